@@ -31,6 +31,7 @@ LAYERS = (
     ("elements",),
     ("volume", "layouts"),
     ("synthesis", "judging"),
+    ("_palettes",),
     ("_verbs",),
     ("quilting",),
     ("growth",),

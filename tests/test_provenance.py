@@ -294,9 +294,13 @@ def test_every_output_is_made_again(here: Path, capsys: Capture, name: str) -> N
 def test_every_format_says_what_it_holds_and_is_made_again(here: Path, capsys: Capture, suffix: str) -> None:
     allowed = FORMATS[suffix]
     made = []
+    if suffix == ".jxl":
+        pytest.importorskip("pillow_jxl")
     if allowed.images:
         dtype = np.float32 if np.dtype(np.float32) in allowed.dtypes else np.uint8
         image = io.read("in.png")
+        # GIF holds few colours.
+        image = image // 64 * 64 if suffix == ".gif" else image
         io.write("in.npy", image if dtype == np.uint8 else image.astype(dtype) / 255)
         made.append(("image", f"tile in.npy -o image{suffix} --wrap x", "3 channels"))
     if allowed.volumes:

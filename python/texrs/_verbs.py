@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
+from texrs import _palettes
 from texrs._arrays import as_image
 from texrs._notices import Notices, collect, repeat
 from texrs._progress import listen
@@ -55,6 +56,7 @@ def takes_materials(
 
     def decorate(verb: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(verb)
+        usual = {name: parameter.default for name, parameter in signature.parameters.items()}
 
         @wraps(verb)
         def run(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -68,9 +70,13 @@ def takes_materials(
             return cast(T, _report(made, notices))
 
         def synthesise(*args: P.args, **kwargs: P.kwargs) -> T:
-            if not any(_holds(value) for value in (*args, *kwargs.values())):
-                return verb(*args, **kwargs)
             given = signature.bind(*args, **kwargs)
+            if not any(_holds(value) for value in (*args, *kwargs.values())):
+                palette = _palettes.find(given.arguments, names, usual)
+                plain: Any = verb(*given.args, **given.kwargs)
+                if palette is not None:
+                    plain = palette.keep(plain) if isinstance(plain, Synthesis) else map(palette.keep, plain)
+                return cast(T, plain)
             watch = given.arguments["progress"] = listen(given.arguments.get("progress"))
             for name in beside:
                 if isinstance(given.arguments.get(name), Material):
@@ -109,6 +115,7 @@ def takes_materials(
 
 def finish(made: Synthesis, materials: list[Material], progress: Progress | None) -> Synthesis:
     """Return what a verb made of guides as what it makes of their materials."""
+    made = _palettes.keep_material(made, materials)
     material = apply_materials(materials, made.source, progress)
     stages = {"guide" if name == "composite" else name: stage for name, stage in made.stages.items()}
     maps = {name: each.role.value for name, each in material.items()}

@@ -24,7 +24,8 @@ from texrs.cli._provenance import RUNNING, check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
 from texrs.io._files import find_suffix
-from texrs.io._formats import RAW, STORE, keeps_spacing
+from texrs.io._formats import RAW, STORE, check, keeps_spacing
+from texrs.io._pillow import write_indexed
 from texrs.io._temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
 
@@ -226,10 +227,18 @@ class _Enough(Exception):
     """What there was to try out worked."""
 
 
-def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (1, 1), *, option: str = "out") -> None:
+def check_output(
+    path: str,
+    like: Array | None = None,
+    size: tuple[int, ...] = (1, 1),
+    *,
+    option: str = "out",
+    fills: bool = False,
+) -> None:
     """Try whether an image of the dtype and channels of ``like`` can be written; leave no trace of it.
 
     Without ``like``, only whether a file can be. What is there must be the command's own, unless all may be replaced.
+    ``fills`` tells that a transparent image can become opaque.
     """
     with suppress(_Enough), write_output(path, option) as temporary:
         if like is None:
@@ -241,6 +250,10 @@ def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (
             longest = min(max(size), LONGEST_PROBE)
             least = np.nan_to_num(np.fmin.reduce(like, axis=None))
             probe = np.full((longest, *(1,) * (axes - 1), *like.shape[axes:]), least, like.dtype)
+            if axes == 2 and like.shape[2:] in ((2,), (4,)):
+                probe[..., -1] = like[..., -1].max() if fills else like[..., -1].min()
+            if find_suffix(temporary).lower() == ".gif":
+                check(like, ".gif", axes)
             (io.write if axes == 2 else io.write_volume)(temporary, probe)
         raise _Enough
 
@@ -344,7 +357,9 @@ def deliver(
     # The result takes its name last, when all else is written.
     with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
         if axes == 2:
-            io.write(temporary, result.image)
+            palette = None if like is None else like.palette
+            if palette is None or not write_indexed(temporary, image, palette):
+                io.write(temporary, result.image)
         else:
             io.write_volume(temporary, result.image, spacing=spacing)
         deliver_beside(result, paths, suffix, made)

@@ -23,6 +23,8 @@ from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING
 from texrs.cli._stacks import is_stack
 from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
+from texrs.io._formats import detect_kind
+from texrs.io._pillow import count_frames
 from texrs.io._temporary import name_prefix
 from texrs.materials import Map, Material
 from texrs.source_map import SourceMap
@@ -273,7 +275,10 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
         except FileError:
             raise error from None
     what = "scale map" if recipe is not None and recipe.verb == "scale-map" else ("image", "volume")[axes - 2]
-    return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}"]
+    frames, palette = count_frames(Path(file), detect_kind(Path(file))), io.read_notes(file).palette
+    also = [f"animation: {frames} frames, the first is read"] * (frames > 1)
+    also += [] if palette is None else [f"palette: {len(palette) // 4} colours"]
+    return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}", *also]
 
 
 def describe_store(path: str) -> str:

@@ -17,6 +17,7 @@ import typer
 from texrs import io
 from texrs._arrays import as_int
 from texrs._notices import Notices, collect
+from texrs._palettes import ask
 from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs, _provenance
@@ -33,6 +34,14 @@ from texrs.synthesis import Synthesis
 VARIANTS = typer.Option(
     help="Make so many, OUT-SEED each, and OUT as their contact sheet.", show_default="one, in OUT", metavar="N"
 )
+PALETTE = Annotated[
+    bool | None,
+    typer.Option(
+        "--palette/--no-palette",
+        help="Look up the nearest pixel and correct no seams, so that the result has only the colours of the input.",
+        show_default="if the input is indexed or has few colours",
+    ),
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +59,8 @@ class Verb:
     """What else is to be said of the result."""
     scaled: bool = True
     """Whether a pixel of the result is as large as one of the first input."""
+    fills: bool = False
+    """Whether a transparent input can give an opaque result."""
     beyond: str = ""
     """What makes larger ones."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
@@ -71,12 +82,16 @@ class Verb:
         for name in ("map", "stages", *(SHOWN if stacked else ())):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
         parameters += [make_parameter(name, type_, None) for name, type_ in OPTIONS.items() if stacked]
+        if stacked:
+            parameters.append(make_parameter("palette", PALETTE, None))
         return [*parameters, make_parameter("count", Threads, None), make_parameter("quiet", Quiet, False)]
 
-    def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
+    def run(
+        self, *, count: int | None, quiet: bool, variants: int | None = None, palette: bool | None = None, **given: Any
+    ) -> None:
         """Do the command; what is too large is told how it is made."""
         try:
-            with collect() as notices:
+            with collect() as notices, ask(palette):
                 self.make(count=count, quiet=quiet, variants=variants, notices=notices, **given)
         except LimitExceeded as error:
             if not self.beyond or not str(error).startswith(("size:", "--size:")):
@@ -115,7 +130,7 @@ class Verb:
         apart = {} if spacing is None else {"spacing": spacing}
         if material is None:
             stack.refuse(paths)
-            _outputs.check_output(out, example, size)
+            _outputs.check_output(out, example, size, fills=self.fills)
             deliver: Callable[..., None] = _outputs.deliver
         else:
             for each in places:

@@ -68,7 +68,7 @@ def make_verb(name: str) -> Verb:
             kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
             names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map", "kind": "scale-kind"}
             options = Options(complete, arguments={"image": UNKNOWN, "hole": HOLE}, kinds=kinds, names=names)
-            return Verb(options, says=tell_sizes)
+            return Verb(options, says=tell_sizes, fills=True)
         case "design":
             from texrs.papers.design import design, design_variants
 
@@ -96,7 +96,7 @@ def make_verb(name: str) -> Verb:
         case "remove":
             from texrs.removal import remove
 
-            return _see(remove, mask=MASK)
+            return replace(_see(remove, mask=MASK), fills=True)
         case "solid":
             from texrs.papers.solid import solid
 

@@ -44,6 +44,7 @@ from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.stitching import guess_instances, make_stitcher
 from texrs.exemplar.symmetry import SUSPECT, Flip, find_mirrors
+from texrs.io import _origins
 
 if TYPE_CHECKING:
     from texrs.io import Header
@@ -113,6 +114,7 @@ class Exemplar:
         self._pixels = checked.copy()
         self._pixels.flags.writeable = False
         self._image = self._pixels if given.ndim > self._axes else self._pixels[..., 0]
+        _origins.carry(given, self._image)
         self._facts: dict[Hashable, object] = {}
 
     def __repr__(self) -> str:

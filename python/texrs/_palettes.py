@@ -1,0 +1,168 @@
+"""Pictures with a palette, or of few colours: results have no other colours than they have.
+
+Interpolation, antialiasing and the correction of seams would make new colours. Therefore the source map looks up each pixel of
+a result at the nearest pixel of the example.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from texrs._conversion import as_ndarray
+from texrs._notices import assume
+from texrs._typing import Array
+from texrs.errors import TexrsError
+from texrs.io import _origins
+from texrs.materials._material import Material
+from texrs.source_map import Finish, SourceMap
+from texrs.synthesis import Synthesis
+
+__all__ = ["Palette", "ask", "find", "has_few_colours", "keep_material", "make_plain"]
+
+MOST = 64
+"""Number of colours that are few. Pixel art has up to 64, and photographs of so few grey levels are rare."""
+SPARE = 8
+"""Number of pixels for each colour, at least: a small cut-out of a photograph has a colour for each pixel."""
+STEP, SHARE = 8, 0.75
+"""Neighbours that differ do so by 8 of 255 levels, in three of four pairs. Smooth pictures have steps of 1 or 2 levels."""
+_ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
+"""If True, any picture keeps its colours; if False, none. If None, indexed pictures and those of few colours do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Palette:
+    """The examples of a verb whose result has no other colours than they have."""
+
+    images: list[Array]
+    count: int
+
+    def keep(self, made: Synthesis) -> Synthesis:
+        """Return a result whose pixels are pixels of the examples."""
+        if made.source.axes != 2:
+            return made
+        source = make_plain(made.source)
+        image = source.render(self.images if len(self.images) > 1 else self.images[0], interpolation="nearest")
+        known = {"blend": 0.0, "interpolation": "nearest"}
+        report = {**made.report, **{key: value for key, value in known.items() if key in made.report}}
+        stages = {name: image if name == "composite" else stage for name, stage in made.stages.items()}
+        return replace(made, image=image, source=source, stages=stages, report={**report, "palette": self.count})
+
+
+@contextmanager
+def ask(kept: bool | None) -> Iterator[None]:
+    """Decide in a block whether pictures keep their colours; None decides for each picture."""
+    token = _ASKED.set(kept)
+    try:
+        yield
+    finally:
+        _ASKED.reset(token)
+
+
+def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) -> Palette | None:
+    """Return the examples among the arguments of a verb, if its result has only their colours.
+
+    A path among the arguments is replaced by the image in it. Arguments that ask for other colours turn this off.
+    """
+    asked, blend, how = _ASKED.get(), given.get("blend"), given.get("interpolation")
+    # Values of other types are refused by the verb.
+    wanted = isinstance(blend, int | float) and blend not in (0, usual.get("blend"))
+    smooth = isinstance(how, str) and how not in ("nearest", usual.get("interpolation"))
+    if asked is False or wanted or smooth or given.get("flatten") is True:
+        return None
+    images: list[tuple[str, Array]] = []
+    for name in names:
+        value = given.get(name)
+        if isinstance(value, str | os.PathLike):
+            with suppress(TexrsError):
+                value = given[name] = as_ndarray(value, name)
+        images += [(name, image) for image in _list_images(value)]
+    if not images or not all(image.ndim in (2, 3) and image.shape[2:] < (5,) for _, image in images):
+        return None
+    known = [_origins.find(image) for _, image in images]
+    if not asked:
+        indexed = [origin is not None and origin[1] for origin in known]
+        kept = [_keeps(image, has_table) for (_, image), has_table in zip(images, indexed, strict=True)]
+        if not all(kept):
+            return None
+    tables = [np.unique(_pack(image)) for _, image in images]
+    for (name, _), origin, table in zip(images, known, tables, strict=True):
+        what = name if origin is None else origin[0]
+        assume(f"{what}: {len(table)} colours, looked up to the nearest pixel and never corrected; see --no-palette")
+    return Palette([image for _, image in images], len(np.unique(np.concatenate(tables))))
+
+
+def has_few_colours(image: Array) -> bool:
+    """Return whether an image has so few colours that a new one would be seen.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> has_few_colours(texrs.samples.pebbles((64, 64)).image)
+    False
+    >>> has_few_colours(np.kron(np.eye(8, dtype=np.uint8), np.full((4, 4), 255, np.uint8)))
+    True
+
+    """
+    if image.dtype not in (np.uint8, np.uint16) or image.ndim not in (2, 3) or image.shape[2:] >= (5,):
+        return False
+    if min(image.shape) == 0 or len(np.unique(_pack(image[: max(1, 2**14 // image.shape[1])]))) > MOST:
+        return False
+    if not 2 <= len(np.unique(_pack(image))) <= min(MOST, image.shape[0] * image.shape[1] // SPARE):
+        return False
+    pixels = image.reshape(*image.shape[:2], -1).astype(np.int32)
+    steps = np.concatenate([np.abs(np.diff(pixels, axis=a)).max(axis=-1).ravel() for a in (0, 1)])
+    least = STEP * np.iinfo(image.dtype).max // 255
+    return bool((steps >= least).sum() >= SHARE * (steps > 0).sum())
+
+
+def make_plain(source: SourceMap) -> SourceMap:
+    """Return a source map whose pixels are looked up to the nearest pixel and are not corrected."""
+    wrap = (False, False) if source.finish is None else source.finish.wrap
+    return replace(source, finish=Finish(wrap, interpolation="nearest"))
+
+
+def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
+    """Return a result whose maps are looked up to the nearest pixel, if the colours of its materials are few."""
+    asked, bases = _ASKED.get(), [m.base for m in materials]
+    few = asked is not False and made.source.axes == 2 and all(has_few_colours(base) for base in bases)
+    if not few and not asked:
+        return made
+    assume("maps: few colours, looked up to the nearest pixel and never corrected; see --no-palette")
+    return replace(made, source=make_plain(made.source))
+
+
+def _keeps(image: Array, indexed: bool) -> bool:
+    """Return whether an image keeps its colours: a palette of many greys is that of a grey photograph."""
+    if not indexed or image.dtype != np.uint8:
+        return has_few_colours(image)
+    grey = image.ndim == 2 or (image.shape[2] >= 3 and bool((image[..., :3] == image[..., :1]).all()))
+    return has_few_colours(image) or not (grey and len(np.unique(_pack(image))) > MOST)
+
+
+def _list_images(value: object) -> Iterator[Array]:
+    """Return the images of an argument: arrays, what holds one, or a list of such."""
+    several = value if isinstance(value, list | tuple) else [value]
+    for each in several:
+        image = each if isinstance(each, np.ndarray) else getattr(each, "image", None)
+        if image is None and type(each).__module__.startswith("PIL."):
+            image = as_ndarray(each, "image")
+        if isinstance(image, np.ndarray):
+            yield image
+
+
+def _pack(image: Array) -> Array:
+    """Return the colours of pixels as one number each."""
+    if image.ndim == 2:
+        return image.ravel()
+    flat = np.ascontiguousarray(image).reshape(-1, image.shape[2])
+    if image.dtype.itemsize > 2 or image.dtype.kind not in "bu":
+        return np.unique(flat, axis=0, return_inverse=True)[1].ravel()
+    weights = np.array([1 << 16 * k for k in range(image.shape[2])], np.uint64)
+    return flat.astype(np.uint64) @ weights
