@@ -103,6 +103,22 @@ def test_a_seed_says_what_comes():
         assert work(5) == work(5)
 
 
+def draw(_: int) -> tuple[int, bytes]:
+    made = AUGMENT(IMAGE)
+    return made.seed, made.image.tobytes()
+
+
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_without_a_seed_each_sample_differs_in_this_process_and_in_forked_workers():
+    made = [draw(0) for _ in range(2)]
+    if "fork" in multiprocessing.get_all_start_methods():
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            made += pool.map(draw, range(4), chunksize=1)
+    assert len({seed for seed, _ in made}) == len(made)
+    assert len({image for _, image in made}) == len(made)
+    assert AUGMENT(IMAGE, seed=made[0][0]).image.tobytes() == made[0][1]
+
+
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
 def test_things_of_large_pictures_are_found_on_half_of_the_samples(dtype: str):
     sample = texrs.samples.dots((160, 150))
@@ -193,6 +209,28 @@ def test_in_a_pipeline_of_albumentations():
     both = alb.Compose([Transform(p=1)], seed=1)(image=IMAGE, mask=np.dstack([ROWS, COLUMNS]).astype(np.int32))
     assert np.array_equal(both["image"], IMAGE[both["mask"][..., 0], both["mask"][..., 1]])
     assert Transform(p=1).to_dict()["transform"]["visible"] == 0.5
+
+
+def ask_albumentations(pipe: object, results: object) -> None:
+    results.put(pipe(image=IMAGE)["image"].tobytes())
+
+
+@pytest.mark.parametrize("seed", [None, 5])
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_workers_of_albumentations_differ_and_a_seed_repeats_them(seed: int | None):
+    alb = pytest.importorskip("albumentations", reason="is no dependency, for it brings OpenCV")
+    from texrs.transforms.albumentations import TextureAugment as Transform
+
+    pipe, context = alb.Compose([Transform(p=1)], seed=seed), multiprocessing.get_context("fork")
+    found = []
+    for name in ("first", "second", "first"):
+        results = context.SimpleQueue()
+        worker = context.Process(target=ask_albumentations, args=(pipe, results), name=name)
+        worker.start()
+        found.append(results.get())
+        worker.join()
+    assert found[0] != found[1]
+    assert found[0] == found[2]
 
 
 def test_in_a_pipeline_of_torchvision():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from secrets import randbits
 from typing import NamedTuple
 
 import numpy as np
@@ -38,14 +39,16 @@ class Augmented(NamedTuple):
         Which of the boxes that were given each follows from, from 0.
     source : SourceMap
         Where each pixel comes from: whatever else is in register follows with ``source.render``.
+    seed : int
+        The seed that was used. The same seed gives the same sample again.
 
     Examples
     --------
     >>> import texrs
     >>> sample = texrs.samples.dots((96, 96))
     >>> made = texrs.transforms.TextureAugment()(sample.image, sample.labels, seed=1)
-    >>> made.mask.shape, made.boxes is None
-    ((96, 96), True)
+    >>> made.mask.shape, made.boxes is None, made.seed
+    ((96, 96), True, 1)
 
     """
 
@@ -59,6 +62,8 @@ class Augmented(NamedTuple):
     """Which of the boxes that were given each follows from."""
     source: SourceMap
     """Where each pixel comes from: whatever else is in register follows with ``source.render``."""
+    seed: int
+    """The seed that was used. The same seed gives the same sample again."""
 
 
 def find_things(image: Exemplar) -> ElementOptions:
@@ -84,7 +89,8 @@ class TextureAugment:
     side by side, seams avoid what would show them, and things stay whole where they can (`texrs.design` with ``plan="still"``).
     No pixel is made up, and none is interpolated.
 
-    The same picture and seed give the same result in any process and with any number of threads. The interpreter lock is
+    Each call without a seed gives another sample. The operating system draws its seed, so forked workers also differ. The same
+    picture and seed give the same result in any process and with any number of threads. The interpreter lock is
     released while the kernels work, so that threads serve as well as processes, and forked and spawned workers are alike. In a
     loader with a worker a core, `texrs.threads` or the environment variable ``RAYON_NUM_THREADS=1`` keeps workers out of each
     other's way. What is known of a picture is kept for a while, so that its second result takes a fraction of the first's
@@ -123,7 +129,11 @@ class TextureAugment:
         return f"TextureAugment(visible={self.visible})"
 
     def __call__(
-        self, image: Array | Exemplar, mask: Array | None = None, boxes: Array | None = None, seed: int = 0
+        self,
+        image: Array | Exemplar,
+        mask: Array | None = None,
+        boxes: Array | None = None,
+        seed: int | None = None,
     ) -> Augmented:
         """Return another picture of the same size, with its labels and its boxes.
 
@@ -135,13 +145,14 @@ class TextureAugment:
             Labels in register, any dtype.
         boxes : (n, 4 or more) array_like, optional
             left, top, right, bottom in pixels; what stands behind stays with the box.
-        seed : int
-            Of the sample: the same seed, the same result.
+        seed : int, optional
+            Seed of the sample, 0 to 2^64 - 1. The same seed gives the same result. Default: a new seed for each call, which
+            is in the result.
 
         Returns
         -------
         Augmented
-            A named tuple of image, mask, boxes, which and source.
+            A named tuple of image, mask, boxes, which, source and seed.
 
         Raises
         ------
@@ -149,7 +160,9 @@ class TextureAugment:
             Not a picture, a mask of another size, or no boxes but something else.
 
         """
-        known, number = as_exemplar(image, "image", minimum=SHORTEST), as_seed(seed)
+        known = as_exemplar(image, "image", minimum=SHORTEST)
+        # A generator of this process would be copied into each forked worker, and all workers would return the same samples.
+        number = randbits(64) if seed is None else as_seed(seed)
         labels = None if mask is None else as_ndarray(mask, "mask")
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
             raise InvalidInput(f"mask: needs the size of the image, {known.shape}, got {labels.shape[:2]}")
@@ -158,4 +171,4 @@ class TextureAugment:
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")
         kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.visible)
-        return Augmented(shown, followed, kept, index, source)
+        return Augmented(shown, followed, kept, index, source, number)

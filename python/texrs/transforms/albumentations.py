@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from multiprocessing import current_process, parent_process
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from albumentations import DualTransform
@@ -22,8 +24,10 @@ def __dir__() -> list[str]:
 class TextureAugment(DualTransform):  # type: ignore[misc]
     """Lay pictures anew from pieces of themselves, in a pipeline of albumentations: images, masks and boxes.
 
-    Seeds are drawn from the pipeline's own generator, so that ``Compose(..., seed=...)`` says what comes. Boxes become several
-    where a thing is copied several times, and their labels with them.
+    The pipeline's own generator draws the seeds, so ``Compose(..., seed=...)`` decides the samples. Each worker process has
+    a copy of this generator in the same state. Therefore the name of the process, which its parent counts, also goes into the
+    seed: workers differ, and so do the workers of the next epoch. Boxes become several if an element is copied several times,
+    and their labels follow.
 
     Parameters
     ----------
@@ -49,7 +53,10 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
     def get_params_dependent_on_data(self, params: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
         """Return the source map of this sample."""
         image = data["image"] if "image" in data else data["images"][0]
-        return {"source": self._augment(image, seed=self.py_random.getrandbits(63)).source}
+        seed = self.py_random.getrandbits(63)
+        if parent_process() is not None:
+            seed ^= crc32(current_process().name.encode()) << 31
+        return {"source": self._augment(image, seed=seed).source}
 
     def apply(self, img: Array, *, source: Any, **params: Any) -> Array:
         """Return the picture, laid anew."""
