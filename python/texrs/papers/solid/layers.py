@@ -25,6 +25,7 @@ from texrs._cache import Cache
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._engine.stitcher import Shown
 from texrs._progress import answering, ask, stage
+from texrs._threads import SideBySide
 from texrs._typing import Floats, Progress
 from texrs.exemplar import Exemplar
 from texrs.exemplar.regularity import find_lattice
@@ -53,6 +54,8 @@ FITS = 0.9
 """Patches are as large as so much of the exemplar, at most: there are places to choose from."""
 WORK = 256 << 20
 """Bytes of boxes that a window keeps while it is made, about."""
+BESIDE = 8
+"""Boxes that are made side by side: each takes some memory of its own."""
 _PROBES, _FAR = 64, 512
 
 Key: TypeAlias = tuple[int, ...]
@@ -148,19 +151,34 @@ class Layers:
         return self._bring_around(out)
 
     def _make_all(self, keys: Sequence[Key], progress: Progress | None) -> Iterator[Box]:
-        """Return some boxes, one after the other."""
+        """Return some boxes, one after the other; those of a layer are made side by side."""
         advance = stage(progress, "patches")
         total = len(self._find_missing(keys)) if advance else 0
         work: Cache[Key, Box] = Cache(WORK, lambda box: box.nbytes)
-        made = 0
+        made, furthest = 0, 0.0
 
-        def begin() -> Callable[[float], object] | None:
-            nonlocal made
-            before, made = made, made + 1
-            return None if advance is None else lambda share: advance(min(1.0, (before + share) / max(total, 1)))
+        def watch(number: int, share: float) -> None:
+            nonlocal furthest
+            if advance is None:
+                ask()
+            else:
+                furthest = max(furthest, min(1.0, (made + number + share) / max(total, 1)))
+                advance(furthest)
 
-        for key in keys:
-            yield self._get(key, work, begin)
+        def make(key: Key, tell: Callable[[float], object]) -> Box:
+            return self._get(key, work, tell)
+
+        with SideBySide(BESIDE) as beside:
+            for start in range(0, len(keys), BESIDE):
+                some = keys[start : start + BESIDE]
+                missing = self._find_missing(some)
+                # Below first, so that no two of a layer wait for the same box.
+                for layer in sorted({key[0] for key in missing}):
+                    group = sorted(key for key in missing if key[0] == layer and work.get(key) is None)
+                    beside.do(make, group, watch)
+                    made += len(group)
+                for key in some:
+                    yield self._get(key, work, lambda share: watch(0, 0.0))
 
     def _find_missing(self, keys: Sequence[Key]) -> set[Key]:
         """Return the boxes that must be made for some."""
@@ -173,25 +191,22 @@ class Layers:
                 todo += self._below(key)
         return found
 
-    def _get(self, key: Key, work: Cache[Key, Box], begin: Callable[[], Callable[[float], object] | None]) -> Box:
+    def _get(self, key: Key, work: Cache[Key, Box], advance: Callable[[float], object]) -> Box:
         """Return a box: one that is kept, or made from those below it."""
         box = work.get(key) or self._kept.get(key)
         if box is None:
-            below = [self._get(k, work, begin) for k in self._below(key)]
-            box = self._make(key, below, begin())
+            below = [self._get(k, work, advance) for k in self._below(key)]
+            box = self._make(key, below, advance)
             self._kept.put(key, box)
         work.put(key, box)
         return box
 
-    def _make(self, key: Key, below: Sequence[Box], advance: Callable[[float], object] | None) -> Box:
+    def _make(self, key: Key, below: Sequence[Box], advance: Callable[[float], object]) -> Box:
         """Cut a patch into what the layer below shows in a box."""
         region = self._region(key)
         frames, last = to_fixed(self.field, region), key[0] == len(self.shifts) - 1
         # Boxes are made sooner than a kernel looks up from its work.
-        if advance is None:
-            ask()
-        else:
-            advance(0.0)
+        advance(0.0)
         with answering(advance, 0.0):
             stitcher = self.exemplar.stitcher
         shown = stitcher.cover(
