@@ -59,7 +59,7 @@ def test_a_material_in_16_bit_along_an_axis_as_obj(here: Path) -> None:
 
 def test_colours_of_corners(here: Path) -> None:
     assert main(["paint", "ball.stl", "stripes.tif", "-o", "c.ply", "--vertices", *SMALL]) == 0
-    vertices, faces = texrs.painting._meshes.read_mesh("ball.stl")[:2]
+    vertices, faces = texrs.painting._reading.read_mesh("ball.stl")[:2]
     wanted = texrs.SolidTexture(STRIPES).sample(vertices[:, ::-1] * 2)
     assert np.array_equal(trimesh.load("c.ply", process=False).visual.vertex_colors[:, :3], wanted)
     assert len(faces) == 80

@@ -11,7 +11,7 @@ from texrs import samples
 from texrs.errors import FileError, InvalidInput
 from texrs.painting import follow, paint
 from texrs.painting._baking import bake_points, lean
-from texrs.painting._meshes import find_normals
+from texrs.painting._meshes import find_normals, find_tangents
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -149,7 +149,9 @@ def test_normals_of_space_tilt_a_ball_by_what_lies_in_its_surface(baked: texrs.p
     relief = paint(BALL, carved((0.6, 0, 0.8)), scale=1.0, atlas=128).relief
     assert relief is not None
     assert baked.uv is not None
-    frames = bake_frames(baked.vertices, baked.faces, baked.uv, 128, 0)
+    normals = find_normals(baked.vertices, baked.faces)
+    tangents = find_tangents(baked.vertices, baked.faces, baked.uv, normals)
+    frames = bake_frames(normals, tangents, baked.faces, baked.uv, 128, 0)
     there = bake_points(baked.vertices, baked.faces, baked.uv, 128, 0)[1]
     shown = np.einsum("nij,ni->nj", frames[there], relief[there])
     out, rise = frames[there][:, 2], np.array([-0.75, 0, 0])

@@ -26,7 +26,7 @@ from texrs.io._temporary import name_prefix
 from texrs.materials import Material
 from texrs.painting import choose_scale, follow, paint
 from texrs.painting._files import check_suffix
-from texrs.painting._meshes import read_mesh
+from texrs.painting._reading import read_mesh
 from texrs.papers.solid.window import SolidTexture
 
 
@@ -42,7 +42,7 @@ BLOCK = Kind("FILE|FOLDER", read_block, "A volume, a folder of volumes that are 
 TEXTURE = Options(SolidTexture, arguments={"exemplar": BLOCK}, leave={"cache_bytes": "one process makes all"}, axes=3)
 MESH = Kind("FILE", lambda text, about: text, ".obj, .ply, .stl or .glb.")
 PAINTED = Options(
-    paint, only=("mesh", "scale", "atlas", "padding"), arguments={"mesh": MESH}, names={"scale": "voxels"}
+    paint, only=("mesh", "scale", "atlas", "padding", "unwrap"), arguments={"mesh": MESH}, names={"scale": "voxels"}
 )
 FOLLOWED = Options(
     follow,
@@ -92,7 +92,7 @@ def paint_command(
             size = painted.setdefault("scale", choose_scale(surface[0], texture))
             texture = SolidTexture(**call | {"field": follow(surface[:2], **followed, scale=size)})
         painted["atlas"] = None if corners else painted.get("atlas", given["atlas"])
-        made = paint(mesh, texture, **painted, progress=progress)
+        made = paint(surface, texture, **painted, progress=progress)
     depth: Any = bits
     with TemporaryDirectory(prefix=name_prefix(), dir=folder) as beside:
         # Files name each other, so they are written under their own names first.
@@ -105,7 +105,8 @@ def paint_command(
                 shutil.copyfile(file, temporary)
         with _outputs.write_output(out) as temporary:
             shutil.copyfile(last, temporary)
-    size_ = f"{len(made.vertices)} corners" if made.uv is None else f"an atlas of {given['atlas']} x {given['atlas']}"
+    many = f"{len(made.sets)} texture sets" if len(made.sets) > 1 else "an atlas"
+    size_ = f"{len(made.vertices)} corners" if made.uv is None else f"{many} of {given['atlas']} x {given['atlas']}"
     note(f"wrote {out}: {len(made.faces)} triangles, {size_}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
 

@@ -65,15 +65,20 @@ def write_gltf(maps: Mapping[str, Map], path: Path, shapes: Sequence[str], repea
     size = next(iter(maps.values())).pixels.shape[:2]
     makers = {"plane": make_plane, "sphere": make_sphere}
     pictures, material = make_pictures(maps, depth)
-    return write_shapes([(s, makers[s](size, times)) for s in wanted], pictures, material, target)
+    return write_shapes([(s, makers[s](size, times)) for s in wanted], pictures, [material], target, apart=APART)
 
 
 def write_shapes(
-    shapes: Sequence[tuple[str, Mesh]], pictures: Mapping[str, Array], material: dict[str, Any], target: FilePath
+    shapes: Sequence[tuple[str, Mesh]],
+    pictures: Mapping[str, Array],
+    materials: Sequence[dict[str, Any]],
+    target: FilePath,
+    *,
+    apart: float = 0.0,
 ) -> list[FilePath]:
-    """Write shapes of one material, whose textures are pictures by number, and return the files."""
+    """Write shapes and their materials, whose textures are pictures by number, and return the files."""
     suffix = target.suffix.lower()
-    document, data = lay_out(shapes, material, target.stem)
+    document, data = lay_out(shapes, materials, target.stem, apart)
     files: dict[FilePath, bytes] = {}
     for number, (name, picture) in enumerate(pictures.items()):
         coded = encode(name, picture, "png")
@@ -106,15 +111,15 @@ def write_shapes(
     return order
 
 
-def make_pictures(maps: Mapping[str, Map], depth: int) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the pictures of a material by name, and the material whose textures are these, by number."""
+def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Return the pictures of a material by name, and the material whose textures are these, by number from the first."""
     pictures: dict[str, Array] = {}
     rough: dict[str, Any] = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0], "metallicFactor": METAL, "roughnessFactor": ROUGH}
     material: dict[str, Any] = {"pbrMetallicRoughness": rough}
 
     def add(name: str, picture: Array) -> dict[str, Any]:
         pictures[name] = picture
-        return {"index": len(pictures) - 1}
+        return {"index": first + len(pictures) - 1}
 
     colour, opacity = find_map(maps, Role.COLOUR), find_opacity(maps)
     see_through = opacity is not None and bool((opacity < 1).any())
@@ -161,23 +166,26 @@ def to_depth(values: Floats, depth: int) -> Array:
     return np.rint(np.clip(values, 0, 1) * np.float64(np.iinfo(kind).max)).astype(kind)
 
 
-def lay_out(shapes: Sequence[tuple[str, Mesh]], material: dict[str, Any], name: str) -> tuple[dict[str, Any], bytes]:
+def lay_out(
+    shapes: Sequence[tuple[str, Mesh]], materials: Sequence[dict[str, Any]], name: str, apart: float
+) -> tuple[dict[str, Any], bytes]:
     """Return a document of the shapes, side by side, and the buffer of their vertices."""
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": f"texrs {__version__}"},
         "scene": 0,
-        "scenes": [{"nodes": list(range(len(shapes)))}],
+        "scenes": [{"nodes": list(range(len({name for name, _ in shapes})))}],
         "nodes": [],
         "meshes": [],
-        "materials": [{"name": name, **material}],
+        "materials": [{"name": name, **material} for material in materials],
         "textures": [],
         "images": [],
         "samplers": [{"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": REPEAT, "wrapT": REPEAT}],
         "accessors": [],
         "bufferViews": [],
     }
-    if "extensions" in material:
-        document["extensionsUsed"] = list(material["extensions"])
+    extensions = sorted({name for material in materials for name in material.get("extensions", ())})
+    if extensions:
+        document["extensionsUsed"] = extensions
     data = b""
     for number, (shape, mesh) in enumerate(shapes):
         numbers: dict[str, int] = {}
@@ -198,11 +206,16 @@ def lay_out(shapes: Sequence[tuple[str, Mesh]], material: dict[str, Any], name: 
             document["bufferViews"].append(view | {"target": INDICES if key == "indices" else VERTICES})
             data += pad(coded, b"\0")
         indices = numbers.pop("indices")
-        primitive = {"attributes": numbers, "indices": indices, "material": 0}
+        primitive = {"attributes": numbers, "indices": indices, "material": mesh.material}
+        before = next((mesh for mesh in document["meshes"] if mesh["name"] == shape), None)
+        if before is not None:
+            # Another material of the same shape.
+            before["primitives"].append(primitive)
+            continue
         document["meshes"].append({"name": shape, "primitives": [primitive]})
-        node: dict[str, Any] = {"name": shape, "mesh": number}
-        if len(shapes) > 1:
-            node["translation"] = [APART * (2 * number - 1), 0.0, 0.0]
+        node: dict[str, Any] = {"name": shape, "mesh": len(document["meshes"]) - 1}
+        if len(shapes) > 1 and apart:
+            node["translation"] = [apart * (2 * number - 1), 0.0, 0.0]
         document["nodes"].append(node)
     return document, data
 

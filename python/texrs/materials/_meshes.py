@@ -33,6 +33,8 @@ class Mesh:
         Three corners each.
     more : dict of str to array
         What else corners have, by the names of glTF.
+    material : int
+        Number of the material.
 
     """
 
@@ -42,6 +44,7 @@ class Mesh:
     places: Floats | None
     faces: NDArray[np.unsignedinteger]
     more: dict[str, Array] = field(default_factory=dict)
+    material: int = 0
 
 
 def make_plane(shape: Sequence[int], repeat: int) -> Mesh:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, as_one, to_unit
+from texrs._arrays import as_bool, as_float, as_int, as_one, to_unit
 from texrs._progress import answering, listen
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import InvalidInput
@@ -21,8 +21,11 @@ from texrs.materials import Map, Role
 from texrs.painting._baking import bake_points, fill_between, lean
 from texrs.painting._directions import follow
 from texrs.painting._files import write_mesh
-from texrs.painting._meshes import read_mesh, unwrap
+from texrs.painting._meshes import find_tangents, shade
+from texrs.painting._reading import read_mesh
 from texrs.painting._relief import bake_frames, carve, read_slopes
+from texrs.painting._sets import Laid, lay_flat
+from texrs.painting._surface import MESH, PAINTED, Surface
 from texrs.papers.solid.window import SolidTexture
 
 __all__ = ["Painted", "follow", "paint"]
@@ -34,7 +37,8 @@ def __dir__() -> list[str]:
 
 FINEST = 4.0
 """Exemplars along the longest side of a mesh, unless it is said how large the texture is."""
-_BAND = 1 << 18
+_BAND = 1 << 20
+_BLOCK = 256.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,14 +52,19 @@ class Painted:
     faces : (M, 3) int64
         Three corners each.
     maps : dict of str to array
-        What was sampled, in the exemplar's dtype: (N[, C]) at the corners, or (size, size[, C]) over the atlas. A texture of an
-        array has one, "image".
+        Sampled maps, in the exemplar's dtype: (N[, C]) at the corners, or (size, size[, C]) over the atlas. Several texture
+        sets have (sets, size, size[, C]). A texture of an array has one map, "image".
     uv : (N, 2) float64, optional
-        Where each corner lies in the atlas, from its lower left; None where corners have colours.
+        Place of each corner in the atlas, from its lower left; None if corners have colours.
     roles : dict of str to Role
-        What the maps of a material are for.
+        Roles of the maps of a material.
     relief : (size, size, 3) float32, optional
         Normals over the atlas, x to its right, y up, z out of the surface: those of a material, or else those of its heights.
+        Several texture sets have (sets, size, size, 3).
+    sets : tuple of str
+        Names of the texture sets. There is one, unless UVs of materials or of parts overlap, or lie in several tiles.
+    which : (M,) int64, optional
+        Texture set of each face; None if there is one.
 
     Examples
     --------
@@ -74,13 +83,17 @@ class Painted:
     uv: NDArray[np.float64] | None = field(default=None)
     roles: dict[str, Role] = field(default_factory=dict)
     relief: Floats | None = field(default=None)
+    sets: tuple[str, ...] = field(default=(PAINTED,))
+    which: NDArray[np.int64] | None = field(default=None)
+    _surface: Surface | None = field(default=None, repr=False)
 
     def save(self, path: Path, *, depth: Literal[8, 16] | None = None) -> list[FilePath]:
         """Write the mesh with every map that its format has a place for.
 
         To .glb and .gltf go colours, opacity, roughness, metal, occlusion, light, and `relief`; to .obj the same beside it, by
-        its .mtl. Corners have their colours as light in 16 bit in .glb, with other maps as attributes of their names (_HEIGHT),
-        and as they are seen in .obj and .ply; without an atlas there is no relief.
+        its .mtl. Names of objects and materials stay, and so do normals. A mesh from an .obj goes to .obj with all its lines in
+        their order, unless an atlas was computed for it. Corners have their colours as light in 16 bit in .glb, with other maps
+        as attributes of their names (_HEIGHT), and as they are seen in .obj and .ply; without an atlas there is no relief.
 
         Parameters
         ----------
@@ -111,12 +124,20 @@ class Painted:
 
         """
         usual = dict.fromkeys(self.maps, Role.COLOUR)
-        maps = {}
-        for name, pixels in self.maps.items():
-            role = (usual | self.roles)[name]
-            maps[name] = Map(pixels, role, "srgb" if role.coloured and pixels.dtype.kind in "ui" else "linear")
         depth = as_one(depth, "depth", 8, 16, None)
-        return write_mesh(as_path(path), self.vertices, self.faces, self.uv, maps, self.relief, depth)
+        count, several = len(self.sets), []
+        for k in range(count):
+            maps = {}
+            for name, pixels in self.maps.items():
+                role = (usual | self.roles)[name]
+                space: Literal["srgb", "linear"] = "srgb" if role.coloured and pixels.dtype.kind in "ui" else "linear"
+                maps[name] = Map(pixels if count == 1 else pixels[k], role, space)
+            several.append(maps)
+        reliefs = [self.relief if self.relief is None or count == 1 else self.relief[k] for k in range(count)]
+        nothing = np.zeros(len(self.faces), np.int64)
+        surface = self._surface or Surface(self.vertices, self.faces, None, None, nothing, (PAINTED,), (MESH,))
+        which = nothing if self.which is None else self.which
+        return write_mesh(as_path(path), surface._replace(uv=self.uv), self.sets, which, several, reliefs, depth)
 
 
 def paint(
@@ -126,6 +147,7 @@ def paint(
     scale: float | None = None,
     atlas: int | None = 1024,
     padding: int = 4,
+    unwrap: bool = False,
     progress: Progress | bool | None = None,
 ) -> Painted:
     """Sample a texture of space over the surface of a mesh.
@@ -133,8 +155,9 @@ def paint(
     Parameters
     ----------
     mesh : path_like, trimesh.Trimesh, or (vertices, faces)
-        Triangles: a file (.obj, .ply, .stl, .glb), a mesh, or arrays (N, 3) and (M, 3). Its own coordinates in an atlas are
-        kept, others are made by xatlas. x, y and z are those of columns, rows and planes.
+        Triangles: a file (.obj, .ply, .stl, .glb), a mesh, or arrays (N, 3) and (M, 3). Its own UVs are kept; faces without
+        UVs are laid out by xatlas. x, y and z are those of columns, rows and planes. Materials share one atlas, unless their
+        UVs overlap; then each has its own atlas. Each tile of UVs beyond 0 to 1 (UDIM) has its own also.
     texture : SolidTexture
         Of an array, or of a material, of which all maps are sampled. Its normals say how its relief leans along columns and
         rows, (0, 0, 1) not at all, and the surface leans as much wherever it cuts the texture.
@@ -145,6 +168,8 @@ def paint(
     padding : int
         Texels by which each piece of the atlas goes on beyond its outline, 0 to 64, by where they would lie in space: so that
         nothing is seen where pieces meet.
+    unwrap : bool
+        If True, xatlas lays out the whole mesh again, and its own UVs are not used.
     progress : callable or True, optional
         Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
 
@@ -172,38 +197,80 @@ def paint(
     watch = listen(progress)
     if not isinstance(texture, SolidTexture):
         raise InvalidInput(f"texture: needs a texrs.SolidTexture, got {type(texture).__name__}")
-    vertices, faces, uv = read_mesh(mesh)
-    size = choose_scale(vertices, texture) if scale is None else as_float(scale, "scale", 1e-9, 1e9)
+    surface = read_mesh(mesh)
+    side = None if atlas is None else as_int(atlas, "atlas", 16, 16384)
+    more, fresh = as_int(padding, "padding", 0, 64), as_bool(unwrap, "unwrap")
+    size = choose_scale(surface.vertices, texture) if scale is None else as_float(scale, "scale", 1e-9, 1e9)
     material = texture.material
     roles = {} if material is None else {name: each.role for name, each in material.items()}
-    if atlas is None:
-        return Painted(vertices, faces, _sample(texture, vertices * size, watch), None, roles)
-    side, more = as_int(atlas, "atlas", 16, 16384), as_int(padding, "padding", 0, 64)
+    if side is None:
+        corners = _sample(texture, surface.vertices * size, watch)
+        return Painted(surface.vertices, surface.faces, corners, None, roles, _surface=surface._replace(uv=None))
     with answering(watch, "atlas", 0.0):
-        if uv is None:
-            vertices, faces, uv = unwrap(vertices, faces, side, more)
-        points, there = bake_points(vertices, faces, uv, side, more)
-    if not there.any():
+        laid = lay_flat(surface, side, more, fresh=fresh)
+        baked = [bake_points(*_take_set(laid, k), side, more) for k in range(len(laid.names))]
+    if not all(there.any() for _, there in baked):
         raise InvalidInput("mesh: its atlas has no area: it lies in one line, or beyond 0 to 1")
-    maps, whole = _sample(texture, points[there] * size, watch), {}
-    for name, values in maps.items():
-        empty = np.zeros((side, side, *values.shape[1:]), values.dtype)
-        empty[there] = values
-        whole[name] = fill_between(empty, there)
-    relief = None
-    normal = next((name for name, role in roles.items() if role.normal), None)
-    height = next((name for name, role in roles.items() if role is Role.HEIGHT), None)
-    if material is not None and normal is not None:
-        slopes = read_slopes(material[normal])
-        relief = np.zeros((side, side, 3), np.float32)
-        frames = bake_frames(vertices, faces, uv, side, more)[there]
-        relief[there] = carve(_sample_slopes(texture, points[there] * size, slopes), frames)
-        relief = fill_between(relief, there)
+    points = np.concatenate([points[there] for points, there in baked])
+    values = _sample(texture, points * size, watch)
+    ends = np.cumsum([there.sum() for _, there in baked])[:-1]
+    maps: dict[str, Array] = {}
+    for name, all_ in values.items():
+        maps[name] = _stack([_spread(v, there) for v, (_, there) in zip(np.split(all_, ends), baked, strict=True)])
+    relief = _make_relief(texture, laid, baked, maps, size, more)
+    surface, which = laid.surface, None if len(laid.names) == 1 else laid.which
+    return Painted(surface.vertices, surface.faces, maps, surface.uv, roles, relief, laid.names, which, surface)
+
+
+def _make_relief(
+    texture: SolidTexture,
+    laid: Laid,
+    baked: list[tuple[NDArray[np.float64], NDArray[np.bool_]]],
+    maps: dict[str, Array],
+    size: float,
+    padding: int,
+) -> Floats | None:
+    """Return normals over the atlas of each set: those of a material, else those of its heights, else none."""
+    material, surface, side = texture.material, laid.surface, len(baked[0][1])
+    if material is None:
+        return None
+    normal = next((name for name, each in material.items() if each.role.normal), None)
+    height = next((name for name, each in material.items() if each.role is Role.HEIGHT), None)
+    reliefs = []
+    if normal is not None:
+        slopes, normals = read_slopes(material[normal]), shade(surface)
+        assert surface.uv is not None
+        tangents = find_tangents(surface.vertices, surface.faces, surface.uv, normals)
+        for k, (points, there) in enumerate(baked):
+            _, faces, uv = _take_set(laid, k)
+            frames = bake_frames(normals, tangents, faces, uv, side, padding)[there]
+            reliefs.append(_spread(carve(_sample_slopes(texture, points[there] * size, slopes), frames), there))
     elif height is not None:
-        values = whole[height] if whole[height].ndim == 2 else whole[height][..., 0]
-        inside = bake_points(vertices, faces, uv, side, 0)[1]
-        relief = lean(to_unit(values) if values.dtype.kind in "bui" else values, points, there, inside)
-    return Painted(vertices, faces, whole, uv, roles, relief)
+        for k, (points, there) in enumerate(baked):
+            values = maps[height] if len(baked) == 1 else maps[height][k]
+            values = values if values.ndim == 2 else values[..., 0]
+            inside = bake_points(*_take_set(laid, k), side, 0)[1]
+            reliefs.append(lean(to_unit(values) if values.dtype.kind in "bui" else values, points, there, inside))
+    return _stack(reliefs) if reliefs else None
+
+
+def _take_set(laid: Laid, number: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return the vertices, faces and UVs in 0 to 1 of a texture set."""
+    surface, mine = laid.surface, laid.which == number
+    assert surface.uv is not None
+    # All faces of a set are in one tile.
+    return surface.vertices, surface.faces[mine], surface.uv - laid.tile[mine][0]
+
+
+def _stack(arrays: list[Array]) -> Array:
+    return arrays[0] if len(arrays) == 1 else np.stack(arrays)
+
+
+def _spread(values: Array, there: NDArray[np.bool_]) -> Array:
+    """Return values of the texels of an atlas, with those of the nearest texel between its pieces."""
+    empty = np.zeros((*there.shape, *values.shape[1:]), values.dtype)
+    empty[there] = values
+    return fill_between(empty, there)
 
 
 def choose_scale(vertices: NDArray[np.float64], texture: SolidTexture) -> float:
@@ -223,12 +290,23 @@ def _sample_slopes(texture: SolidTexture, points: NDArray[np.float64], slopes: F
 
 
 def _sample(texture: SolidTexture, points: NDArray[np.float64], watch: Progress | None) -> dict[str, Array]:
-    at = points[:, ::-1]
+    """Return the maps of a texture at points (x, y, z) in voxels."""
+    # Neighbours together: what is made for one band of points is used up there.
+    order = np.lexsort((points // _BLOCK).T)
+    at = points[order, ::-1]
     parts = []
     for start in range(0, max(len(at), 1), _BAND):
         some = at[start : start + _BAND]
-        with answering(watch, "sample", start / max(len(at), 1)):
-            parts.append({"image": texture.sample(some)} if texture.material is None else texture.sample_maps(some))
-        if watch is not None:
-            watch("sample", min(1.0, (start + _BAND) / max(len(at), 1)))
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        first, share = start / max(len(at), 1), len(some) / max(len(at), 1)
+
+        def tell(stage: str, done: float, first: float = first, share: float = share) -> None:
+            if watch is not None:
+                watch("sample", first + done * share)
+
+        made = texture.sample if texture.material is None else texture.sample_maps
+        found = made(some, progress=None if watch is None else tell)
+        parts.append(found if isinstance(found, dict) else {"image": found})
+    back = np.argsort(order)
+    if watch is not None:
+        watch("sample", 1.0)
+    return {name: np.concatenate([part[name] for part in parts])[back] for name in parts[0]}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from texrs._progress import ask
 from texrs._typing import Array, Floats
-from texrs.painting._meshes import Floats64
+from texrs.painting._surface import Floats64
 
 __all__ = ["bake_points", "bake_values", "fill_between", "lean"]
 

@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_int
 from texrs.errors import FileError, InvalidInput
 from texrs.fields import Field, from_directions
-from texrs.painting._meshes import Floats64, find_normals, read_mesh
+from texrs.painting._meshes import find_normals
+from texrs.painting._reading import read_mesh
+from texrs.painting._surface import Floats64
 
 __all__ = ["follow"]
 
@@ -81,7 +83,7 @@ def follow(
     array([1., 0., 0.], dtype=float32)
 
     """
-    vertices, faces, _ = read_mesh(mesh)
+    vertices, faces = read_mesh(mesh)[:2]
     size, count = as_float(scale, "scale", 1e-9, 1e9), as_int(resolution, "resolution", 8, 200)
     longest = float(np.ptp(vertices, axis=0).max())
     if not longest > 0:

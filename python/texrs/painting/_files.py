@@ -5,7 +5,7 @@ All that belongs together is written to temporary names; what is opened first ta
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path as FilePath
 from typing import Any
@@ -24,7 +24,9 @@ from texrs.materials._gltf import make_pictures, write_shapes
 from texrs.materials._light import find_map
 from texrs.materials._meshes import Mesh
 from texrs.materials._surface import find_opacity, take_colour
-from texrs.painting._meshes import Floats64, find_normals, find_tangents
+from texrs.painting._meshes import find_tangents, shade
+from texrs.painting._obj import paint_text, spell_obj
+from texrs.painting._surface import PAINTED, Floats64, Surface
 
 __all__ = ["SUFFIXES", "check_suffix", "write_mesh"]
 
@@ -50,45 +52,93 @@ def check_suffix(path: Path, *, baked: bool) -> str:
 
 def write_mesh(
     path: Path,
-    vertices: Floats64,
-    faces: NDArray[np.int64],
-    uv: Floats64 | None,
-    maps: Mapping[str, Map],
-    relief: Floats | None,
+    surface: Surface,
+    names: Sequence[str],
+    which: NDArray[np.int64],
+    maps: Sequence[Mapping[str, Map]],
+    reliefs: Sequence[Floats | None],
     depth: int | None,
 ) -> list[FilePath]:
-    """Write a mesh with what is painted on it, and return the files."""
-    suffix, target = check_suffix(path, baked=uv is not None), FilePath(path)
+    """Write a mesh with the maps and the relief of each texture set, and return the files."""
+    baked = surface.uv is not None
+    suffix, target = check_suffix(path, baked=baked), FilePath(path)
     if depth not in (None, 8, 16):
         raise InvalidInput(f"depth: allowed are 8 and 16, got {depth!r}")
-    deep = any(each.pixels.dtype.itemsize > 1 for each in maps.values())
+    deep = any(each.pixels.dtype.itemsize > 1 for several in maps for each in several.values())
     bits = depth or (16 if deep else 8)
-    normals = find_normals(vertices, faces)
-    if uv is None:
-        if suffix == ".obj":
-            return _write_all({target: _spell_obj(vertices, faces, normals, None, _show(maps), None)})
-        if suffix == ".ply":
-            return _write_all({target: _pack_ply(vertices, faces, normals, _show(maps))})
-        mesh = _shape(vertices, faces, normals, None, _colour_corners(maps))
-        factors = {"baseColorFactor": [1.0] * 4, "metallicFactor": 0.0, "roughnessFactor": ROUGH}
-        material: dict[str, Any] = {"pbrMetallicRoughness": factors}
-        if (mesh.more["COLOR_0"][:, 3] < 65535).any():
-            material["alphaMode"] = "BLEND"
-        return write_shapes([("mesh", mesh)], {}, material, target)
-    seen = {name: each for name, each in maps.items() if each.role not in (Role.NORMAL, Role.NORMAL_DX)}
-    if relief is not None:
-        # As shares, for of numbers that happen to be positive nobody could tell.
-        seen["normal"] = Map((relief + np.float32(1)) / np.float32(2), Role.NORMAL, "linear")
-    pictures, material = make_pictures(seen, bits)
-    rough = material["pbrMetallicRoughness"]
-    if "metallicRoughnessTexture" not in rough:
-        rough |= {"metallicFactor": 0.0, "roughnessFactor": ROUGH}
+    normals = shade(surface)
+    if not baked:
+        return _write_corners(target, suffix, surface, normals, maps[0])
+    materials, owner = _name_materials(surface, names, which)
+    pictures: dict[str, Array] = {}
+    looks: list[tuple[dict[str, Array], dict[str, Any]]] = []
+    for name, several, relief in zip(names, maps, reliefs, strict=True):
+        seen = {key: each for key, each in several.items() if each.role not in (Role.NORMAL, Role.NORMAL_DX)}
+        if relief is not None:
+            # As shares, for of numbers that happen to be positive nobody could tell.
+            seen["normal"] = Map((relief + np.float32(1)) / np.float32(2), Role.NORMAL, "linear")
+        own, look = make_pictures(seen, bits, len(pictures))
+        rough = look["pbrMetallicRoughness"]
+        if "metallicRoughnessTexture" not in rough:
+            rough |= {"metallicFactor": 0.0, "roughnessFactor": ROUGH}
+        prefix = f"{name}_" if len(names) > 1 else ""
+        pictures |= {prefix + key: picture for key, picture in own.items()}
+        looks.append((own, look))
     if suffix != ".obj":
-        return write_shapes([("mesh", _shape(vertices, faces, normals, uv, {}))], pictures, material, target)
-    height = find_map(maps, Role.HEIGHT)
-    files = _spell_mtl(target, pictures, height, bits)
-    files[target] = _spell_obj(vertices, faces, normals, uv, None, f"{target.stem}.mtl")
+        said = [looks[k][1] | ({} if name == PAINTED else {"name": name}) for name, k in materials]
+        return write_shapes(list(_divide(surface, normals, owner)), pictures, said, target)
+    files: dict[FilePath, bytes] = {}
+    lines = ["# texrs"]
+    for k, name in enumerate(names):
+        prefix = f"{target.stem}_{name}_" if len(names) > 1 else f"{target.stem}_"
+        more, words = _spell_mtl(target, prefix, looks[k][0], find_map(maps[k], Role.HEIGHT), bits)
+        files |= more
+        for material, of in materials:
+            lines += [f"newmtl {material}", *words] if of == k else []
+    library = target.with_suffix(".mtl")
+    files[library] = ("\n".join(lines) + "\n").encode()
+    used = [materials[k][0] for k in owner.tolist()]
+    if surface.text is not None:
+        files[target] = paint_text(surface.text, library.name, used)
+    else:
+        files[target] = spell_obj(surface.vertices, surface.faces, normals, surface.uv, None, library.name, used)
     return _write_all(files)
+
+
+def _write_corners(
+    target: FilePath, suffix: str, surface: Surface, normals: Floats64, maps: Mapping[str, Map]
+) -> list[FilePath]:
+    """Write a mesh whose vertices have colours."""
+    vertices, faces = surface.vertices, surface.faces
+    if suffix == ".obj" and surface.text is not None and surface.origin is not None:
+        # The vertices are in the order of the file, those of one place in it side by side.
+        first = np.unique(surface.origin, return_index=True)[1]
+        return _write_all({target: paint_text(surface.text, None, (), _show(maps)[first])})
+    if suffix == ".obj":
+        return _write_all({target: spell_obj(vertices, faces, normals, None, _show(maps), None)})
+    if suffix == ".ply":
+        return _write_all({target: _pack_ply(vertices, faces, normals, _show(maps))})
+    colours = _colour_corners(maps)
+    factors = {"baseColorFactor": [1.0] * 4, "metallicFactor": 0.0, "roughnessFactor": ROUGH}
+    material: dict[str, Any] = {"pbrMetallicRoughness": factors}
+    if (colours["COLOR_0"][:, 3] < 65535).any():
+        material["alphaMode"] = "BLEND"
+    return write_shapes(list(_divide(surface, normals, np.zeros(len(faces), int), colours)), {}, [material], target)
+
+
+def _name_materials(
+    surface: Surface, names: Sequence[str], which: NDArray[np.int64]
+) -> tuple[list[tuple[str, int]], NDArray[np.int64]]:
+    """Return the materials, with the texture set of each, and the material of each face.
+
+    Materials keep their names, unless one is in several sets.
+    """
+    labels = [*surface.materials]
+    both = sorted({(labels[p], int(w)) for p, w in np.unique(np.column_stack([surface.part, which]), axis=0).tolist()})
+    several = {label for label, _ in both if sum(other == label for other, _ in both) > 1}
+    numbers = {pair: k for k, pair in enumerate(both)}
+    owner = np.array([numbers[labels[p], w] for p, w in zip(surface.part.tolist(), which.tolist(), strict=True)])
+    return [(names[w] if label in several else label, w) for label, w in both], owner
 
 
 def _write_all(files: Mapping[FilePath, bytes]) -> list[FilePath]:
@@ -103,23 +153,34 @@ def _write_all(files: Mapping[FilePath, bytes]) -> list[FilePath]:
 # --- glTF ------------------------------------------------------------------------------------------------------------
 
 
-def _shape(
-    vertices: Floats64,
-    faces: NDArray[np.int64],
-    normals: Floats64,
-    uv: Floats64 | None,
-    more: Mapping[str, Array],
-) -> Mesh:
-    kind = np.uint16 if len(vertices) < 2**16 - 1 else np.uint32
-    return Mesh(
-        positions=vertices.astype(np.float32),
-        normals=normals.astype(np.float32),
-        tangents=None if uv is None else find_tangents(vertices, faces, uv, normals).astype(np.float32),
-        # From the upper left, as glTF has it.
-        places=None if uv is None else np.stack([uv[:, 0], 1 - uv[:, 1]], axis=-1).astype(np.float32),
-        faces=faces.astype(kind),
-        more=dict(more),
-    )
+def _divide(
+    surface: Surface, normals: Floats64, owner: NDArray[np.int64], more: Mapping[str, Array] | None = None
+) -> Iterator[tuple[str, Mesh]]:
+    """Yield the shapes of a mesh: one for each part and material, with the name of its object."""
+    uv = surface.uv
+    tangents = None if uv is None else find_tangents(surface.vertices, surface.faces, uv, normals).astype(np.float32)
+    # Materials of an object are primitives of one mesh.
+    keys, number = np.unique(np.column_stack([surface.part, owner]), axis=0, return_inverse=True)
+    for k, (part, material) in enumerate(keys.tolist()):
+        faces = surface.faces[number.reshape(-1) == k]
+        used, local = np.unique(faces, return_inverse=True)
+        if len(keys) == 1:
+            # Vertices that no face uses stay where they are.
+            used, local = np.arange(len(surface.vertices)), faces
+        kind = np.uint16 if len(used) < 2**16 - 1 else np.uint32
+        yield (
+            surface.objects[part],
+            Mesh(
+                positions=surface.vertices[used].astype(np.float32),
+                normals=normals[used].astype(np.float32),
+                tangents=None if tangents is None else tangents[used],
+                # From the upper left, as glTF has it.
+                places=None if uv is None else np.stack([uv[used, 0], 1 - uv[used, 1]], axis=-1).astype(np.float32),
+                faces=local.reshape(-1, 3).astype(kind),
+                more={} if more is None else {key: values[used] for key, values in more.items()},
+                material=material,
+            ),
+        )
 
 
 def _colour_corners(maps: Mapping[str, Map]) -> dict[str, Array]:
@@ -141,7 +202,7 @@ def _colour_corners(maps: Mapping[str, Map]) -> dict[str, Array]:
     return found
 
 
-# --- OBJ and PLY -----------------------------------------------------------------------------------------------------
+# --- MTL and PLY -----------------------------------------------------------------------------------------------------
 
 
 def _show(maps: Mapping[str, Map]) -> NDArray[np.uint8]:
@@ -151,31 +212,10 @@ def _show(maps: Mapping[str, Map]) -> NDArray[np.uint8]:
     return np.rint(np.clip(encode_srgb(light), 0, 1) * np.float64(255)).astype(np.uint8)
 
 
-def _spell_obj(
-    vertices: Floats64,
-    faces: NDArray[np.int64],
-    normals: Floats64,
-    uv: Floats64 | None,
-    colours: NDArray[np.uint8] | None,
-    library: str | None,
-) -> bytes:
-    lines = ["# texrs"] + ([] if library is None else [f"mtllib {library}", "usemtl painted"])
-    if colours is None:
-        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices.tolist()]
-    else:
-        both = np.concatenate([vertices, colours / 255], axis=1)
-        lines += ["v " + " ".join(f"{v:.9g}" for v in row) for row in both.tolist()]
-    lines += [f"vn {x:.6g} {y:.6g} {z:.6g}" for x, y, z in normals.tolist()]
-    if uv is not None:
-        lines += [f"vt {u:.9g} {v:.9g}" for u, v in uv.tolist()]
-        lines += ["f " + " ".join(f"{i}/{i}/{i}" for i in row) for row in (faces + 1).tolist()]
-    else:
-        lines += ["f " + " ".join(f"{i}//{i}" for i in row) for row in (faces + 1).tolist()]
-    return ("\n".join(lines) + "\n").encode()
-
-
-def _spell_mtl(target: FilePath, pictures: Mapping[str, Array], height: Map | None, bits: int) -> dict[FilePath, bytes]:
-    """Return the pictures, and the material that names them: as OBJ has it, with the usual words for what it had none."""
+def _spell_mtl(
+    target: FilePath, prefix: str, pictures: Mapping[str, Array], height: Map | None, bits: int
+) -> tuple[dict[FilePath, bytes], list[str]]:
+    """Return pictures, and the lines of the material that names them, with the usual words for maps that OBJ lacks."""
     parts: dict[str, tuple[str, Array]] = {}
     for name, picture in pictures.items():
         if name == "basecolor":
@@ -195,13 +235,12 @@ def _spell_mtl(target: FilePath, pictures: Mapping[str, Array], height: Map | No
         kind = np.dtype(f"u{bits // 8}")
         parts["map_Bump"] = "height", np.rint(flat * np.float64(np.iinfo(kind).max)).astype(kind)
     files: dict[FilePath, bytes] = {}
-    lines = ["# texrs", "newmtl painted", "Kd 1 1 1", "Ka 1 1 1", "Ks 0 0 0", f"Pr {ROUGH}", "Pm 0", "illum 2"]
+    lines = ["Kd 1 1 1", "Ka 1 1 1", "Ks 0 0 0", f"Pr {ROUGH}", "Pm 0", "illum 2"]
     for word, (name, picture) in parts.items():
-        file = target.with_name(f"{target.stem}_{name}.png")
+        file = target.with_name(f"{prefix}{name}.png")
         files[file] = encode(name, np.ascontiguousarray(picture), "png")
         lines.append(f"{word} {file.name}")
-    files[target.with_suffix(".mtl")] = ("\n".join(lines) + "\n").encode()
-    return files
+    return files, lines
 
 
 def _pack_ply(vertices: Floats64, faces: NDArray[np.int64], normals: Floats64, colours: NDArray[np.uint8]) -> bytes:

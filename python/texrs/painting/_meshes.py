@@ -1,65 +1,24 @@
-"""Meshes as they are read, laid flat in pieces, and shaded."""
+"""Meshes laid flat in pieces, and shaded."""
 
 from __future__ import annotations
-
-import os
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import try_array
 from texrs._typing import Floats
-from texrs.errors import FileError, InvalidInput
+from texrs.errors import InvalidInput
+from texrs.painting._surface import Floats64, Surface
 
-__all__ = ["Floats64", "find_normals", "find_tangents", "read_mesh", "unwrap"]
+__all__ = ["find_normals", "find_tangents", "shade", "unwrap"]
 
-Floats64 = NDArray[np.float64]
 CREASE = 0.5
 """Cosine of the angle between faces beyond which an edge is one: 60 degrees."""
 
 
-def read_mesh(mesh: Any) -> tuple[Floats64, NDArray[np.int64], Floats64 | None]:
-    """Return corners, triangles, and where corners lie in an atlas, if that is said.
-
-    Raises
-    ------
-    InvalidInput
-        No triangles.
-    FileError
-        The file cannot be read.
-
-    """
-    uv = None
-    if isinstance(mesh, str | os.PathLike):
-        name = os.fspath(mesh)
-        try:
-            import trimesh
-        except ImportError:
-            raise InvalidInput("mesh: a file needs the extra: pip install texrs[mesh]") from None
-        try:
-            mesh = trimesh.load(name, force="mesh", process=False)
-        except Exception as error:
-            raise FileError(f"{name}: cannot be read as a mesh ({error})") from None
-    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        uv = getattr(mesh.visual, "uv", None)
-        mesh = (mesh.vertices, mesh.faces)
-    if not isinstance(mesh, tuple | list) or len(mesh) != 2:
-        raise InvalidInput(f"mesh: needs a file, a trimesh.Trimesh or (vertices, faces), got {type(mesh).__name__}")
-    vertices, faces = try_array(mesh[0], np.float64), try_array(mesh[1])
-    if vertices.ndim != 2 or vertices.shape[1:] != (3,) or not np.isfinite(vertices).all():
-        raise InvalidInput(f"mesh: needs finite vertices (N, 3), got shape {vertices.shape}")
-    if faces.ndim != 2 or faces.shape[1:] != (3,) or not len(faces) or faces.dtype.kind not in "ui":
-        raise InvalidInput(f"mesh: needs triangles (M, 3) of integers, got {faces.dtype} of {faces.shape}")
-    if int(faces.min()) < 0 or int(faces.max()) >= len(vertices):
-        raise InvalidInput(f"mesh: has {len(vertices)} vertices, but faces reach {int(faces.max())}")
-    return vertices, faces.astype(np.int64), None if uv is None else np.asarray(uv, np.float64)
-
-
 def unwrap(
     vertices: Floats64, faces: NDArray[np.int64], side: int, padding: int
-) -> tuple[Floats64, NDArray[np.int64], Floats64]:
-    """Lay a surface flat in pieces.
+) -> tuple[Floats64, NDArray[np.int64], Floats64, NDArray[np.int64]]:
+    """Return a surface that is laid flat in pieces, and which vertex each of its vertices was.
 
     Raises
     ------
@@ -77,7 +36,17 @@ def unwrap(
     how.padding, how.resolution, how.bilinear = 2 * padding, side, True
     maker.generate(pack_options=how)
     kept, triangles, uv = maker[0]
-    return vertices[kept], triangles.astype(np.int64), uv.astype(np.float64)
+    return vertices[kept], triangles.astype(np.int64), uv.astype(np.float64), kept.astype(np.int64)
+
+
+def shade(surface: Surface) -> Floats64:
+    """Return which way is out at each vertex: as the file says, and else as its faces say."""
+    found = find_normals(surface.vertices, surface.faces)
+    if surface.normals is None:
+        return found
+    length = np.sqrt((surface.normals**2).sum(axis=1, keepdims=True))
+    given = np.isfinite(length) & (length > 0)
+    return np.asarray(np.where(given, surface.normals / np.where(given, length, 1), found))
 
 
 def find_normals(vertices: Floats64, faces: NDArray[np.int64]) -> Floats64:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from texrs._typing import Floats
 from texrs.materials import Map, Role
 from texrs.painting._baking import bake_values
-from texrs.painting._meshes import Floats64, find_normals, find_tangents
+from texrs.painting._surface import Floats64
 
 __all__ = ["bake_frames", "carve", "read_slopes"]
 
@@ -38,11 +38,9 @@ def read_slopes(normals: Map) -> Floats:
 
 
 def bake_frames(
-    vertices: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
+    normals: Floats64, tangents: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
 ) -> NDArray[np.float64]:
     """Return where each texel's columns go on the surface, where its rows go up, and the way out, (side, side, 3, 3)."""
-    normals = find_normals(vertices, faces)
-    tangents = find_tangents(vertices, faces, uv, normals)
     values = bake_values(np.concatenate([normals, tangents], axis=1), faces, uv, side, padding)[0]
     out, along = _scale(values[..., :3]), _scale(values[..., 3:6])
     up = _scale(np.cross(out, along)) * np.where(values[..., 6:] < 0, -1.0, 1.0)

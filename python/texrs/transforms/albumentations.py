@@ -25,9 +25,9 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
     """Lay pictures anew from pieces of themselves, in a pipeline of albumentations: images, masks and boxes.
 
     The pipeline's own generator draws the seeds, so ``Compose(..., seed=...)`` decides the samples. Each worker process has
-    a copy of this generator in the same state. Therefore the name of the process, which its parent counts, also goes into the
-    seed: workers differ, and so do the workers of the next epoch. Boxes become several if an element is copied several times,
-    and their labels follow.
+    a copy of this generator in the same state. The seed also depends on the name of the process, which its parent counts.
+    Workers differ, and so do the workers of the next epoch. Boxes become several if an element is copied several times, and
+    their labels follow.
 
     Parameters
     ----------
