@@ -181,8 +181,9 @@ def test_a_scene_keeps_places_names_and_uvs_without_materials(here) -> None:
     turn = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1])
     turn[:3, 3] = [5, 0, 0]
     scene.add_geometry(flat, node_name="far", geom_name="leaf", transform=turn)
-    scene.export("scene.gltf")
-    document = json.loads(Path("scene.gltf").read_text())
+    for name, data in trimesh.exchange.gltf.export_gltf(scene).items():
+        Path(name).write_bytes(data)
+    document = json.loads(Path("model.gltf").read_text())
     del document["materials"]
     for mesh in document["meshes"]:
         del mesh["primitives"][0]["material"]

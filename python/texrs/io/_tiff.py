@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._notices import ignore
+from texrs._notices import assume, ignore
 from texrs._typing import Array
 from texrs.errors import FileError
 from texrs.io import _image_io, _pillow
@@ -39,6 +39,8 @@ _DICTIONARY = 2**28
 _ORIENTATION = 274
 _SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317, 320, 322, 323, 324, 325, 338, 339})
 """Tags that say how the pixels lie. tifffile goes on without a tag that it cannot read."""
+_ASSOCIATED = 1
+"""Kind of an extra sample: an alpha that colours are multiplied by."""
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _SEPARATED, _YCBCR = 0, 1, 2, 3, 5, 6
 
 
@@ -68,7 +70,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         orientation = int(tag.value) if tag is not None and tag.value in range(1, 9) else 1
         _report_others(path, tif, series)
         if first.photometric == _SEPARATED or first.compression not in tifffile.TIFF.DECOMPRESSORS:
-            return _read_otherwise(path, series, sides, channels, limit), orientation
+            return _part_alpha(path, _read_otherwise(path, series, sides, channels, limit), first), orientation
         _check_unfolded(path, tif.filehandle, series)
         try:
             array = series.asarray(maxworkers=1)
@@ -78,12 +80,12 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
             reasons = ("imagecodecs", "INSUFFICIENT_SPACE")
             if not isinstance(error, ImportError) and not any(reason in str(error) for reason in reasons):
                 raise
-            return _read_otherwise(path, series, sides, channels, limit), orientation
+            return _part_alpha(path, _read_otherwise(path, series, sides, channels, limit), first), orientation
         if array.shape != series.shape:
             raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
         order = [a for a in series.axes if a not in "YXSC"] + [a for a in "YXCS" if a in series.axes]
         array = array.transpose([series.axes.index(a) for a in order]).reshape(*sides, channels)
-        return _apply_colours(path, np.ascontiguousarray(array), first), orientation
+        return _part_alpha(path, _apply_colours(path, np.ascontiguousarray(array), first), first), orientation
 
 
 def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channels: int, limit: int) -> Array:
@@ -281,6 +283,19 @@ def _apply_colours(path: Path, array: Array, page: Any) -> Array:
         return array
     name = getattr(photometric, "name", str(photometric))
     raise FileError(f"{path}: holds {name} colours of {array.dtype}; grey, RGB and palettes are read")
+
+
+def _part_alpha(path: Path, array: Array, page: Any) -> Array:
+    """Return colours that are not multiplied by alpha, which is how all other files and verbs have them."""
+    if array.shape[-1] not in (2, 4) or tuple(page.extrasamples) != (_ASSOCIATED,) or array.dtype.kind not in "uf":
+        return array
+    assume(f"{path.name}: colours are divided by alpha, because the file has them multiplied by it (associated alpha)")
+    most = np.iinfo(array.dtype).max if array.dtype.kind == "u" else 1
+    alpha = array[..., -1:].astype(np.float64)
+    colours = array[..., :-1] * np.divide(most, alpha, out=np.ones_like(alpha), where=alpha > 0)
+    if array.dtype.kind == "u":
+        colours = np.rint(np.minimum(colours, most))
+    return np.concatenate([colours.astype(array.dtype), array[..., -1:]], axis=-1)
 
 
 @contextmanager
