@@ -111,8 +111,8 @@ def _find_tiles(surface: Surface) -> Floats64:
     if away.any():
         low, high = uv.min(axis=(0, 1)), uv.max(axis=(0, 1))
         raise InvalidInput(
-            f"mesh: UVs of {away.sum()} faces cross a tile's border (u {low[0]:g} to {high[0]:g}, v {low[1]:g} to {high[1]:g})."
-            " The picture would repeat there; pass unwrap (--unwrap) for another layout"
+            f"mesh: UVs of {away.sum()} faces cross a tile's border (u {low[0]:g} to {high[0]:g}, v {low[1]:g} to {high[1]:g});"
+            " pass unwrap (--unwrap) for another layout"
         )
     return np.asarray(tile)
 
