@@ -208,17 +208,17 @@ def apply(
     Parameters
     ----------
     source : SourceMap
-        Of a picture or a volume.
+        Source map of a picture or a volume.
     exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels.
     kind : {"colour", "normal", "vector", "label"}
-        As in `texrs.apply`.
+        Meaning of the values (see `texrs.apply`).
     green : {"up", "down"}
-        As in `texrs.apply`.
+        Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX).
     finish : Finish, optional
         Another finish than that of the map.
     progress : callable or True, optional
-        As in `texrs.apply`.
+        Called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a bar.
 
     Returns
     -------

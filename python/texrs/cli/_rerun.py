@@ -288,7 +288,7 @@ def describe_store(path: str) -> str:
 
 
 def describe_material(path: str, what: str) -> list[str]:
-    """Return lines about the maps of a folder, or the layers of a file; what is not used is a notice."""
+    """Return lines about the maps of a folder, or the layers of a file. Notices name all others."""
     shown = Material.read(path)
     first = f"material: {show_sides(shown.shape)}, {len(shown)} {what}{'s'[: len(shown) != 1]}"
     return [first, *(describe_layer(name, each) for name, each in shown.items())]

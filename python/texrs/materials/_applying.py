@@ -34,14 +34,14 @@ def apply(
 ) -> Array:
     """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
 
-    ``apply(result.source, exemplar)`` is ``result.image``, bit for bit, except where elements are lit again (`texrs.splice`):
-    seams disappear, samples are interpolated, and known pixels are kept, in the same way. A map without a finish is not
+    ``apply(result.source, exemplar)`` is ``result.image``, bit for bit, except where elements are lit again (`texrs.splice`).
+    Seams disappear, samples are interpolated, and known pixels are kept, in the same way. A map without a finish is not
     corrected.
 
     Parameters
     ----------
     source : SourceMap
-        Of a picture or a volume.
+        Source map of a picture or a volume.
     exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels. The name of a file gives its role, as
         in a folder of maps (`texrs.materials.guess_role`).
@@ -51,7 +51,7 @@ def apply(
         a meaning between them; the nearest sample is taken, and nothing is corrected. Default: as the name of the file says;
         without a role, "label" for integers that form regions of unrelated values, else "colour".
     green : {"up", "down"}, optional
-        Direction in which the y of normals and vectors grows: up (OpenGL) or down (DirectX). Default: as the name of the file
+        Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: as the name of the file
         says, else "up".
     finish : Finish, optional
         Another finish than that of the map.

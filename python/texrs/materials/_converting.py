@@ -1,14 +1,10 @@
-"""Maps in another depth: the same light, directions, shares and labels, encoded as whoever reads the file expects.
+"""Maps in another depth: the same light, directions, shares and labels, encoded as readers of the file expect.
 
-==================== =================================== ===================================================
-Role                 Integers                            Floats
-==================== =================================== ===================================================
-colours, emission    sRGB, alpha as a share              linear light
-normals, vectors     0 to the maximum means -1 to 1      as they were: -1 to 1, or shares if none is negative
-labels               whole numbers                       whole numbers
-heights, others      shares; other ranges are spread     as they were
-all other roles      shares                              as they were
-==================== =================================== ===================================================
+* Colours and emission are sRGB as integers, and linear light as floats. Their alpha is a share in both.
+* Components of normals and vectors, -1 to 1, are 0 to the maximum as integers. Floats stay as they are.
+* Labels are the same whole numbers in every dtype.
+* Heights and values without a role are shares as integers. A range beyond 0 to 1 is spread. Floats stay as they are.
+* All other roles are shares as integers. Floats stay as they are.
 """
 
 from __future__ import annotations
@@ -34,14 +30,14 @@ WHOLE = 2**24
 
 
 def choose_dtype(dtype: np.dtype[Any], depth: int | None) -> np.dtype[Any]:
-    """Return the dtype of so many bits: integers of 8 or 16, floats of 32; the same one if none are given."""
+    """Return the dtype of a depth: integers of 8 or 16 bits, floats of 32; the same one without a depth."""
     if depth is None or dtype == np.bool_:
         return dtype
     return np.dtype(np.float32 if depth == 32 else f"u{depth // 8}")
 
 
 def convert(name: str, each: Map, depth: int | None) -> Map:
-    """Return a map in so many bits, in the space in which a file of them is read.
+    """Return a map in a depth, and in the space that a reader of its dtype expects.
 
     Raises
     ------

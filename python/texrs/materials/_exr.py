@@ -172,7 +172,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
 
 
 def split_layer(name: str, letters: Mapping[str, Array]) -> dict[str, dict[str, Array]]:
-    """Return the picture of a layer, and by names of their own the channels that are no part of it, such as a depth."""
+    """Return the picture of a layer, and each other channel, such as a depth, under a name of its own."""
     picture = next((p for p in ("RGBA", "YA") if p[0] in letters and not {"X", "Y"} <= letters.keys()), None)
     if picture is None:
         return {name: dict(letters)}

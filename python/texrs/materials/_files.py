@@ -29,7 +29,7 @@ __all__ = ["read_maps", "write_maps"]
 DOCUMENTS = (".txt", ".md", ".json", ".html", ".htm", ".pdf", ".csv", ".yaml", ".yml", ".toml", ".url")
 """Suffixes of files that describe maps and never are maps."""
 SYSTEM = ("thumbs.db", "desktop.ini")
-"""Files that file managers leave in folders, besides hidden ones."""
+"""Files of file managers that are not hidden."""
 NAMED = 8
 """Maximum number of names in a notice."""
 PRIMARIES = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
@@ -151,7 +151,7 @@ def read_map(file: FilePath, role: Role, axes: int) -> Map:
 
 
 def report_colours(file: Path, notes: io.Notes, space: Space) -> None:
-    """Report what a file states of its colours, if they are not those of sRGB, in which maps are read and written."""
+    """Report the colour space that a file states, if it is not sRGB."""
     stated = []
     if notes.profile is not None and (title := name_profile(notes.profile)) is not None:
         stated.append(f"the ICC profile {title!r}")

@@ -163,7 +163,7 @@ class Material(Exports):
         -----
         InputWarning
             Files, subfolders or layers are not used: the name gives no role, the format is not read, and so on. `notices`
-            keeps the reasons. Hidden files, texts and what texrs writes beside maps do not count.
+            keeps the reasons. Hidden files, texts, reports and mipmaps do not count.
 
         Examples
         --------

@@ -103,7 +103,7 @@ def perspective(
         another size is stretched to that of the result, its borders on the borders (`texrs.scale_maps.resample`). None:
         ``scale_map``, stretched.
     target_green : {"up", "down"}
-        Direction in which the y of normals in ``target`` grows: up (OpenGL) or down (DirectX).
+        Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX).
     kind : {"width", "area"}, optional
         What maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope; "area",
         square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
