@@ -17,6 +17,7 @@ LAYERS = (
     ("_cache", "_checks", "_digits", "_progress", "_version"),
     ("io",),
     ("_conversion",),
+    ("_masks",),
     ("_arrays",),
     ("_colours",),
     ("_evidence", "_light", "_show", "_threads", "kernels"),

@@ -211,7 +211,7 @@ def test_what_is_masked_is_a_hole():
     for verb in (texrs.tile, texrs.design, texrs.Exemplar, texrs.elements.analyse):
         with pytest.raises(InvalidInput, match=r": 672 of 12288 values are masked, which is a hole: texrs.complete"):
             verb(known)
-    with pytest.raises(InvalidInput, match="hole: needs a mask, 'alpha', or an image that is a masked array"):
+    with pytest.raises(InvalidInput, match="hole: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image"):
         texrs.complete(PEBBLES)
 
 

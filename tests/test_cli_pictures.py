@@ -142,7 +142,7 @@ REFUSED = {
     "tile in.png --threads 0": "--threads: needs",
     "tile in.png hole.png": "--help",
     "tile": "--help",
-    "complete in.png": "HOLE: needs a mask",
+    "complete in.png": "HOLE: must be a mask",
     "complete in.png no.png": "no.png",
     "complete no.png hole.png": "no.png",
     "complete in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
@@ -156,7 +156,7 @@ REFUSED = {
     "complete in.png hole.png --from hole.png": "hole.png: needs the dtype and channels of the image",
     "complete in.png hole.png --from no.png": "no.png",
     "complete nan.npy hole.png": "nan.npy",
-    "complete in.png nan.npy": "nan.npy: needs bool or integers",
+    "complete in.png nan.npy": "nan.npy: must be finite",
 }
 
 

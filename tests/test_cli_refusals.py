@@ -38,8 +38,9 @@ FREE = {
     *((command, "--stages", value) for command in COMMANDS for value in BAD),
     *((command, flag, "-5") for command in COMMANDS for flag in ("--tilt", "--direction", "--azimuth", "--elevation")),
     ("apply", "--band", "-5"),
+    *((command, "--grow", "-5") for command in COMMANDS),
 }
-"""What is fine for once: names of folders, angles below 0, and what another option must come with."""
+"""What is fine for once: names of folders, angles below 0, masks that shrink, and what another option must come with."""
 
 
 class Work(Exception):

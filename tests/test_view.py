@@ -7,7 +7,7 @@ import pytest
 
 import texrs
 from texrs import Plane, View
-from texrs.completion._holes import widen
+from texrs._masks import widen
 from texrs.errors import InvalidInput
 from texrs.planes import _choose
 

@@ -18,6 +18,7 @@ from . import (
     transforms,
     volume,
 )
+from ._masks import Mask
 from ._threads import threads
 from ._version import __version__
 from .blending import blend
@@ -50,6 +51,7 @@ __all__ = [
     "Finish",
     "Gallery",
     "Guide",
+    "Mask",
     "Material",
     "Plane",
     "PlaneTexture",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,8 @@ from texrs._checks import (
     check_work,
     try_array,
 )
-from texrs._conversion import as_ndarray
+from texrs._conversion import as_ndarray, is_pillow
+from texrs._masks import Mask, mark
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput, LimitExceeded
 
@@ -293,14 +295,17 @@ def to_lab(unit: Floats) -> Floats:
 
 
 def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
-    """Check a mask, bool or integers of which zero means False, and return a copy (see `as_array`).
+    """Check a mask and return a copy.
 
-    Of a picture in colours, a file or one of PIL, any colour but black is marked, whatever its alpha channel says.
+    It may be an array of bool or integers, of which zero means False, a file or an image of PIL, or a `texrs.Mask`.
     """
+    if isinstance(value, Mask) and value.feather:
+        raise InvalidInput(f"{name}: must have no feather, which is for a hole that is filled")
+    if isinstance(value, Mask | str | PathLike) or is_pillow(value):
+        return mark(value, name, shape)
     given = as_ndarray(value, name, axes=len(shape))
     if given.ndim == len(shape) + 1 and not isinstance(value, np.ndarray):
-        colours = given[..., :-1] if given.shape[-1] in (2, 4) else given
-        given = np.asarray((colours != 0).any(axis=-1))
+        return mark(given, name, shape)
     return np.array(as_array(given, name, np.bool_, shape))
 
 

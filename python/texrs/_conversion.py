@@ -62,7 +62,7 @@ def as_ndarray(value: object, name: str, *, axes: int = 2) -> Array:
     if isinstance(value, np.ma.MaskedArray):
         return _take_whole(value, name)
     try:
-        if _is_pillow(value):
+        if is_pillow(value):
             return np.asarray(_take_colours(value, name))
         if hasattr(value, "__dlpack__") and not hasattr(value, "__array__"):
             return np.from_dlpack(value)
@@ -98,8 +98,9 @@ def _take_whole(value: Any, name: str) -> Array:
     return np.asarray(value.data)
 
 
-def _is_pillow(value: object) -> bool:
-    # Without an import of PIL, which takes a while.
+def is_pillow(value: object) -> bool:
+    """Return whether a value is a picture of PIL."""
+    # Do not import PIL, which takes a while.
     return any(c.__module__ == "PIL.Image" and c.__name__ == "Image" for c in type(value).__mro__)
 
 

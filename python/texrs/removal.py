@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_ndarray, as_seed, check_work
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_ndarray, as_seed, check_work
+from texrs._masks import Mask, check_share, fade, mark, widen
 from texrs._progress import answering, listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
-from texrs.completion._holes import widen
 from texrs.completion._planes import Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
 from texrs.materials import Material
@@ -38,7 +38,7 @@ THINGS = 1 / 12
 @takes_materials("image")
 def remove(
     image: Array | Material,
-    mask: Array,
+    mask: Array | Mask | str,
     *,
     view: View | Plane | Sequence[View | Plane] | None = None,
     margin: int | None = None,
@@ -55,8 +55,9 @@ def remove(
     ----------
     image : (H, W) or (H, W, C) array
         The photograph, any real dtype, each side at least 64.
-    mask : (H, W) array
-        Not 0 where there is what is to go, its shadow included.
+    mask : (H, W) array, path or Mask
+        Mask of the object to remove and of its shadow, white where it marks. See `texrs.Mask` for how a mask is read,
+        inverted, grown and feathered.
     view : View or Plane, or a sequence of them, optional
         How the photograph shows the plane that it stands on, as far as that is to be said; what is not is found. Where that
         is not sure, or the plane is seen from the front, things are filled in as large as they are seen anywhere. Of several
@@ -85,7 +86,8 @@ def remove(
     Synthesis
         The photograph without it, in its dtype and with its channels; nothing changes but what is marked, its margin and
         boundary. Its source map leads to the photograph. The stages are ``"known"``, ``"ground"``, each plane in a shade of
-        its own, ``"patches"`` and ``"composite"``. The report has the planes that were followed.
+        its own, ``"patches"`` and ``"composite"``. The report contains the planes that were followed, and ``"filled"``, the
+        share of the image that is filled, 0 to 1, margin included.
 
     Raises
     ------
@@ -114,9 +116,9 @@ def remove(
     image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     shape = pixels.shape[0], pixels.shape[1]
-    marked = as_mask(mask, "mask", shape)
-    if not marked.any():
-        raise InvalidInput("mask: marks nothing, so there is nothing to remove")
+    asked = Mask.of(mask)
+    marked = mark(asked, "mask", shape)
+    check_share(marked, "mask", asked.call("mask"), "remove")
     wide = max(1, round(MARGIN * min(shape))) if margin is None else as_int(margin, "margin", 0, 64)
     rim, things = round(RIM * min(shape)), min(64, round(THINGS * min(shape)))
     if boundary is not None:
@@ -127,7 +129,8 @@ def remove(
     side = None if patch is None else as_int(patch, "patch", 4, min(shape))
     views = as_views(view)
     settled = [v.settle(shape) for v in views]
-    hole = widen(marked, wide)
+    inner = widen(marked, wide)
+    hole = widen(inner, asked.feather)
     if hole.all():
         raise InvalidInput("mask: with its margin it covers the whole photograph, so nothing is left to fill it from")
     check_work("remove", [pixels], shape, "image")
@@ -144,12 +147,14 @@ def remove(
         pixels, hole, parts, boundary=rim, things=things, light=follow, patch=side, seed=number, progress=progress
     )
     how = made.finish(screening, (0, 0) if follow else None)
-    source = made.source.finished((False, False), **how, **({"known": (~hole,)} if how else {}))
+    how |= {"known": (~hole,)} if how else {}
+    how |= {"fade": np.rint(255 * fade(inner, asked.feather)).astype(np.uint8)} if asked.feather else {}
+    source = made.source.finished((False, False), **how)
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
     stages = made.show(pixels, hole) | {"composite": source.render(pixels)}
     report: dict[str, Any] = {
-        "hole": float(hole.mean()),
+        "filled": float(hole.mean()),
         "patches": list(made.counts),
         "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
         "margin": wide,

@@ -35,6 +35,7 @@ from texrs._light import divide_out, measure_lights
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
+from texrs.blending._fade import fade_in
 from texrs.blending._seams import Look, Seam, take_rows
 from texrs.blending._values import Samples
 from texrs.blending._visibility import Visibility, measure_visibility
@@ -244,10 +245,23 @@ def apply(
     as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
     if finish is not None:
         as_instance(finish, "finish", Finish)
-    if kind == "label":
-        return source.render(exemplars, interpolation="nearest")
     how = finish or source.finish
     several: Sequence[Array] = as_list(exemplars)
+    made = _look_up(source, several, how, kind, green, progress)
+    return made if how is None or how.fade is None else fade_in(made, several[0], how.fade, kind)
+
+
+def _look_up(
+    source: SourceMap,
+    several: Sequence[Array],
+    how: Finish | None,
+    kind: Literal["colour", "normal", "vector", "label"],
+    green: Literal["up", "down"],
+    progress: Progress | None,
+) -> Array:
+    """Look maps up and correct their seams, in even light or with light that is followed if the finish says so."""
+    if kind == "label":
+        return source.render(several, interpolation="nearest")
     if how is not None and how.flatten and kind == "colour":
         several = [flatten(as_ndarray(each, "exemplars")) for each in several]
     if how is not None and how.light is not None and how.within is not None and kind == "colour" and len(several) == 1:

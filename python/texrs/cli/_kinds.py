@@ -16,6 +16,7 @@ from texrs.cli._readers import (
     read_entry,
     read_example,
     read_field,
+    read_hole,
     read_labels,
     read_layout,
     read_mask,
@@ -98,13 +99,15 @@ ENTRIES = replace(
     note="Files, folders of the maps of a material, sample:NAME, or entries that texrs analyse wrote (.npz).",
     many=True,
 )
-MASK = Kind("FILE", lambda path, about: read_mask(path, about.axes), "What is not black is marked.", file=True)
+WHITE = "White is marked; of a layer, its opaque pixels."
+"""What masks mark."""
+MASK = Kind("FILE", lambda path, about: read_mask(path, about.axes), WHITE, file=True)
 GROUNDS = replace(
     MASK,
     metavar=f"FILE|{FOUND}",
     words=(FOUND,),
     read=lambda texts, about: [None if text == FOUND else read_mask(text, about.axes) for text in texts],
-    note=f"What is not black is marked; the option may be repeated, for several planes, one of which may be {FOUND}.",
+    note=f"{WHITE} Repeat the option for several planes, one of which may be {FOUND}.",
     many=True,
 )
 CORNERS = Kind(
@@ -115,7 +118,15 @@ CORNERS = Kind(
 )
 EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grounds, or {FOUND}.", many=True)
 """Of each plane of a photograph."""
-HOLE = replace(MASK, words=("alpha",))
+THING = Kind("FILE", lambda path, about: path, WHITE, file=True)
+"""A mask that the function reads, as its other options say."""
+HOLE = Kind(
+    "FILE|alpha|nan|nodata|VALUE",
+    read_hole,
+    "nan: pixels that are NaN or infinite; nodata: the value that the file states; or a value.",
+    file=True,
+    words=("alpha", "nan"),
+)
 MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs scale-map wrote.", file=True)
 SEEN = Kind(
     "FILE|auto",

@@ -34,6 +34,7 @@ APPLIED = Options(
         "finish.known": "one an exemplar, and no map is of them",
         "finish.parts": "the verb knows them",
         "finish.light": "the verb knows where its pixels lie",
+        "finish.fade": "the verb knows where its filling fades",
     },
     optional=dict.fromkeys(
         ("wrap", "interpolation", "antialias", "screening", "across", "outlines", "flatten"), "as the map says"
@@ -98,7 +99,7 @@ def store_map(
     quiet: bool,
 ) -> None:
     """Look a map up into a store, chunk by chunk, so that the result is never in memory as a whole."""
-    if finish.screening is not None or finish.light is not None:
+    if finish.screening is not None or finish.light is not None or finish.fade is not None:
         raise InvalidInput(
             f"--out: {out} is made in parts, and the seams of this result are blended, which takes all of it at once; "
             "--blend 0 leaves them as they are, or write to a file"

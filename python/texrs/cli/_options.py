@@ -135,6 +135,7 @@ class Options:
             inside = [o for o in self if o.path[0] == name and len(o.path) == 2]
             used = [o for o in inside if given[o.name] not in (None, o.default)]
             there = [o.name_value(given[o.name]) for o in used if o.file or not any(i.file for i in inside)]
+            there = there or [o.name_value(given[o.name]) for o in inside if o.argument]
             called |= {name: " and ".join(there)} if there else {}
         return called
 

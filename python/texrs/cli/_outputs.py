@@ -29,6 +29,8 @@ from texrs.io._pillow import write_indexed
 from texrs.io._temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
 
+NEGATIVE = re.compile(r"-[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)
+"""A negative number, which click would take for an option."""
 SAMPLE = "sample:"
 """What the name of a built-in exemplar starts with."""
 LONGEST_PROBE = 2**17
@@ -113,6 +115,18 @@ class Command(TyperCommand):
             if entries:
                 with formatter.section(title):
                     formatter.write_dl(entries)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take a negative number for an argument, as a value of pixels may be, where it does not follow an option."""
+        before = ["", *args]
+        shielded = [
+            f" {a}" if NEGATIVE.fullmatch(a) and b[:1] != "-" else a for b, a in zip(before, args, strict=False)
+        ]
+        rest: list[str] = super().parse_args(ctx, shielded)
+        ctx.params |= {
+            n: v.strip() for n, v in ctx.params.items() if isinstance(v, str) and NEGATIVE.fullmatch(v.strip())
+        }
+        return rest
 
     def invoke(self, ctx: Any) -> Any:
         """Do the command, if no output is an input; what it writes says how it was made."""
@@ -359,7 +373,7 @@ def deliver(
         if axes == 2:
             palette = None if like is None else like.palette
             if palette is None or not write_indexed(temporary, image, palette):
-                io.write(temporary, result.image)
+                io.write(temporary, result.image, notes=like)
         else:
             io.write_volume(temporary, result.image, spacing=spacing)
         deliver_beside(result, paths, suffix, made)

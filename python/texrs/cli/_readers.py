@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from texrs import io, samples
 from texrs._arrays import as_image
 from texrs._notices import assume, ignore
+from texrs._masks import mark
 from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
@@ -95,13 +97,21 @@ def read_density(text: str, about: About) -> Any:
 
 
 def read_mask(path: str, axes: int = 2) -> Array:
-    """Read a mask: any colour but black, or 0 in all channels, is marked, whatever an alpha channel of a picture says."""
-    mask = read_array(path, axes)
-    if mask.ndim == axes:
-        return mask
-    colours = mask[..., :-1] if axes == 2 and mask.shape[-1] in (2, 4) else mask
-    marked: Array = (colours != 0).any(axis=-1)
-    return marked
+    """Read a mask of any size, as `texrs.Mask` describes."""
+    return mark(path, path, ("planes", "rows", "columns")[3 - axes :])
+
+
+def read_hole(text: str, about: About) -> Any:
+    """Return a number, the nodata value that the first argument states, or the name of a file."""
+    if text == "nodata" and not os.path.exists(text):
+        value = io.read_notes(about.first).nodata
+        if value is None:
+            raise InvalidInput(f"{about.first}: states no nodata value; give the value, or nan")
+        return value
+    try:
+        return text if os.path.exists(text) else float(text)
+    except ValueError:
+        return text
 
 
 def read_scale_map(path: str, encoding: str = "log2") -> Floats:

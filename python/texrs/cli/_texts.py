@@ -29,6 +29,8 @@ class About:
     option: str = ""
     """What errors call it."""
     axes: int = 2
+    first: str = ""
+    """Text of the first argument: usually the name of the example."""
     size: tuple[int, ...] = ()
     """Of the result, once it is known."""
     like: Array | None = None

@@ -9,6 +9,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ import typer
 
 from texrs import io
 from texrs._arrays import as_int
-from texrs._notices import Notices, collect
+from texrs._notices import Notices, collect, ignore
 from texrs._palettes import ask
 from texrs._threads import threads
 from texrs._typing import Array
@@ -61,6 +62,8 @@ class Verb:
     """Whether a pixel of the result is as large as one of the first input."""
     fills: bool = False
     """Whether a transparent input can give an opaque result."""
+    placed: bool = False
+    """Whether each pixel of the result lies at the same place in the first input."""
     beyond: str = ""
     """What makes larger ones."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
@@ -118,14 +121,14 @@ class Verb:
                 check_free(each["out"] or "")
         for each in places:
             _outputs.check_outputs(each)
-        about = About(axes=options.axes, roles=stack.roles)
+        first = given[next(o.name for o in options if o.argument)]
+        about = About(axes=options.axes, first=first if isinstance(first, str) else "", roles=stack.roles)
         with warnings.catch_warnings(record=True) as early:
             warnings.simplefilter("always")
             values |= options.read(given, about, which=lambda o: o.file and (o.argument or o.name == self.shape))
-        example, like = self.find_example(values), self.read_colours(given)
+        example, like = self.find_example(values), self.read_colours(given, out)
         size = self.find_size(values, example)
         material = self.find_material(values)
-        first = given[next(o.name for o in options if o.argument)]
         spacing = _outputs.read_kept_spacing(first, out, options.axes)
         apart = {} if spacing is None else {"spacing": spacing}
         if material is None:
@@ -187,11 +190,14 @@ class Verb:
         # Analysed elements hold theirs, and materials have one that shows them.
         return np.asarray(first.base if isinstance(first, Material) else getattr(first, "image", first))
 
-    def read_colours(self, given: Mapping[str, Any]) -> io.Notes:
+    def read_colours(self, given: Mapping[str, Any], out: str) -> io.Notes:
         """Return what the first input says of its colours, which are those of the result, and of its pixels."""
         first = given[next(o.name for o in self.options if o.argument)]
         name = first[0] if isinstance(first, list) else first
         notes = io.read_notes(name) if os.path.isfile(name) else io.Notes()
+        if self.placed and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
+            ignore(f"{os.path.basename(name)}: its georeference is not written, because only TIFF holds it")
+        notes = notes if self.placed else replace(notes, georeference=())
         return replace(notes, made=None, density=notes.density if self.scaled else None)
 
     def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:

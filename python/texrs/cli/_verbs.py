@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import wraps
@@ -23,11 +24,11 @@ from texrs.cli._kinds import (
     HOLE,
     LAYOUT,
     MAP_OR_AUTO,
-    MASK,
     NUMBERS,
     SEEN,
     SOURCE,
     TARGET,
+    THING,
     UNKNOWN,
     VOLUME,
     Kind,
@@ -67,8 +68,14 @@ def make_verb(name: str) -> Verb:
 
             kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
             names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map", "kind": "scale-kind"}
-            options = Options(complete, arguments={"image": UNKNOWN, "hole": HOLE}, kinds=kinds, names=names)
-            return Verb(options, says=tell_sizes, fills=True)
+            options = Options(
+                complete,
+                arguments={"image": UNKNOWN, "hole.marks": HOLE},
+                kinds=kinds,
+                names=names | {"hole.marks": "hole"},
+                optional={"marks": ""},
+            )
+            return Verb(options, says=lambda made: tell_filled(made) + tell_sizes(made), knows=read_nodata, fills=True, placed=True)
         case "design":
             from texrs.papers.design import design, design_variants
 
@@ -96,7 +103,8 @@ def make_verb(name: str) -> Verb:
         case "remove":
             from texrs.removal import remove
 
-            return replace(_see(remove, mask=MASK), fills=True)
+            verb = _see(remove, {"mask.marks": "mask"}, **{"mask.marks": THING})
+            return replace(verb, says=lambda made: tell_filled(made) + say_planes(made), fills=True, placed=True)
         case "solid":
             from texrs.papers.solid import solid
 
@@ -122,6 +130,21 @@ def make_verb(name: str) -> Verb:
 def count_moved(result: Synthesis) -> str:
     """Return how many elements moved."""
     return f", {len(result.report['matches'])} elements moved"
+
+
+def tell_filled(result: Synthesis) -> str:
+    """Return the share of the image that is filled."""
+    return f", {100 * result.report['filled']:.3g} % filled"
+
+
+def read_nodata(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """Return the value for pixels without data that the image states, as the hole."""
+    image = given["image"]
+    value = None if given["hole_marks"] or image.startswith(_outputs.SAMPLE) else io.read_notes(image).nodata
+    if value is None:
+        return {}
+    assume(f"{os.path.basename(image)}: its pixels without data ({value:g}) are filled, because no hole is given")
+    return {("hole", "marks"): value}
 
 
 def tell_sizes(result: Synthesis) -> str:
@@ -198,13 +221,14 @@ def make_views(
     return views if count > 1 else views[0]
 
 
-def _see(verb: Callable[..., Synthesis], **more: Kind) -> Verb:
+def _see(verb: Callable[..., Synthesis], names: Mapping[str, str] | None = None, **more: Kind) -> Verb:
     left = {"view.plane": "the command says how it lies by corners or angles"}
     kinds = {"ground": GROUNDS, "corners": CORNERS, "slant": EACH, "tilt": EACH, "fov": EACH}
     options = Options(
         verb,
         arguments={"image": EXAMPLE, **more},
         kinds={f"view.{name}": kind for name, kind in kinds.items()},
+        names=names,
         leave=left,
         makers={"view": make_views},
     )

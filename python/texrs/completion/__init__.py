@@ -9,7 +9,7 @@ own holes in the same way.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,20 +21,20 @@ from texrs._arrays import (
     as_int,
     as_mask,
     as_method,
-    as_ndarray,
     as_seed,
     as_wrap,
     check_work,
 )
+from texrs._masks import Mask, fade, widen
 from texrs._progress import listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.completion._depth import see_plane
 from texrs.completion._fill import Filling, fill
-from texrs.completion._holes import widen
+from texrs.completion._holes import find_hole
 from texrs.completion._optimise import optimise, recover_scale
-from texrs.completion._patches import LEAST, choose_mirrors, map_untouched
+from texrs.completion._patches import LEAST, choose_mirrors
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.symmetry import NONE
@@ -49,7 +49,7 @@ __all__ = ["complete"]
 @takes_materials("image", "exemplar")
 def complete(
     image: Array | Exemplar | Material,
-    hole: Array | str | None = None,
+    hole: Array | Mask | str | float | None = None,
     *,
     exemplar: Array | Exemplar | Material | None = None,
     allowed: Array | None = None,
@@ -65,14 +65,17 @@ def complete(
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Fill a hole in a picture by example.
+    """Fill a hole in an image by example.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array, or Exemplar
         The picture, any real dtype, at least 4 pixels a side. What it holds in the hole does not matter; it may be NaN.
-    hole : (H, W) bool or integers, or "alpha", optional
-        True, or not zero, where the picture is to be filled; "alpha": where its last channel of two or four is 0.
+    hole : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
+        Mask of the pixels to fill, white where it marks. "alpha": all pixels that are not fully opaque. "nan": all pixels
+        that are NaN or infinite. "nodata": the value that the file of the image states for pixels without data. A number:
+        all pixels of this value. Default: all pixels that are masked, NaN or infinite. See `texrs.Mask` for how a mask is
+        read, inverted, grown and feathered.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
     allowed : (H, W) array, optional
@@ -126,17 +129,17 @@ def complete(
         picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
         (each in a shade of its own) and ``"composite"``, the result before ``blend``. In the report ``"measured"`` tells of
         a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is; ``"exemplar_measured"``
-        the same of the exemplar's.
+        the same of the exemplar's. ``"filled"`` is the share of the image that is filled, 0 to 1.
 
     Raises
     ------
     InvalidInput
-        A hole or ``allowed`` of another shape; an exemplar of another dtype or other channels; nothing to copy from; a
-        patch larger than the pictures, with no place for it outside the hole, or given to "optimise".
+        A hole or ``allowed`` of another shape; a hole that marks nothing; an exemplar of another dtype or other channels;
+        nothing to copy from; a patch larger than the pictures, with no place for it outside the hole, or given to "optimise".
 
     Notes
     -----
-    What is masked in a `numpy.ma.MaskedArray` is a hole: it is filled too, and then ``hole`` may be left out.
+    Masked values of a `numpy.ma.MaskedArray` are filled too. A number or "nodata" also fills pixels that are NaN or infinite.
 
     References
     ----------
@@ -167,12 +170,11 @@ def complete(
     if mirror is not None or scale_map is not None:
         mirror = False if mirror is None else as_bool(mirror, "mirror")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    picture, masked = take_masked(image.image if isinstance(image, Exemplar) else image)
-    asked = mark_transparent(picture) if isinstance(hole, str) and hole == "alpha" else hole
-    pictures, open_ = check_pictures(picture, join_holes(asked, masked), exemplar)
+    cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), Mask.of(hole)
+    picture, marked = find_hole(image.image if isinstance(image, Exemplar) else image, mask, cyclic)
+    pictures, open_ = check_pictures(picture, widen(marked, mask.feather, cyclic), exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     usable = check_allowed(allowed, open_, exemplar is None and method == "patch")
-    cyclic, seed = as_wrap(wrap, usual=False), as_seed(seed)
     width = as_int(boundary, "boundary", 0, 1024)
     if patch is not None and method == "optimise":
         raise InvalidInput("patch: method 'optimise' has no patches; leave it out, or take method='patch'")
@@ -181,18 +183,15 @@ def complete(
 
     check_work("complete", pictures, shapes[0], "image", method=method)
     watch("complete", 0.0)
-    scales: list[Floats] | None = None
-    measured: list[Sizes | None] = [None, None]
-    if open_.any():
-        scales, measured = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
+    scales, measured = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)
-    mirrors = choose_mirrors(pictures, open_, mirror) if open_.any() and method == "patch" else (NONE,)
+    mirrors = choose_mirrors(pictures, open_, mirror) if method == "patch" else (NONE,)
     across = (cyclic[0], cyclic[1])
-    if open_.any() and method == "optimise":
+    if method == "optimise":
         places, levels = optimise(pictures, open_, scales, wide, wrap=across, seed=seed, progress=progress)
         made = Filling(places, 0.0, int(places.label.max()), [], False)
-    elif open_.any():
+    else:
         own = scales is not None and len(pictures) == 1 and len(mirrors) == 1
         made = fill(
             pictures,
@@ -207,8 +206,6 @@ def complete(
             seed=seed,
             progress=progress,
         )
-    else:
-        made = Filling(map_untouched(shapes), 0.0, 0, [], True)
     places, count = made.source, made.count
     new = find_places(places.label)
     # What is kept maps to itself; of patches every coordinate is whole, but where they are seen in depth.
@@ -219,23 +216,26 @@ def complete(
         row, column = places.coordinates[new].astype(np.intp).T
         result[new] = pictures[-1][row, column]
     composite = result
-    if screening and count:
+    how: dict[str, Any] = {}
+    if screening:
         known = (~open_, *(np.ones(s, bool) for s in shapes[1:]))
-        places = places.finished(cyclic, screening=screening, within=places.label > 0, known=known)
+        how = {"screening": screening, "within": places.label > 0, "known": known}
+    if mask.feather:
+        how["fade"] = np.rint(255 * fade(marked, mask.feather, cyclic)).astype(np.uint8)
+    places = places.finished(cyclic, **how)
+    if how:
         result = apply(places, pictures, progress=progress)
-    else:
-        places = places.finished(cyclic)
     watch("done", 1.0)
     bare = pictures[0].copy()
     # The hole is painted over with a known pixel, which does not change the least value.
-    bare[open_] = bare.min() if count and not open_.all() else 0
+    bare[open_] = 0 if open_.all() else bare.min()
     shades = np.zeros(open_.shape, np.uint8)
     shades[new] = 55 + places.label[new] * 67 % 200
     stages = {"known": bare, "patches": shades, "composite": composite}
     report: dict[str, object] = {
         "method": method,
         "seed": seed,
-        "hole": float(open_.mean()),
+        "filled": float(open_.mean()),
         "scaled": scale_map is not None,
         "measured": None if measured[0] is None else measured[0].as_dict(),
         "exemplar_measured": None if measured[1] is None else measured[1].as_dict(),
@@ -250,35 +250,6 @@ def complete(
     if method == "optimise":
         report["levels"] = levels
     return Synthesis(result, places, stages, report)
-
-
-def take_masked(image: object) -> tuple[Array, Bools | None]:
-    """Return a picture, and where it is masked, in whichever channel; None where nothing is."""
-    if not isinstance(image, np.ma.MaskedArray) or not np.ma.is_masked(image):
-        return as_ndarray(image, "image"), None
-    mask = np.ma.getmaskarray(image)
-    return np.asarray(image.data), np.asarray(mask.any(axis=-1) if image.ndim > 2 else mask)
-
-
-def join_holes(hole: object, masked: Bools | None) -> object:
-    """Return the hole that is said, and what is masked."""
-    if hole is None and masked is None:
-        raise InvalidInput("hole: needs a mask, 'alpha', or an image that is a masked array")
-    if hole is None or masked is None:
-        return masked if hole is None else hole
-    return as_mask(hole, "hole", masked.shape) | masked
-
-
-def mark_transparent(pixels: Array) -> Bools:
-    """Return what is wholly transparent in a picture as its hole."""
-    if pixels.ndim != 3 or pixels.shape[2] not in (2, 4):
-        raise InvalidInput(
-            f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
-        )
-    hole: Bools = pixels[..., -1] == 0
-    if not hole.any():
-        raise InvalidInput("hole: nothing in the image is wholly transparent, so there is nothing to fill")
-    return hole
 
 
 def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
@@ -305,17 +276,13 @@ def recover_scales(
     return [scale, np.ones(shape, np.float32) if other is None else other], [measured, beside]
 
 
-def check_pictures(array: Array, hole: object, exemplar: object | None) -> tuple[list[Array], Bools]:
+def check_pictures(array: Array, mask: Bools, exemplar: object | None) -> tuple[list[Array], Bools]:
     """Return the picture with its hole painted over, the one to copy from if there is one, and the hole."""
-    mask = None
-    if array.ndim in (2, 3) and array.dtype.kind in "buif" and array.size:
-        mask = as_mask(hole, "hole", array.shape[:2])
-        # What is in the hole must not matter, not even to the range of the values.
-        array = array.copy()
-        first = np.unravel_index(mask.argmin(), mask.shape)
-        array[mask] = array[first] if not mask[first] else 0
+    # What is in the hole must not matter, not even to the range of the values.
+    array = array.copy()
+    first = np.unravel_index(mask.argmin(), mask.shape)
+    array[mask] = array[first] if not mask[first] else 0
     pixels = as_image(array, "image", minimum=LEAST)
-    mask = as_mask(hole, "hole", pixels.shape[:2]) if mask is None else mask
     if exemplar is None:
         if mask.all():
             raise InvalidInput("hole: covers the whole image, so there is nothing to copy from; give an exemplar")

@@ -1,47 +1,125 @@
-"""Holes: masks of what is to be filled, and what is around them."""
+"""Holes: which pixels are to be filled, and what is around them."""
 
 from __future__ import annotations
 
+import math
+import numbers
+import os
 from collections.abc import Sequence
 
 import numpy as np
 
+from texrs._arrays import as_image, as_ndarray
 from texrs._engine.pyramid import Region
+from texrs._masks import Mask, check_share, mark
+from texrs._notices import assume
 from texrs._typing import Array, Bools
+from texrs.errors import InvalidInput
+
+NEAR = 1e-6
+"""Relative difference up to which a float equals the nodata value, which files state as rounded text."""
 
 
-def widen(mask: Bools, width: int, wrap: Sequence[bool] = (False, False)) -> Bools:
-    """Widen a mask by so many pixels all around, also across the edges of axes that wrap.
+def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) -> tuple[Array, Bools]:
+    """Return an image and which of its pixels are to be filled.
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> point = np.zeros((5, 5), bool)
-    >>> point[2, 0] = True
-    >>> widen(point, 2, (False, True)).astype(int)
-    array([[1, 0, 0, 0, 0],
-           [1, 1, 0, 0, 1],
-           [1, 1, 1, 1, 1],
-           [1, 1, 0, 0, 1],
-           [1, 0, 0, 0, 0]])
+    Parameters
+    ----------
+    image : array_like, path_like or numpy.ma.MaskedArray
+        Masked values are a hole too.
+    mask : Mask
+        Its marks are a mask, "alpha", "nan", "nodata", a number, or None: all pixels without a value.
+    wrap : sequence of bool
+        Axes along which the image is cyclic.
+    axes : int
+        Number of axes of the image without channels.
 
     """
-    from scipy.ndimage import distance_transform_edt
+    pixels, masked = take_masked(image, axes)
+    if pixels.ndim not in (axes, axes + 1) or pixels.dtype.kind not in "buif" or not pixels.size:
+        as_image(pixels, "image", axes=axes)
+    marks, shape = mask.marks, pixels.shape[:axes]
+    word = marks if isinstance(marks, str) else ""
+    number = isinstance(marks, numbers.Real) and not isinstance(marks, bool)
+    worded, alpha = marks is None or number or word in ("nan", "nodata"), word == "alpha"
+    if worded and mask.threshold is not None:
+        raise InvalidInput("threshold: must be given with a mask that is an image, or with 'alpha'")
+    if alpha:
+        hole = mask.adjust(_mark_transparent(pixels, axes, mask.threshold), wrap)
+    elif worded:
+        hole = mask.adjust(_mark_missing(image, pixels, marks, masked, axes), wrap)
+    else:
+        hole = mark(mask, "hole", shape, wrap)
+    hole = hole if masked is None else hole | masked
+    check_share(hole, "hole", mask.call("hole"), "fill", invertible=not (worded or alpha))
+    return pixels, hole
 
-    if not width or not mask.any():
-        return mask
-    reach = [min(width, n) if cyclic else 0 for n, cyclic in zip(mask.shape, wrap, strict=True)]
-    padded = np.pad(mask, [(n, n) for n in reach], mode="wrap")
-    # Distances are slow to measure: only where they can be short.
-    box = []
-    for axis in range(2):
-        marked = np.flatnonzero(padded.any(axis=1 - axis))
-        box.append(slice(max(0, int(marked[0]) - width), int(marked[-1]) + width + 1))
-    near = np.zeros_like(padded)
-    part = padded[tuple(box)]
-    near[tuple(box)] = distance_transform_edt(~part) <= width
-    inner = tuple(slice(n, n + m) for n, m in zip(reach, mask.shape, strict=True))
-    return np.asarray(near[inner], np.bool_)
+
+def take_masked(image: object, axes: int = 2) -> tuple[Array, Bools | None]:
+    """Return an image, and where any of its channels is masked; None if nothing is."""
+    if not isinstance(image, np.ma.MaskedArray) or not np.ma.is_masked(image):
+        return as_ndarray(image, "image", axes=axes), None
+    masked = np.ma.getmaskarray(image)
+    return np.asarray(image.data), np.asarray(masked.any(axis=-1) if image.ndim > axes else masked)
+
+
+def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bools:
+    """Return which pixels are not fully opaque, or are as transparent as a threshold says."""
+    if pixels.ndim != axes + 1 or pixels.shape[-1] not in (2, 4):
+        raise InvalidInput(
+            f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
+        )
+    alpha = pixels[..., -1]
+    full = float(np.iinfo(alpha.dtype).max) if alpha.dtype.kind in "ui" else 1.0
+    hole: Bools = ~(alpha >= full)
+    if threshold is not None:
+        hole &= ~(alpha > (1 - threshold) * full)
+    if not hole.any():
+        raise InvalidInput("hole: no pixel of the image is transparent, so there is nothing to fill")
+    return hole
+
+
+def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | None, axes: int) -> Bools:
+    """Return which pixels have no value: those that are NaN or infinite in any channel, or nodata in all channels."""
+    coloured = pixels.ndim > axes
+    bad = ~np.isfinite(pixels) if pixels.dtype.kind == "f" else np.zeros(pixels.shape, np.bool_)
+    missing = np.asarray(bad.any(axis=-1) if coloured else bad, np.bool_)
+    if marks is None:
+        if masked is None and not missing.any():
+            raise InvalidInput(
+                "hole: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image must be a masked array or hold NaN"
+            )
+        if missing.any():
+            assume(f"image: {np.count_nonzero(missing)} pixels are NaN or infinite; they are filled")
+        return missing if masked is None else missing | masked
+    value = _read_nodata(image) if marks == "nodata" else math.nan if marks == "nan" else _as_number(marks)
+    if math.isfinite(value):
+        with np.errstate(all="ignore"):
+            close = np.isclose(pixels, value, NEAR, 0) if pixels.dtype.kind == "f" else pixels == value
+        missing |= close.all(axis=-1) if coloured else close
+    if not missing.any():
+        what = f"is {value:g}" if math.isfinite(value) else "is NaN or infinite"
+        raise InvalidInput(f"hole: no pixel of the image {what}, so there is nothing to fill")
+    return missing
+
+
+def _as_number(value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        raise InvalidInput("hole: must be a number that a double can hold") from None
+
+
+def _read_nodata(image: object) -> float:
+    """Return the value that a file states for pixels without data."""
+    from texrs.io import read_notes
+
+    if not isinstance(image, str | os.PathLike):
+        raise InvalidInput("hole: 'nodata' needs the path of an image, whose file states the value; or give the value")
+    value = read_notes(image).nodata
+    if value is None:
+        raise InvalidInput(f"hole: {os.fspath(image)} states no nodata value; give the value, or 'nan'")
+    return value
 
 
 def look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> Region:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from texrs._arrays import guidance
 from texrs._light import divide_out, measure_lights
+from texrs._masks import widen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.completion._fill import fill
-from texrs.completion._holes import paint_over, widen
+from texrs.completion._holes import paint_over
 from texrs.completion._patches import choose_mirrors
 from texrs.completion._sides import share_out
 from texrs.exemplar.symmetry import NONE

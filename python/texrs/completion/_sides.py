@@ -9,8 +9,8 @@ from math import ceil, cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._masks import widen
 from texrs._typing import Bools
-from texrs.completion._holes import widen
 
 REACH = 0.5
 """Known pixels around a hole that tell where parts meet: so far away, in square roots of its area."""

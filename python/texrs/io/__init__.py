@@ -61,7 +61,7 @@ from math import atan, degrees, prod
 import numpy as np
 
 from texrs import _notices
-from texrs._checks import as_items, as_limit, try_array
+from texrs._checks import as_instance, as_items, as_limit, try_array
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
@@ -277,7 +277,14 @@ def read_volume(path: PathLike, *, limit: int | None = None) -> Array:
     return READERS[kind](name, limit)
 
 
-def write(path: PathLike, array: Array, *, overwrite: bool = True, description: str | None = None) -> None:
+def write(
+    path: PathLike,
+    array: Array,
+    *,
+    overwrite: bool = True,
+    description: str | None = None,
+    notes: Notes | None = None,
+) -> None:
     """Write an image, whole or not at all.
 
     Parameters
@@ -290,6 +297,8 @@ def write(path: PathLike, array: Array, *, overwrite: bool = True, description: 
         Whether a file that exists may be replaced.
     description : str, optional
         What the file is to say of itself, in letters of ASCII: PNG and TIFF keep it (`read_description`), the others do not.
+    notes : Notes, optional
+        What the file is to say beside its values, as far as `annotate` cannot write it: TIFF keeps the georeference.
 
     Raises
     ------
@@ -311,7 +320,8 @@ def write(path: PathLike, array: Array, *, overwrite: bool = True, description: 
     """
     if description is not None and not (isinstance(description, str) and description.isascii()):
         raise InvalidInput(f"description: needs letters of ASCII, got {description!r}")
-    _write(path, array, 2, overwrite, None, description)
+    said = Notes() if notes is None else as_instance(notes, "notes", Notes)
+    _write(path, array, 2, overwrite, None, description, said.georeference)
 
 
 def write_volume(
@@ -456,6 +466,7 @@ def _write(
     overwrite: bool,
     spacing: Sequence[float] | None,
     description: str | None = None,
+    tags: Sequence[tuple[int, int, int, object]] = (),
 ) -> None:
     target = _files.as_path(path)
     suffix = find_suffix(target).lower()
@@ -477,7 +488,7 @@ def _write(
         if suffix in (".tif", ".tiff"):
             planes = array if axes == 3 else array[np.newaxis]
             planes = planes if planes.ndim == 4 else planes[..., np.newaxis]
-            _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes, description)
+            _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes, description, tags)
             return
         if axes == 3:
             volume = array[..., 0] if array.ndim == 4 and array.shape[3] == 1 else array

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 from texrs._checks import as_int
+
+NODATA = 42113
+"""Tag of TIFF in which GDAL states the value of pixels without data."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +32,9 @@ class Notes:
         JSON: how texrs made the file.
     palette : bytes, optional
         Colours of an indexed image in the order of the file, four bytes each: red, green, blue, alpha.
+    georeference : tuple of (int, int, int, object)
+        Tags of a TIFF file that say where on the earth its pixels lie, and which value stands for no data: code, type, number
+        of values, and value, as tifffile returns them. `write` writes them.
 
     Examples
     --------
@@ -43,6 +51,15 @@ class Notes:
     primaries: tuple[float, ...] | None = None
     made: str | None = None
     palette: bytes | None = None
+    georeference: tuple[tuple[int, int, int, Any], ...] = ()
+
+    @property
+    def nodata(self) -> float | None:
+        """The value of pixels without data, as GDAL states it."""
+        text = next((value for code, _, _, value in self.georeference if code == NODATA), None)
+        with suppress(TypeError, ValueError):
+            return float(text)  # type: ignore[arg-type]
+        return None
 
     def fit(self, channels: int) -> Notes:
         """Return what is true of a picture of so many channels: a profile is of grey or of colours.

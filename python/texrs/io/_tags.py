@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from texrs.errors import FileError
-from texrs.io._notes import Notes
+from texrs.io._notes import NODATA, Notes
 
 INCH = 0.0254
 SOFTWARE, ORIENTATION, ACROSS, DOWN, UNIT, EXIF, PROFILE, SPACE = 305, 274, 282, 283, 296, 0x8769, 34675, 0xA001
+GEOREFERENCE = frozenset({33550, 33922, 34264, 34735, 34736, 34737, NODATA})
+"""Tags of GeoTIFF, and of GDAL."""
 _SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 13: 4, 16: 8, 17: 8, 18: 8}
 """Bytes of a value, by the type of a tag."""
 _MOST_TAGS, _MOST = 4096, 2**24
@@ -110,6 +112,12 @@ def read_tiff(path: Path) -> dict[str, Any]:
         text = tags.read(SOFTWARE)
         if text and text.startswith(b'{"texrs"'):
             found["made"] = text.rstrip(b"\0").decode("utf-8")
+        if tags.entries.keys() & GEOREFERENCE:
+            import tifffile
+
+            with tifffile.TiffFile(path, is_ome=False) as tif:
+                stated = [t for t in tif.pages.first.tags if t.code in GEOREFERENCE]
+                found["georeference"] = tuple((t.code, int(t.dtype), t.count, t.value) for t in stated)
     return found
 
 

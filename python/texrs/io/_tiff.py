@@ -6,7 +6,7 @@ import logging
 import lzma
 import threading
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from math import inf, prod
@@ -143,7 +143,14 @@ def take_volume(path: Path, planes: Array, orientation: int) -> Array:
     return planes[..., 0] if planes.shape[3] == 1 else planes
 
 
-def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int, description: str | None = None) -> None:
+def write_tiff(
+    path: Path,
+    planes: Iterable[Array],
+    channels: int,
+    size: int,
+    description: str | None = None,
+    tags: Sequence[tuple[int, int, int, Any]] = (),
+) -> None:
     """Write planes of rows, columns, channels, of so many bytes in all: one page a plane, uncompressed."""
     import tifffile
 
@@ -151,6 +158,8 @@ def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int, de
     options: dict[str, Any] = {"photometric": "rgb" if channels in (3, 4) else "minisblack", "metadata": None}
     if description is not None:
         options["description"] = description
+    if tags:
+        options["extratags"] = [(*tag, True) for tag in tags]
     if channels not in (1, 3):
         options["extrasamples"] = extra
     if channels > 1:

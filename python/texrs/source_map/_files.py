@@ -91,6 +91,7 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
         "finish": 2**20,
         "finish/within": pixels,
         "finish/parts": 2 * pixels,
+        "finish/fade": pixels,
     }
     known = [name for name in headers if name.startswith("finish/known/")]
     chosen = [name for name in most if name in headers]

@@ -55,6 +55,8 @@ class Finish:
         Of a picture that goes on beyond its exemplar, or in holes of it: the place (row, column) in the exemplar that its first
         pixel lies at. Slow light of each part is divided out of what is looked up, and that of where it is shown multiplied on.
         None: it brings its own light along.
+    fade : (rows, columns) uint8, optional
+        Weight of what is looked up, 0 to 255, where a filling fades into the exemplar of the same size. None: 255 everywhere.
 
     Examples
     --------
@@ -77,6 +79,7 @@ class Finish:
     known: tuple[Bools, ...] | None = None
     parts: NDArray[np.uint16] | None = None
     light: tuple[int, int] | None = None
+    fade: NDArray[np.uint8] | None = None
 
     __repr__ = brief
 
@@ -87,7 +90,7 @@ class Finish:
         -------
         dict of str to array
             ``"finish"`` is (n,) uint8; where there are any, ``"finish/within"`` and ``"finish/known/0"`` are bool, and
-            ``"finish/parts"`` is uint16.
+            ``"finish/parts"`` is uint16, ``"finish/fade"`` uint8.
 
         Examples
         --------
@@ -102,6 +105,8 @@ class Finish:
             parts["finish/within"] = self.within
         if self.parts is not None:
             parts["finish/parts"] = self.parts
+        if self.fade is not None:
+            parts["finish/fade"] = self.fade
         parts |= {f"finish/known/{i}": mask for i, mask in enumerate(self.known or ())}
         return parts
 
@@ -156,6 +161,9 @@ class Finish:
             raise InvalidInput(f"finish: parts needs uint16 of shape {shape}")
         if within is not None and within.shape != shape:
             raise InvalidInput(f"finish: within needs a mask of shape {shape}")
+        fade = parts.get("finish/fade")
+        if fade is not None and ((fade.shape, *shapes[:1]) != (shape, shape) or fade.dtype != np.uint8):
+            raise InvalidInput(f"finish: fade must be uint8 of shape {shape}, which must be that of the first exemplar")
         light = words["light"]
         if light is not None and not (isinstance(light, list) and len(light) == 2):
             raise InvalidInput("finish: light needs a row and a column")
@@ -175,4 +183,5 @@ class Finish:
             None
             if light is None
             else (as_int(light[0], "light", -(2**31), 2**31), as_int(light[1], "light", -(2**31), 2**31)),
+            fade,
         )

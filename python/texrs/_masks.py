@@ -1,0 +1,350 @@
+"""Masks: which pixels or voxels a user marked, read from whatever holds the marks."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import Any
+
+import numpy as np
+
+from texrs._checks import as_bool, as_float, as_int
+from texrs._conversion import as_ndarray
+from texrs._notices import assume
+from texrs._typing import Array, Bools, Floats
+from texrs.errors import InvalidInput
+
+__all__ = ["Mask", "check_share", "fade", "mark", "widen"]
+
+HALF = 0.5
+"""Share of white from which a pixel is marked. JPEG at quality 20 moves black and white by up to 0.46 of their distance."""
+GREY, LEAST_GREY = 1 / 16, 0.01
+"""Share of white above which a pixel is grey, and share of all pixels from which unmarked grey is reported."""
+TWO = 0.1
+"""Share of the pixels other than 0 that may lie between the two values of a mask: edges, and noise of JPEG."""
+MUCH = 0.5
+"""Share of an image above which a mask is probably inverted."""
+FARTHEST = 4096
+"""Maximum number of pixels of `Mask.grow` and of `Mask.feather`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mask:
+    """A mask, and how to read it.
+
+    A mask is white where it marks. Any parameter of texrs that takes a mask also takes a `Mask`.
+
+    Parameters
+    ----------
+    marks : array_like, path_like, str, float or None
+        The marks: an image of the same size, or what the function that takes the mask allows instead. A bool array is taken as
+        it is. Of an image, a pixel is marked if its largest channel is at least half of white. An image without any light
+        pixel contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency
+        varies is a layer of a paint program: each pixel is marked that is at least half opaque.
+    invert : bool
+        If True, the other pixels are marked.
+    threshold : float, optional
+        Share of white, or of full opacity of a layer, from which a pixel is marked, 0 to 1. At 0, each pixel that is not black
+        is marked. Default: 0.5, which noise of JPEG does not reach.
+    grow : int
+        Number of pixels by which the marked area grows on all sides, -4096 to 4096. A negative number shrinks it.
+    feather : int
+        Width in pixels of the band around the marked area in which the filling fades into the image, 0 to 4096. The marked
+        area is replaced completely. Only for a hole that is filled.
+
+    Raises
+    ------
+    InvalidInput
+        An option is out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texrs
+    >>> wall = texrs.samples.load("bricks", size=(64, 64)).image
+    >>> drawn = np.zeros((64, 64), np.uint8)
+    >>> drawn[20:30, 20:30] = 255
+    >>> round(texrs.complete(wall, texrs.Mask(drawn, grow=3)).report["filled"], 3)
+    0.062
+
+    """
+
+    marks: Any
+    _: KW_ONLY
+    invert: bool = False
+    threshold: float | None = None
+    grow: int = 0
+    feather: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "invert", as_bool(self.invert, "invert"))
+        share = None if self.threshold is None else as_float(self.threshold, "threshold", 0, 1)
+        object.__setattr__(self, "threshold", share)
+        object.__setattr__(self, "grow", as_int(self.grow, "grow", -FARTHEST, FARTHEST))
+        object.__setattr__(self, "feather", as_int(self.feather, "feather", 0, FARTHEST))
+
+    @classmethod
+    def of(cls, value: object) -> Mask:
+        """Return a mask as it is, or one of marks that are read by default.
+
+        Parameters
+        ----------
+        value : Mask or object
+            A mask, or the marks.
+
+        Returns
+        -------
+        Mask
+
+        Examples
+        --------
+        >>> import texrs
+        >>> texrs.Mask.of("hole.png").grow
+        0
+
+        """
+        return value if isinstance(value, Mask) else cls(value)
+
+    def call(self, name: str) -> str:
+        """Return what notices call the marks: the name of the file, or of the parameter.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        str
+
+        Examples
+        --------
+        >>> import texrs
+        >>> texrs.Mask("masks/hole.png").call("hole")
+        'hole.png'
+
+        """
+        return os.path.basename(self.marks) if isinstance(self.marks, str | os.PathLike) else name
+
+    def adjust(self, marked: Bools, wrap: Sequence[bool] | None = None) -> Bools:
+        """Return a marked area inverted and grown.
+
+        Parameters
+        ----------
+        marked : (...) bool
+            The marked pixels or voxels.
+        wrap : sequence of bool, optional
+            Axes along which the image is cyclic. Default: none.
+
+        Returns
+        -------
+        (...) bool
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texrs
+        >>> texrs.Mask(None, grow=1).adjust(np.array([[False, False, True, False, False]])).astype(int).tolist()
+        [[0, 1, 1, 1, 0]]
+
+        """
+        marked = ~marked if self.invert else marked
+        return ~widen(~marked, -self.grow, wrap) if self.grow < 0 else widen(marked, self.grow, wrap)
+
+
+def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bool] | None = None) -> Bools:
+    """Return which pixels or voxels a mask marks.
+
+    Parameters
+    ----------
+    value : Mask, array_like, path_like or PIL.Image.Image
+        The mask, of the shape or with channels last.
+    name : str
+        Name of the parameter, for messages.
+    shape : sequence of int or str
+        Length of each axis. A word stands for any length.
+    wrap : sequence of bool, optional
+        Axes along which the image is cyclic. Default: none.
+
+    Returns
+    -------
+    (...) bool
+
+    Raises
+    ------
+    InvalidInput
+        Not numbers, not finite, or of another shape.
+    FileError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> mark(np.uint8([[0, 2, 255]]), "hole", ("rows", "columns"))
+    array([[False, False,  True]])
+
+    """
+    mask = Mask.of(value)
+    given = _read(mask.marks, name, len(shape))
+    if given.dtype.kind not in "buif":
+        raise InvalidInput(f"{name}: needs bool, integers or floats, got dtype {given.dtype}")
+    sides = given.shape[: len(shape)]
+    fits = len(sides) == len(shape) and all(
+        n > 0 if isinstance(wanted, str) else n == wanted for n, wanted in zip(sides, shape, strict=True)
+    )
+    if not fits or given.ndim > len(shape) + 1 or (given.ndim > len(shape) and not 0 < given.shape[-1] <= 4):
+        wanted = ", ".join(map(str, shape)) + "," * (len(shape) == 1)
+        raise InvalidInput(f"{name}: needs shape ({wanted}), got {given.shape}; a mask has the size of the image")
+    if given.dtype.kind == "f" and not np.isfinite(given).all():
+        raise InvalidInput(f"{name}: must be finite, but some values of the mask are NaN or infinite")
+    return mask.adjust(_decide(given, len(shape), mask, mask.call(name)), wrap)
+
+
+def _read(marks: object, name: str, axes: int) -> Array:
+    """Return marks as an array. An error of a file names the file alone."""
+    if not isinstance(marks, str | os.PathLike):
+        return as_ndarray(marks, name, axes=axes)
+    from texrs import io
+
+    return io.read_volume(marks) if axes == 3 else io.read(marks)
+
+
+def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:
+    """Return which pixels of an image are marked, and report what is not certain."""
+    levels = given
+    if given.ndim > axes:
+        colours, alpha = (given[..., :-1], given[..., -1]) if given.shape[-1] in (2, 4) else (given, None)
+        levels = colours.max(axis=-1)
+        if alpha is not None and alpha.size and alpha.min() < alpha.max():
+            levels = _look_through(levels, alpha, called)
+    if levels.dtype == np.bool_ or not levels.size:
+        return np.array(levels, np.bool_)
+    if levels.min() < 0:
+        assume(f"{called}: read as numbers, because some are negative; each value other than 0 is marked")
+        return np.asarray(levels != 0)
+    top, white = float(levels.max()), _find_white(levels)
+    if top < HALF * white:
+        between = np.count_nonzero((levels > top / 4) & (levels < top * 3 / 4))
+        cut = HALF * top if between <= TWO * np.count_nonzero(levels) else 0.0
+        if top > 1 and (levels.dtype.kind == "f" or levels.dtype.itemsize < 4):
+            least = f"from {cut:g} on" if np.any((levels > 0) & (levels < cut)) else "other than 0"
+            assume(
+                f"{called}: read as numbers, because the largest is {top:g} of {white:g}; each value {least} is marked"
+            )
+        white = top
+    else:
+        cut = HALF * white
+        grey = float(np.mean((levels > GREY * white) & (levels < cut)))
+        if mask.threshold is None and grey >= LEAST_GREY:
+            assume(f"{called}: {100 * grey:.0f} % is dark grey, which is not marked (a smaller threshold marks it)")
+    if mask.threshold is not None:
+        cut = mask.threshold * white
+    return np.asarray((levels >= cut) & (levels > 0))
+
+
+def _look_through(levels: Array, alpha: Array, called: str) -> Array:
+    """Return the marks of an image whose transparency varies: its opacity, or what is white where it is opaque."""
+    white, full = _find_white(levels), _find_white(alpha)
+    seen = levels[alpha >= HALF * full].astype(np.float64) / white
+    dark, light = (float(np.mean(part)) if seen.size else 0.0 for part in (seen < 0.25, seen > 0.75))
+    if min(dark, light) >= LEAST_GREY and dark + light >= 1 - TWO:
+        assume(f"{called}: read as a mask in black and white with transparent parts, which are not marked")
+        return np.where(alpha >= HALF * full, levels, 0).astype(levels.dtype)
+    assume(f"{called}: read as a layer, because its transparency varies; its opaque pixels are marked")
+    return alpha
+
+
+def _find_white(levels: Array) -> float:
+    """Return the value of white: the largest one of an integer type, 1 of floats within 0 to 1, else the largest float."""
+    if levels.dtype == np.bool_:
+        return 1.0
+    return float(np.iinfo(levels.dtype).max) if levels.dtype.kind in "ui" else max(1.0, float(levels.max()))
+
+
+def check_share(marked: Bools, name: str, called: str, verb: str, *, invertible: bool = True) -> None:
+    """Refuse a mask that marks nothing, and report one that marks more than half.
+
+    Parameters
+    ----------
+    marked : (...) bool
+        The marked pixels or voxels.
+    name, called : str
+        Name of the parameter, and what notices call the mask.
+    verb : str
+        What is done with the marked pixels, such as "fill".
+    invertible : bool
+        If True, the notice advises to invert the mask.
+
+    Raises
+    ------
+    InvalidInput
+        Nothing is marked.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> check_share(np.zeros((4, 4), bool), "hole", "hole.png", "fill")
+    Traceback (most recent call last):
+        ...
+    texrs.errors.InvalidInput: hole: marks nothing, so there is nothing to fill
+
+    """
+    share = float(marked.mean())
+    if not share:
+        raise InvalidInput(f"{name}: marks nothing, so there is nothing to {verb}")
+    if MUCH < share < 1:
+        advice = "; if the rest is meant, invert the mask (--invert)" if invertible else ""
+        assume(f"{called}: marks {100 * share:.0f} % of the image{advice}")
+
+
+def widen(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Bools:
+    """Grow a mask by a number of pixels on all sides, also across the borders of cyclic axes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> point = np.zeros((5, 5), bool)
+    >>> point[2, 0] = True
+    >>> widen(point, 2, (False, True)).astype(int)
+    array([[1, 0, 0, 0, 0],
+           [1, 1, 0, 0, 1],
+           [1, 1, 1, 1, 1],
+           [1, 1, 0, 0, 1],
+           [1, 0, 0, 0, 0]])
+
+    """
+    if not width or not mask.any():
+        return mask
+    return measure(mask, width, wrap) <= width
+
+
+def fade(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floats:
+    """Return the weight of a filling: 1 where a mask marks, and evenly less to 0 beyond a band around it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> fade(np.array([[True, False, False, False]]), 1).tolist()
+    [[1.0, 0.5, 0.0, 0.0]]
+
+    """
+    return np.asarray(np.clip(1 - measure(mask, width, wrap) / (width + 1), 0, 1), np.float32)
+
+
+def measure(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floats:
+    """Return the distance in pixels to the nearest marked pixel, infinite beyond a width."""
+    from scipy.ndimage import distance_transform_edt
+
+    closed = (False,) * mask.ndim if wrap is None else wrap
+    reach = [min(width, n) if cyclic else 0 for n, cyclic in zip(mask.shape, closed, strict=True)]
+    padded = np.pad(mask, [(n, n) for n in reach], mode="wrap")
+    far = np.full(padded.shape, np.inf, np.float32)
+    if mask.any():
+        # Distances are slow to measure: only measure them in the box in which they can be short.
+        box = []
+        for axis in range(mask.ndim):
+            marked = np.flatnonzero(padded.any(axis=tuple(a for a in range(mask.ndim) if a != axis)))
+            box.append(slice(max(0, int(marked[0]) - width), int(marked[-1]) + width + 1))
+        far[tuple(box)] = distance_transform_edt(~padded[tuple(box)])
+    return far[tuple(slice(n, n + m) for n, m in zip(reach, mask.shape, strict=True))]
