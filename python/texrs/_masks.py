@@ -15,7 +15,7 @@ from texrs._notices import assume
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["Mask", "check_share", "fade", "mark", "widen"]
+__all__ = ["Mask", "adjust", "as_marks", "check_share", "fade", "mark", "name_marks", "widen"]
 
 HALF = 0.5
 """Share of white from which a pixel is marked. JPEG at quality 20 moves black and white by up to 0.46 of their distance."""
@@ -37,7 +37,7 @@ class Mask:
 
     Parameters
     ----------
-    marks : array_like, path_like, str, float or None
+    marks : (H, W) or (D, H, W) array, with or without channels, path_like, PIL.Image.Image, str, float or None
         The marks: an image of the same size, or what the function that takes the mask allows instead. A bool array is taken as
         it is. Of an image, a pixel is marked if its largest channel is at least half of white. An image without any light
         pixel contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency
@@ -66,7 +66,7 @@ class Mask:
     >>> drawn = np.zeros((64, 64), np.uint8)
     >>> drawn[20:30, 20:30] = 255
     >>> round(texrs.complete(wall, texrs.Mask(drawn, grow=3)).report["filled"], 3)
-    0.062
+    0.058
 
     """
 
@@ -84,73 +84,29 @@ class Mask:
         object.__setattr__(self, "grow", as_int(self.grow, "grow", -FARTHEST, FARTHEST))
         object.__setattr__(self, "feather", as_int(self.feather, "feather", 0, FARTHEST))
 
-    @classmethod
-    def of(cls, value: object) -> Mask:
-        """Return a mask as it is, or one of marks that are read by default.
 
-        Parameters
-        ----------
-        value : Mask or object
-            A mask, or the marks.
+def as_marks(value: object) -> Mask:
+    """Return a mask as it is, or one of marks that are read by default."""
+    return value if isinstance(value, Mask) else Mask(value)
 
-        Returns
-        -------
-        Mask
 
-        Examples
-        --------
-        >>> import texrs
-        >>> texrs.Mask.of("hole.png").grow
-        0
+def name_marks(mask: Mask, name: str) -> str:
+    """Return what notices call the marks: the name of the file, or of the parameter."""
+    return os.path.basename(mask.marks) if isinstance(mask.marks, str | os.PathLike) else name
 
-        """
-        return value if isinstance(value, Mask) else cls(value)
 
-    def call(self, name: str) -> str:
-        """Return what notices call the marks: the name of the file, or of the parameter.
+def adjust(mask: Mask, marked: Bools, wrap: Sequence[bool] | None = None) -> Bools:
+    """Return a marked area inverted and grown as a mask says.
 
-        Parameters
-        ----------
-        name : str
-            Name of the parameter.
+    Examples
+    --------
+    >>> import numpy as np
+    >>> adjust(Mask(None, grow=1), np.array([[False, False, True, False, False]])).astype(int).tolist()
+    [[0, 1, 1, 1, 0]]
 
-        Returns
-        -------
-        str
-
-        Examples
-        --------
-        >>> import texrs
-        >>> texrs.Mask("masks/hole.png").call("hole")
-        'hole.png'
-
-        """
-        return os.path.basename(self.marks) if isinstance(self.marks, str | os.PathLike) else name
-
-    def adjust(self, marked: Bools, wrap: Sequence[bool] | None = None) -> Bools:
-        """Return a marked area inverted and grown.
-
-        Parameters
-        ----------
-        marked : (...) bool
-            The marked pixels or voxels.
-        wrap : sequence of bool, optional
-            Axes along which the image is cyclic. Default: none.
-
-        Returns
-        -------
-        (...) bool
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import texrs
-        >>> texrs.Mask(None, grow=1).adjust(np.array([[False, False, True, False, False]])).astype(int).tolist()
-        [[0, 1, 1, 1, 0]]
-
-        """
-        marked = ~marked if self.invert else marked
-        return ~widen(~marked, -self.grow, wrap) if self.grow < 0 else widen(marked, self.grow, wrap)
+    """
+    marked = ~marked if mask.invert else marked
+    return ~widen(~marked, -mask.grow, wrap) if mask.grow < 0 else widen(marked, mask.grow, wrap)
 
 
 def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bool] | None = None) -> Bools:
@@ -185,7 +141,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     array([[False, False,  True]])
 
     """
-    mask = Mask.of(value)
+    mask = as_marks(value)
     given = _read(mask.marks, name, len(shape))
     if given.dtype.kind not in "buif":
         raise InvalidInput(f"{name}: needs bool, integers or floats, got dtype {given.dtype}")
@@ -198,7 +154,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
         raise InvalidInput(f"{name}: needs shape ({wanted}), got {given.shape}; a mask has the size of the image")
     if given.dtype.kind == "f" and not np.isfinite(given).all():
         raise InvalidInput(f"{name}: must be finite, but some values of the mask are NaN or infinite")
-    return mask.adjust(_decide(given, len(shape), mask, mask.call(name)), wrap)
+    return adjust(mask, _decide(given, len(shape), mask, name_marks(mask, name)), wrap)
 
 
 def _read(marks: object, name: str, axes: int) -> Array:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_ndarray, as_seed, check_work
-from texrs._masks import Mask, check_share, fade, mark, widen
+from texrs._masks import Mask, as_marks, check_share, fade, mark, name_marks, widen
 from texrs._progress import answering, listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
@@ -116,9 +116,9 @@ def remove(
     image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     shape = pixels.shape[0], pixels.shape[1]
-    asked = Mask.of(mask)
+    asked = as_marks(mask)
     marked = mark(asked, "mask", shape)
-    check_share(marked, "mask", asked.call("mask"), "remove")
+    check_share(marked, "mask", name_marks(asked, "mask"), "remove")
     wide = max(1, round(MARGIN * min(shape))) if margin is None else as_int(margin, "margin", 0, 64)
     rim, things = round(RIM * min(shape)), min(64, round(THINGS * min(shape)))
     if boundary is not None:

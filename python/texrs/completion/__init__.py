@@ -25,7 +25,7 @@ from texrs._arrays import (
     as_wrap,
     check_work,
 )
-from texrs._masks import Mask, fade, widen
+from texrs._masks import Mask, as_marks, fade, widen
 from texrs._progress import listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs._verbs import takes_materials
@@ -170,7 +170,7 @@ def complete(
     if mirror is not None or scale_map is not None:
         mirror = False if mirror is None else as_bool(mirror, "mirror")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), Mask.of(hole)
+    cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), as_marks(hole)
     picture, marked = find_hole(image.image if isinstance(image, Exemplar) else image, mask, cyclic)
     pictures, open_ = check_pictures(picture, widen(marked, mask.feather, cyclic), exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)

@@ -11,7 +11,7 @@ import numpy as np
 
 from texrs._arrays import as_image, as_ndarray
 from texrs._engine.pyramid import Region
-from texrs._masks import Mask, check_share, mark
+from texrs._masks import Mask, adjust, check_share, mark, name_marks
 from texrs._notices import assume
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
@@ -45,13 +45,13 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
     if worded and mask.threshold is not None:
         raise InvalidInput("threshold: must be given with a mask that is an image, or with 'alpha'")
     if alpha:
-        hole = mask.adjust(_mark_transparent(pixels, axes, mask.threshold), wrap)
+        hole = adjust(mask, _mark_transparent(pixels, axes, mask.threshold), wrap)
     elif worded:
-        hole = mask.adjust(_mark_missing(image, pixels, marks, masked, axes), wrap)
+        hole = adjust(mask, _mark_missing(image, pixels, marks, masked, axes), wrap)
     else:
         hole = mark(mask, "hole", shape, wrap)
     hole = hole if masked is None else hole | masked
-    check_share(hole, "hole", mask.call("hole"), "fill", invertible=not (worded or alpha))
+    check_share(hole, "hole", name_marks(mask, "hole"), "fill", invertible=not (worded or alpha))
     return pixels, hole
 
 
