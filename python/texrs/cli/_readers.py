@@ -13,6 +13,7 @@ from texrs import io, samples
 from texrs._arrays import as_image
 from texrs._notices import assume, ignore
 from texrs._masks import mark
+from texrs._notices import assume
 from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
@@ -97,8 +98,12 @@ def read_density(text: str, about: About) -> Any:
 
 
 def read_mask(path: str, axes: int = 2) -> Array:
-    """Read a mask of any size, as `texrs.Mask` describes."""
-    return mark(path, path, ("planes", "rows", "columns")[3 - axes :])
+    """Read a mask of any size, as `texrs.Mask` describes, and report how much it marks."""
+    marked = mark(path, path, ("planes", "rows", "columns")[3 - axes :])
+    if not marked.any():
+        raise InvalidInput(f"{path}: marks nothing; a mask is white where it marks")
+    assume(f"{os.path.basename(path)}: read as a mask that marks {100 * float(marked.mean()):.3g} % of it")
+    return marked
 
 
 def read_hole(text: str, about: About) -> Any:

@@ -172,7 +172,8 @@ def complete(
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), as_marks(hole)
     picture, marked = find_hole(image.image if isinstance(image, Exemplar) else image, mask, cyclic)
-    pictures, open_ = check_pictures(picture, widen(marked, mask.feather, cyclic), exemplar)
+    open_ = widen(marked, mask.feather, cyclic)
+    pictures = check_pictures(picture, marked, open_, exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     usable = check_allowed(allowed, open_, exemplar is None and method == "patch")
     width = as_int(boundary, "boundary", 0, 1024)
@@ -276,17 +277,17 @@ def recover_scales(
     return [scale, np.ones(shape, np.float32) if other is None else other], [measured, beside]
 
 
-def check_pictures(array: Array, mask: Bools, exemplar: object | None) -> tuple[list[Array], Bools]:
-    """Return the picture with its hole painted over, the one to copy from if there is one, and the hole."""
+def check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | None) -> list[Array]:
+    """Return the picture with its marked pixels painted over, and the one to copy from if there is one."""
     # What is in the hole must not matter, not even to the range of the values.
     array = array.copy()
     first = np.unravel_index(mask.argmin(), mask.shape)
     array[mask] = array[first] if not mask[first] else 0
     pixels = as_image(array, "image", minimum=LEAST)
     if exemplar is None:
-        if mask.all():
+        if open_.all():
             raise InvalidInput("hole: covers the whole image, so there is nothing to copy from; give an exemplar")
-        return [pixels.reshape(array.shape)], mask
+        return [pixels.reshape(array.shape)]
     known = as_exemplar(exemplar, minimum=LEAST)
     other = known.pixels
     if other.dtype != pixels.dtype or other.shape[-1] != pixels.shape[-1]:
@@ -294,9 +295,9 @@ def check_pictures(array: Array, mask: Bools, exemplar: object | None) -> tuple[
             f"exemplar: needs the dtype and channels of the image, {pixels.dtype} and {pixels.shape[-1]}; "
             f"got {other.dtype} and {other.shape[-1]}"
         )
-    if mask.all():
+    if open_.all():
         pixels[...] = other[0, 0]
-    return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])], mask
+    return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])]
 
 
 def find_places(marked: Array) -> tuple[NDArray[np.intp], ...]:
