@@ -213,6 +213,14 @@ def test_a_softly_erased_hole_keeps_nothing_of_the_brush(dtype: type) -> None:
     assert kept.report["filled"] == pytest.approx((alpha <= 0.5).mean(), abs=0.01)
 
 
+def test_an_image_without_an_opaque_pixel_says_what_to_do() -> None:
+    veiled = np.dstack([BRICKS, np.where(DISC, 0, 254).astype(np.uint8)])
+    with collect() as notices, pytest.raises(InvalidInput, match="hole: covers the whole image"):
+        texrs.complete(veiled, "alpha")
+    assert "with a threshold of 1 only fully transparent ones are" in notices.assumed[0]
+    assert texrs.complete(veiled, Mask("alpha", threshold=1)).report["filled"] == DISC.mean()
+
+
 def test_a_feathered_filling_fades_into_the_image() -> None:
     base = np.where(DISC, 0, BRICKS[..., 0]).astype(np.uint8)
     made = texrs.complete(base, Mask(WHITE, feather=5))

@@ -46,7 +46,8 @@ class Mask:
         If True, the other pixels are marked.
     threshold : float, optional
         Share of white, or of full opacity of a layer, from which a pixel is marked, 0 to 1. At 0, each pixel that is not black
-        is marked. Default: 0.5, which noise of JPEG does not reach.
+        is marked. Default: 0.5, which noise of JPEG does not reach. If the marks are "alpha", it is the share of transparency;
+        default: any.
     grow : int
         Number of pixels by which the marked area grows on all sides, -4096 to 4096. A negative number shrinks it.
     feather : int

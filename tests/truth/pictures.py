@@ -168,7 +168,7 @@ def tile_along_columns() -> Parts:
     return parts_of(texrs.tile(channels("grit", 96, 128), wrap=(False, True), overlap=24), report=("overlap", "joints"))
 
 
-COMPLETED = ("hole", "replaced_outside", "patch", "patches")
+COMPLETED = ("filled", "replaced_outside", "patch", "patches")
 
 
 @case
@@ -182,14 +182,16 @@ def complete_with_patches() -> Parts:
 def complete_what_is_transparent() -> Parts:
     image = clear("weave", 96, 96).copy()
     image[box(image.shape[:2], (70, 96), (20, 60)), 3] = 0
-    return parts_of(texrs.complete(image, "alpha", wrap=True, mirror=False, patch=12), report=COMPLETED)
+    return parts_of(
+        texrs.complete(image, texrs.Mask("alpha", threshold=1), wrap=True, mirror=False, patch=12), report=COMPLETED
+    )
 
 
 @case
 def complete_by_optimising() -> Parts:
     hole = box((112, 112), (30, 80), (30, 80))
     result = texrs.complete(deep("bark", 112, 112), hole, method="optimise", seed=5, wrap=(True, False))
-    return parts_of(result, report=("hole", "levels"))
+    return parts_of(result, report=("filled", "levels"))
 
 
 @case
@@ -199,7 +201,7 @@ def complete_with_a_scale_map() -> Parts:
     scale = np.where(hole, np.nan, floor.scale_map)
     parts: dict[str, object] = {}
     for method, given in (("patch", scale), ("optimise", "auto")):
-        found = parts_of(texrs.complete(floor.image, hole, scale_map=given, method=method), report=("hole",))
+        found = parts_of(texrs.complete(floor.image, hole, scale_map=given, method=method), report=("filled",))
         parts |= {f"{method} {name}": part for name, part in found.items()}
     return parts
 

@@ -74,6 +74,10 @@ def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bool
     hole: Bools = ~(alpha >= full)
     if threshold is not None:
         hole &= ~(alpha > (1 - threshold) * full)
+    elif hole.all():
+        assume(
+            "image: no pixel is fully opaque, so all are filled; with a threshold of 1 only fully transparent ones are"
+        )
     if not hole.any():
         raise InvalidInput("hole: no pixel of the image is transparent, so there is nothing to fill")
     return hole
