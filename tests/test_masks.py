@@ -390,6 +390,12 @@ def test_commands_refuse_what_marks_nothing_and_warn_of_much(here: Path, capsys:
     np.testing.assert_array_equal(io.read("stroke-out.png"), io.read("same.png"))
 
 
+def test_a_file_that_is_missing_is_named_once(here: Path, capsys: Capture) -> None:
+    for command in ("complete in.png no.png", "remove in.png no.png", "complete in.png hole.png --allowed no.png"):
+        assert main([*command.split(), "-o", "out.png"]) == 2
+        assert capsys.readouterr().err.splitlines()[-1] == "texrs: no.png: there is no such file"
+
+
 def test_an_inverted_mask_is_warned_of(here: Path, capsys: Capture) -> None:
     assert main(["complete", "in.png", "inverted.png", "-o", "out.png"]) == 0
     said = capsys.readouterr().err

@@ -143,7 +143,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
 
     """
     mask = as_marks(value)
-    given = _read(mask.marks, name, len(shape))
+    given = as_ndarray(mask.marks, name, axes=len(shape))
     if given.dtype.kind not in "buif":
         raise InvalidInput(f"{name}: needs bool, integers or floats, got dtype {given.dtype}")
     sides = given.shape[: len(shape)]
@@ -156,15 +156,6 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     if given.dtype.kind == "f" and not np.isfinite(given).all():
         raise InvalidInput(f"{name}: must be finite, but some values of the mask are NaN or infinite")
     return adjust(mask, _decide(given, len(shape), mask, name_marks(mask, name)), wrap)
-
-
-def _read(marks: object, name: str, axes: int) -> Array:
-    """Return marks as an array. An error of a file names the file alone."""
-    if not isinstance(marks, str | os.PathLike):
-        return as_ndarray(marks, name, axes=axes)
-    from texrs import io
-
-    return io.read_volume(marks) if axes == 3 else io.read(marks)
 
 
 def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:

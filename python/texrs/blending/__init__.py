@@ -32,6 +32,7 @@ from texrs._arrays import (
 )
 from texrs._evening import flatten
 from texrs._light import divide_out, measure_lights
+from texrs._masks import Mask
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
@@ -56,7 +57,7 @@ def blend(
     wrap: bool | Sequence[bool],
     screening: float = SCREENING,
     band: int | None = None,
-    within: Array | None = None,
+    within: Array | Mask | str | None = None,
     known: Array | Sequence[Array] | None = None,
     across: bool = True,
     parts: Array | None = None,
@@ -90,9 +91,8 @@ def blend(
         ``screening ** -0.5`` pixels: 0.01 makes the transitions of smooth exemplars softer.
     band : int, optional
         Correct only what is at most this many pixels from a seam; all else keeps its values. By default everything.
-    within : (H, W) bool or integers, optional
-        Correct only pixels that are True, or not zero; all else keeps its values: of a picture whose hole was filled, the
-        hole.
+    within : (H, W) bool or integers, path or Mask, optional
+        Mask of the pixels that are corrected, such as the hole of an image that was filled. All others keep their values.
     known : (h, w) bool or integers, or a sequence of one an exemplar, optional
         What of the exemplars may be looked at beyond a seam. By default all.
     across : bool

@@ -10,6 +10,7 @@ import numpy as np
 
 from texrs.cli._readers import (
     match_alpha,
+    name_file,
     read_array,
     read_density,
     read_direction,
@@ -118,7 +119,7 @@ CORNERS = Kind(
 )
 EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grounds, or {FOUND}.", many=True)
 """Of each plane of a photograph."""
-THING = Kind("FILE", lambda path, about: path, WHITE, file=True)
+THING = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
 """A mask that the function reads, as its other options say."""
 HOLE = Kind(
     "FILE|alpha|nan|nodata|VALUE",

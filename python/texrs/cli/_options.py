@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_orig
 
 import typer
 
+from texrs._masks import Mask
 from texrs.cli._kinds import KINDS, Kind
 from texrs.cli._texts import About
 from texrs.errors import InvalidInput
@@ -179,7 +180,8 @@ class Options:
             if each.kind is each.VAR_KEYWORD or name == "self" or name in self.leave or (only and name not in only):
                 continue
             group: Any = next((t for t in _split_union(each.annotation) if is_dataclass(t)), self.groups.get(name))
-            if group is None or name in self._kinds:
+            # A mask alone is an option as any other; where it is the hole, how it is read are options too.
+            if group is None or name in self._kinds or (group is Mask and f"{name}.marks" not in self._arguments):
                 yield (name,), each, texts.get(name, "")
                 continue
             self.groups.setdefault(name, group)

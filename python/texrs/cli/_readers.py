@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
 from texrs.errors import FileError, InvalidInput
+from texrs.io._files import check_file
 
 
 def read_picture(text: str, *, finite: bool = True) -> Array:
@@ -99,11 +101,19 @@ def read_density(text: str, about: About) -> Any:
 
 def read_mask(path: str, axes: int = 2) -> Array:
     """Read a mask of any size, as `texrs.Mask` describes, and report how much it marks."""
+    name_file(path)
     marked = mark(path, path, ("planes", "rows", "columns")[3 - axes :])
     if not marked.any():
         raise InvalidInput(f"{path}: marks nothing; a mask is white where it marks")
     assume(f"{os.path.basename(path)}: read as a mask that marks {100 * float(marked.mean()):.3g} % of it")
     return marked
+
+
+def name_file(path: str) -> str:
+    """Return the name of a file that is read later, if there is one."""
+    if not io.is_store(path):
+        check_file(Path(path))
+    return path
 
 
 def read_hole(text: str, about: About) -> Any:
@@ -113,10 +123,10 @@ def read_hole(text: str, about: About) -> Any:
         if value is None:
             raise InvalidInput(f"{about.first}: states no nodata value; give the value, or nan")
         return value
-    try:
-        return text if os.path.exists(text) else float(text)
-    except ValueError:
-        return text
+    with suppress(ValueError):
+        if not os.path.exists(text):
+            return float(text)
+    return name_file(text)
 
 
 def read_scale_map(path: str, encoding: str = "log2") -> Floats:

@@ -52,7 +52,7 @@ def complete(
     hole: Array | Mask | str | float | None = None,
     *,
     exemplar: Array | Exemplar | Material | None = None,
-    allowed: Array | None = None,
+    allowed: Array | Mask | str | None = None,
     scale_map: Array | str | None = None,
     exemplar_scale_map: Array | str | None = None,
     kind: Kind | None = None,
@@ -78,9 +78,9 @@ def complete(
         read, inverted, grown and feathered.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
-    allowed : (H, W) array, optional
-        Not 0 where patches may be copied from: of a floor the floor, not the sky above it. By default all that is known. Not
-        for use with ``exemplar``, or "optimise".
+    allowed : (H, W) array, path or Mask, optional
+        Mask of the pixels that patches may be copied from, such as the floor without the sky above it. Default: all known
+        pixels. It cannot be combined with ``exemplar`` or with "optimise".
     scale_map : {None, "auto"} or (H, W) float array, optional
         For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is
         filled with elements of the size that belongs there [2]_. "auto" measures it: that of the plane

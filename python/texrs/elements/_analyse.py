@@ -68,8 +68,8 @@ def analyse(
         tell surely, else by all its maps if these tell more; it is shown by its colours.
     box : (row, column, height, width), optional
         Centre and size, in pixels, of the box around one element. Of a connected foreground it holds a mesh or a knot.
-    mask : (H, W) array of bool, optional
-        The foreground: of the chosen element if it lies within the box, else of the whole image, which is then not cut.
+    mask : (H, W) array of bool, path or Mask, optional
+        Mask of the foreground: of the chosen element if it lies within the box, else of the whole image, which is then not cut.
     background : (n, 2) points or (H, W) array of bool, optional
         Places (row, column) that lie between the elements, each good for 4 pixels around, or all that is known.
     layout : Layout or str, optional

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_float, as_mask, check_memory, try_array
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
+from texrs._notices import ignore
 from texrs._show import brief
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
@@ -256,6 +257,8 @@ class Conditions:
         mask = values = pins = maps = None
         if constraints is not None:
             mask = as_mask(constraints.mask, "mask", shape)
+            if not mask.any():
+                ignore("constraints: not used, because mask marks nothing")
             if constraints.coordinates is not None:
                 pins = Pins(mask, _check_coordinates(constraints.coordinates, mask, image))
                 values = gather(image, pins.coordinates, interpolation="nearest")

@@ -9,6 +9,7 @@ from itertools import islice
 import numpy as np
 
 from texrs._arrays import as_array, as_float, as_items, as_mask, as_size
+from texrs._masks import Mask
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
 from texrs.planes._plane import FOV, STEEPEST, Plane
@@ -36,9 +37,9 @@ class View:
     fov : float, optional
         Degrees that the longer side of the photograph spans, 1 to 170 (`texrs.io.read_fov`; the command reads it of the
         file). By default what the corners tell, else 60.
-    ground : (H, W) array, optional
-        Not 0 where the photograph shows the plane. By default what is found (`texrs.planes.find_ground`), or, to be made flat
-        or larger, all of a photograph of which is said how the plane lies.
+    ground : (H, W) array, path or Mask, optional
+        Mask of the pixels that show the plane. Default: the ground that is found (`texrs.planes.find_ground`). If the plane is
+        given and the photograph is made flat or larger, the default is all pixels.
 
     Raises
     ------
@@ -63,7 +64,7 @@ class View:
     slant: float | None = None
     tilt: float | None = None
     fov: float | None = None
-    ground: Array | None = field(default=None, repr=False)
+    ground: Array | Mask | str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         given = [name for name in ("plane", "corners", "slant") if getattr(self, name) is not None]
