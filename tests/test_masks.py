@@ -371,6 +371,18 @@ def test_georeference_that_is_not_written_is_reported(here: Path, capsys: Captur
     assert read_tags("new.tif") == {}
 
 
+def test_nodata_that_is_used_as_values_is_reported(here: Path, capsys: Capture) -> None:
+    words = f"heights.tif: its nodata value -9999 is not used, so {DISC.sum()} pixels count as data; texrs complete fills them"
+    with pytest.warns(InputWarning, match=words):
+        made = texrs.tile("heights.tif")
+    assert made.report["ignored"] == [words]
+    assert main(["tile", "heights.tif", "-o", "out.tif"]) == 0
+    assert words in capsys.readouterr().err
+    assert main(["tile", "heights.tif", "-o", "out.tif", "--strict", "--force"]) == 2
+    tifffile.imwrite("whole.tif", HEIGHTS, extratags=[(*tag, True) for tag in GEO])
+    assert "ignored" not in texrs.tile("whole.tif").report
+
+
 # --- commands --------------------------------------------------------------------------------------------------------
 
 

@@ -7,18 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from texrs._typing import Array
+from texrs._notices import ignore
+from texrs._typing import Array, Bools
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 
 COLOURED = {"P": "RGB", "PA": "RGBA", "RGBX": "RGB", "RGBa": "RGBA", "La": "LA", "YCbCr": "RGB", "HSV": "RGB"}
 """Modes of PIL pictures whose numbers are no colours yet, and what they are converted to."""
 WITH_ALPHA = {"L": "LA", "RGB": "RGBA"}
 """What a mode is converted to where one of its colours stands for transparency."""
+NEAR = 1e-6
+"""Relative difference up to which a float equals the nodata value of a file, which is rounded text."""
 KEPT = ("1", "L", "LA", "I", "F", "RGB", "RGBA")
 """Modes whose numbers are taken as they are, as are those of I;16."""
 
 
-def as_ndarray(value: object, name: str, *, axes: int = 2) -> Array:
+def as_ndarray(value: object, name: str, *, axes: int = 2, used: bool = True) -> Array:
     """Return whatever somebody keeps a picture in as an array: the one place that knows what that may be.
 
     Parameters
@@ -31,6 +34,8 @@ def as_ndarray(value: object, name: str, *, axes: int = 2) -> Array:
         The argument's name, for messages.
     axes : int
         Of a file's array without the channels: 3 reads a volume.
+    used : bool
+        If True, pixels that have the nodata value of their file are reported, because they are used as values.
 
     Returns
     -------
@@ -58,7 +63,10 @@ def as_ndarray(value: object, name: str, *, axes: int = 2) -> Array:
     if type(value) is np.ndarray:
         return value
     if isinstance(value, str | os.PathLike):
-        return _read(value, name, axes)
+        array = _read(value, name, axes)
+        if used:
+            report_nodata(value, array)
+        return array
     if isinstance(value, np.ma.MaskedArray):
         return _take_whole(value, name)
     try:
@@ -96,6 +104,41 @@ def _take_whole(value: Any, name: str) -> Array:
             "or value.filled(...) says what stands there"
         )
     return np.asarray(value.data)
+
+
+def find_value(pixels: Array, value: float, axes: int) -> Bools:
+    """Return which pixels have a value in all channels; floats are compared as the rounded text of a file states them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> find_value(np.float32([[-9999, 1]]), -9999, 2)
+    array([[ True, False]])
+
+    """
+    if not np.isfinite(value):
+        same = ~np.isfinite(pixels)
+    elif pixels.dtype.kind == "f":
+        with np.errstate(all="ignore"):
+            same = np.isclose(pixels, value, NEAR, 0)
+    else:
+        same = np.asarray(pixels == value)
+    return np.asarray(same.all(axis=-1) if pixels.ndim > axes else same, np.bool_)
+
+
+def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
+    """Report pixels that have the nodata value of their file, if they are used as values."""
+    from texrs.io import read_notes
+
+    if os.path.splitext(path)[1].lower() not in (".tif", ".tiff"):
+        return
+    value = read_notes(path).nodata
+    count = 0 if value is None or not np.isfinite(value) else int(np.count_nonzero(find_value(pixels, value, 2)))
+    if count:
+        name = os.path.basename(path)
+        ignore(
+            f"{name}: its nodata value {value:g} is not used, so {count} pixels count as data; texrs complete fills them"
+        )
 
 
 def is_pillow(value: object) -> bool:

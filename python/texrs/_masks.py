@@ -15,7 +15,16 @@ from texrs._notices import assume
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["Mask", "adjust", "as_marks", "check_share", "fade", "mark", "name_marks", "widen"]
+__all__ = [
+    "Mask",
+    "adjust",
+    "as_marks",
+    "check_share",
+    "fade",
+    "mark",
+    "name_marks",
+    "widen",
+]
 
 HALF = 0.5
 """Share of white from which a pixel is marked. JPEG at quality 20 moves black and white by up to 0.46 of their distance."""
@@ -143,7 +152,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
 
     """
     mask = as_marks(value)
-    given = as_ndarray(mask.marks, name, axes=len(shape))
+    given = as_ndarray(mask.marks, name, axes=len(shape), used=False)
     if given.dtype.kind not in "buif":
         raise InvalidInput(f"{name}: needs bool, integers or floats, got dtype {given.dtype}")
     sides = given.shape[: len(shape)]

@@ -13,6 +13,7 @@ import numpy as np
 from texrs import io, samples
 from texrs._arrays import as_image
 from texrs._notices import assume, ignore
+from texrs._conversion import report_nodata
 from texrs._masks import mark
 from texrs._notices import assume
 from texrs._typing import Array, Floats
@@ -27,6 +28,7 @@ def read_picture(text: str, *, finite: bool = True) -> Array:
     image: Array = samples.load(text.removeprefix(SAMPLE)).image if text.startswith(SAMPLE) else io.read(text)
     if finite:
         as_image(image, text)
+        report_nodata(text, image)
     return image
 
 

@@ -10,14 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from texrs._arrays import as_image, as_ndarray
+from texrs._conversion import find_value
 from texrs._engine.pyramid import Region
 from texrs._masks import Mask, adjust, check_share, mark, name_marks
 from texrs._notices import assume
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
-
-NEAR = 1e-6
-"""Relative difference up to which a float equals the nodata value, which files state as rounded text."""
 
 
 def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) -> tuple[Array, Bools]:
@@ -58,7 +56,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
 def take_masked(image: object, axes: int = 2) -> tuple[Array, Bools | None]:
     """Return an image, and where any of its channels is masked; None if nothing is."""
     if not isinstance(image, np.ma.MaskedArray) or not np.ma.is_masked(image):
-        return as_ndarray(image, "image", axes=axes), None
+        return as_ndarray(image, "image", axes=axes, used=False), None
     masked = np.ma.getmaskarray(image)
     return np.asarray(image.data), np.asarray(masked.any(axis=-1) if image.ndim > axes else masked)
 
@@ -85,9 +83,8 @@ def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bool
 
 def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | None, axes: int) -> Bools:
     """Return which pixels have no value: those that are NaN or infinite in any channel, or nodata in all channels."""
-    coloured = pixels.ndim > axes
     bad = ~np.isfinite(pixels) if pixels.dtype.kind == "f" else np.zeros(pixels.shape, np.bool_)
-    missing = np.asarray(bad.any(axis=-1) if coloured else bad, np.bool_)
+    missing = np.asarray(bad.any(axis=-1) if pixels.ndim > axes else bad, np.bool_)
     if marks is None:
         if masked is None and not missing.any():
             raise InvalidInput(
@@ -98,9 +95,7 @@ def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | N
         return missing if masked is None else missing | masked
     value = _read_nodata(image) if marks == "nodata" else math.nan if marks == "nan" else _as_number(marks)
     if math.isfinite(value):
-        with np.errstate(all="ignore"):
-            close = np.isclose(pixels, value, NEAR, 0) if pixels.dtype.kind == "f" else pixels == value
-        missing |= close.all(axis=-1) if coloured else close
+        missing |= find_value(pixels, value, axes)
     if not missing.any():
         what = f"is {value:g}" if math.isfinite(value) else "is NaN or infinite"
         raise InvalidInput(f"hole: no pixel of the image {what}, so there is nothing to fill")
