@@ -12,10 +12,9 @@ import numpy as np
 
 from texrs import io, samples
 from texrs._arrays import as_image
-from texrs._notices import assume, ignore
 from texrs._conversion import report_nodata
 from texrs._masks import mark
-from texrs._notices import assume
+from texrs._notices import assume, ignore
 from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
