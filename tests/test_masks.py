@@ -276,6 +276,13 @@ def test_one_mask_fills_all_maps_of_a_material() -> None:
         )
 
 
+@pytest.mark.parametrize("hole", ["alpha", "nan", "nodata", 0, None, Mask("alpha")])
+def test_a_hole_of_a_material_is_a_mask(hole: object) -> None:
+    rock = texrs.Material({"color": BRICKS, "height": HEIGHTS})
+    with pytest.raises(InvalidInput, match="hole: must be a mask, because the image is a material"):
+        texrs.complete(rock, hole)  # type: ignore[arg-type]
+
+
 # --- pixels without data ---------------------------------------------------------------------------------------------
 
 

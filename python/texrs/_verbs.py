@@ -28,7 +28,10 @@ T = TypeVar("T")
 
 
 def takes_materials(
-    *names: str, beside: tuple[str, ...] = (), analysed: bool = False
+    *names: str,
+    beside: tuple[str, ...] = (),
+    analysed: bool = False,
+    check: Callable[[dict[str, Any]], None] = lambda given: None,
 ) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Let a verb take materials for its examples: it decides on what they tell, and all their maps come of it.
 
@@ -40,6 +43,8 @@ def takes_materials(
         Parameters of which only what they look like counts.
     analysed : bool
         Whether the verb needs the elements of what it is given, which of a material its colours may tell best.
+    check : callable
+        Called with the arguments of a call with materials. It refuses arguments that only an image can have.
 
     Returns
     -------
@@ -87,6 +92,7 @@ def takes_materials(
             if not any(isinstance(m, Material) for m in several):
                 return verb(*given.args, **given.kwargs)
             materials = _check(several, used)
+            check(given.arguments)
             lit = given.arguments.get("flatten")
             guides = iter(guide_materials([m.flatten() for m in materials] if lit is True else materials))
             for name in used:

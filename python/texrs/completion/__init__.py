@@ -32,7 +32,7 @@ from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.completion._depth import see_plane
 from texrs.completion._fill import Filling, fill
-from texrs.completion._holes import find_hole
+from texrs.completion._holes import check_material, find_hole
 from texrs.completion._optimise import optimise, recover_scale
 from texrs.completion._patches import LEAST, choose_mirrors
 from texrs.errors import InvalidInput
@@ -46,7 +46,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["complete"]
 
 
-@takes_materials("image", "exemplar")
+@takes_materials("image", "exemplar", check=check_material)
 def complete(
     image: Array | Exemplar | Material,
     hole: Array | Mask | str | float | None = None,

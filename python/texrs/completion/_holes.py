@@ -6,13 +6,14 @@ import math
 import numbers
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from texrs._arrays import as_image, as_ndarray
 from texrs._conversion import find_value
 from texrs._engine.pyramid import Region
-from texrs._masks import Mask, adjust, check_share, mark, name_marks
+from texrs._masks import Mask, adjust, as_marks, check_share, mark, name_marks
 from texrs._notices import assume
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
@@ -37,9 +38,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
     if pixels.ndim not in (axes, axes + 1) or pixels.dtype.kind not in "buif" or not pixels.size:
         as_image(pixels, "image", axes=axes)
     marks, shape = mask.marks, pixels.shape[:axes]
-    word = marks if isinstance(marks, str) else ""
-    number = isinstance(marks, numbers.Real) and not isinstance(marks, bool)
-    worded, alpha = marks is None or number or word in ("nan", "nodata"), word == "alpha"
+    alpha, worded = _is_alpha(marks), _is_value(marks)
     if worded and mask.threshold is not None:
         raise InvalidInput("threshold: must be given with a mask that is an image, or with 'alpha'")
     if alpha:
@@ -51,6 +50,24 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
     hole = hole if masked is None else hole | masked
     check_share(hole, "hole", name_marks(mask, "hole"), "fill", invertible=not (worded or alpha))
     return pixels, hole
+
+
+def check_material(given: dict[str, Any]) -> None:
+    """Refuse a hole that is found in the values of one image, where there are several maps."""
+    marks = as_marks(given.get("hole")).marks
+    if _is_alpha(marks) or _is_value(marks):
+        raise InvalidInput("hole: must be a mask, because the image is a material, whose maps have it in common")
+
+
+def _is_alpha(marks: object) -> bool:
+    return isinstance(marks, str) and marks == "alpha"
+
+
+def _is_value(marks: object) -> bool:
+    """Return whether marks are values of the image: "nan", "nodata", a number, or None for pixels without a value."""
+    if isinstance(marks, str):
+        return marks in ("nan", "nodata")
+    return marks is None or (isinstance(marks, numbers.Real) and not isinstance(marks, bool))
 
 
 def take_masked(image: object, axes: int = 2) -> tuple[Array, Bools | None]:
