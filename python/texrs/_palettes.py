@@ -68,7 +68,7 @@ def ask(kept: bool | None) -> Iterator[None]:
 def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) -> Palette | None:
     """Return the examples among the arguments of a verb, if its result has only their colours.
 
-    A path among the arguments is replaced by the image in it. Arguments that ask for other colours turn this off.
+    Arguments that ask for other colours turn this off.
     """
     asked, blend, how = _ASKED.get(), given.get("blend"), given.get("interpolation")
     # Values of other types are refused by the verb.
@@ -81,7 +81,8 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
         value = given.get(name)
         if isinstance(value, str | os.PathLike):
             with suppress(TexrsError):
-                value = given[name] = as_ndarray(value, name)
+                # The verb reads the file again, because only it knows whether nodata values are a hole.
+                value = as_ndarray(value, name, used=False)
         images += [(name, image) for image in _list_images(value)]
     if not images or not all(image.ndim in (2, 3) and image.shape[2:] < (5,) for _, image in images):
         return None
