@@ -35,13 +35,13 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "synthesize": ("synthesize in.png -o out.zarr --size 128 --chunks 64", ""),
     "synthesize, to a file": ("synthesize in.png -o out.tif --size 128 --chunks 64", "out.tif"),
     "tiles": ("tiles in.png -o tiles --side 32 --pictures 1 --plan still", ""),
-    "database": ("database base add in.png --box 41,78,21,23 --layout disjoint", ""),
+    "database": ("database base add in.png --box 78,41,23,21 --layout disjoint", ""),
     "batch": ("batch recipe.toml", ""),
 }
 """What is run, and which of its outputs are files that are whole or not there."""
 RECIPE = 'verb = "tile"\ninputs = ["in.png", "other.png"]\nout = "made"\n'
 RACES = {
-    "one name in a database": "database base add in.png --box 41,78,21,23 --layout disjoint --replace",
+    "one name in a database": "database base add in.png --box 78,41,23,21 --layout disjoint --replace",
     "one store": "synthesize in.png -o out.zarr --size 128 --chunks 64",
     "one file": "tile in.png -o out.png --force",
 }

@@ -67,8 +67,9 @@ def test_places_may_follow_each_other(here: Path) -> None:
     from test_elements import annotate
 
     box, ground = annotate(DOTS)
-    places = [f"{r},{c}" for r, c in ground[:4]]
-    start = ["analyse", "in.png", "-q", "--box", ",".join(map(str, box)), "--layout", "F=d"]
+    places = [f"{c},{r}" for r, c in ground[:4]]
+    row, column, height, width = box
+    start = ["analyse", "in.png", "-q", "--box", f"{column},{row},{width},{height}", "--layout", "F=d"]
     assert main([*start, "-o", "a.npz", "--background", *places]) == 0
     assert main([*start, "-o", "b.npz", *(x for p in places for x in ("--background", p))]) == 0
     assert main([*start, "-o", "c.npz", "--background", " ".join(places)]) == 0
@@ -128,11 +129,14 @@ def test_database(here: Path, capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("analyse in.png -o before.npz --box 10,20", "--box: needs ROW,COL,HEIGHT,WIDTH"),
-        ("analyse in.png -o before.npz --box 500,20,20,20", "--box: reaches from 490 to 510 along the rows"),
-        ("analyse in.png -o before.npz --background 10", "--background: needs ROW,COL"),
-        ("analyse in.png -o before.npz --background 10,nan", "--background: needs ROW,COL"),
-        ("analyse in.png -o before.npz --background 10,900", "--background: point 0, .* outside"),
+        ("analyse in.png -o before.npz --box 10,20", "--box: needs X,Y,WIDTH,HEIGHT"),
+        ("analyse in.png -o before.npz --box 20,500,20,20", "--box: reaches from 490 to 510 along the rows"),
+        ("analyse in.png -o before.npz --background 10", "--background: needs X,Y"),
+        ("analyse in.png -o before.npz --background 10,nan", "--background: needs X,Y"),
+        (
+            "analyse in.png -o before.npz --background 900,10",
+            r"--background: point 0, \(x, y\) = \[900.0, 10.0\], lies outside",
+        ),
         ("analyse in.png -o before.npz --layout F=e", "--layout: allowed are default, disjoint, connected and jointed"),
         (
             "analyse in.png -o before.npz --layout F=c --mask mask.png --box 48,48,20,20",
@@ -140,7 +144,7 @@ def test_database(here: Path, capsys: Capture) -> None:
         ),
         ("analyse in.png -o before.npz --points nan.csv", "--points: must be finite, but point 1"),
         ("analyse in.png -o before.npz --points twice.csv", "--points: point 2, .* is there twice"),
-        ("analyse in.png -o before.npz --points words.csv", "words.csv: line 2 needs row,column, got 'here,there'"),
+        ("analyse in.png -o before.npz --points words.csv", "words.csv: line 2 needs x,y, got 'here,there'"),
         ("analyse in.png -o before.npz --points empty.csv", "empty.csv: holds no points"),
         ("analyse in.png -o before.npz --points none.csv", "none.csv: cannot be read"),
         ("analyse in.png -o before.npz --scales large", "--scales: needs numbers"),

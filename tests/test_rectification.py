@@ -180,7 +180,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert json.loads((tmp_path / "s" / "report.json").read_text())["plane"]["fov"] == 55
     assert main(["apply", source, photo, "-o", str(tmp_path / "again.png")]) == 0
     corners = PLANE.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])
-    words = " ".join(f"{r:.4f},{c:.4f}" for r, c in corners)
+    words = " ".join(f"{c:.4f},{r:.4f}" for r, c in corners)
     assert main(["rectify", photo, "-o", out, "--corners", words, "--wrap", "xy", "--size", "96"]) == 0
     assert io.read(out).shape == (96, 96, 3)
     assert main(["rectify", photo, "-o", out, "--corners", "1,2 3,4"]) == 2

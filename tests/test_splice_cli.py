@@ -87,7 +87,7 @@ def test_the_help_names_every_step(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_entries_are_taken(tmp_path: Path) -> None:
     entry, out = tmp_path / "dots.npz", tmp_path / "out.png"
-    box = ["--box", "60,62,25,25", "--layout", "F=d"]
+    box = ["--box", "62,60,25,25", "--layout", "F=d"]
     assert main(["analyse", "dots.png", "-o", str(entry), *box, "-q"]) == 0
     assert main(["splice", str(entry), "pebbles.png", "-o", str(out), "--size", "64", "-q"]) == 0
     assert io.read(out).shape == (64, 64, 3)

@@ -21,10 +21,11 @@ from texrs.cli._console import complain, keep, note, say, show_progress
 from texrs.cli._kinds import EXAMPLE, Kind
 from texrs.cli._options import Option, Options, check_needed, take_options
 from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, name_arguments, to_write
+from texrs.cli._places import PLACE, show_box
 from texrs.cli._provenance import RUNNING, check_free
 from texrs.cli._readers import read_picture
 from texrs.cli._stacks import Roles, read_roles
-from texrs.cli._texts import PLACE, About
+from texrs.cli._texts import About
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.elements import page as draw_page
@@ -54,7 +55,7 @@ ACTIONS: dict[str, tuple[Option, ...]] = {
 def analyse_command(
     out: Annotated[str, to_write("out", "ENTRY.npz", "Entry to write.")],
     given: dict[str, Any],
-    more: Annotated[list[str] | None, make_argument("ROW,COL", "More places of --background.")] = None,
+    more: Annotated[list[str] | None, make_argument("X,Y", "More places of --background.")] = None,
     stages: Annotated[str | None, to_write("stages", text="Folder for pictures of the points and the mask.")] = None,
     page: Annotated[str | None, to_write("page")] = None,
     role: Roles = None,
@@ -132,7 +133,7 @@ def database_command(
     match action:
         case "list":
             for record in textures.list():
-                box = ",".join(map(str, record.box))
+                box = show_box(record.box)
                 say(f"{record.name}\t{record.layout}\t{record.elements} elements\tbox {box}\t{record.image}")
         case "remove":
             if not names:
@@ -248,7 +249,7 @@ def explain(entry: Any, *, quiet: bool) -> None:
     """Print what was proposed, how sure that is, and what is doubtful."""
     sure = entry.report.get("confidence", {})
     for name in entry.report["proposed"]:
-        value = {"box": ",".join(map(str, entry.report["box"])), "layout": entry.layout}.get(name, "as drawn")
+        value = {"box": show_box(entry.report["box"]), "layout": entry.layout}.get(name, "as drawn")
         note(f"proposed {name}: {value} ({sure.get(name, 0):.0%} sure)", quiet=quiet)
     note(f"elements: {entry.arrangement.describe(entry.layout)}", quiet=quiet)
     for doubt in entry.report["doubts"]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from texrs.cli._places import parse_box, parse_corners, parse_places, read_points
 from texrs.cli._readers import (
     match_alpha,
     name_file,
@@ -23,7 +24,6 @@ from texrs.cli._readers import (
     read_mask,
     read_numbers,
     read_picture,
-    read_points,
     read_scale_map,
     read_target,
     read_values,
@@ -34,11 +34,9 @@ from texrs.cli._texts import (
     PLANE,
     About,
     parse_axes,
-    parse_box,
     parse_bytes,
     parse_each,
     parse_numbers,
-    parse_places,
     parse_range,
     parse_size,
     parse_sizes,
@@ -112,8 +110,8 @@ GROUNDS = replace(
     many=True,
 )
 CORNERS = Kind(
-    "ROW,COL ...",
-    lambda texts, about: [None if text == FOUND else parse_places([text], about) for text in texts],
+    "X,Y ...",
+    lambda texts, about: [None if text == FOUND else parse_corners(text, about) for text in texts],
     f"Four, with spaces between them; of several planes in the order of their grounds, or {FOUND}.",
     many=True,
 )
@@ -184,7 +182,7 @@ KINDS = {
     "field": Kind(
         "WORDS|FILE",
         lambda text, about: read_field(text, about.size),
-        "As in circular:axis=z or zigzag:period=64,angle=30, or frames or directions in a file.",
+        "As in circular:axis=z,centre=16x24x0 (x first) or zigzag:period=64, or a file of frames or directions.",
         file=True,
     ),
     "scale_map": MAP,
@@ -193,15 +191,15 @@ KINDS = {
     "within": MASK,
     "ground": MASK,
     "allowed": MASK,
-    "corners": Kind(
-        "ROW,COL ...", lambda text, about: parse_places([text], about), "Four, with spaces between them.", plain=True
-    ),
+    "corners": Kind("X,Y ...", parse_corners, "Four, with spaces between them.", plain=True),
     "labels": Kind("FILE", read_labels, "Or an entry that texrs analyse wrote (.npz).", file=True),
     "values": Kind("FILE", read_values, file=True),
     "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),
-    "background": Kind("ROW,COL", parse_places, "The option may be repeated.", many=True),
-    "box": Kind("ROW,COL,HEIGHT,WIDTH", parse_box),
-    "points": Kind("POINTS.csv", read_points, "A file of row,column a line.", file=True),
+    "background": Kind("X,Y", parse_places, "The option may be repeated.", many=True),
+    "box": Kind("X,Y,WIDTH,HEIGHT", parse_box, "X,Y is the middle of the box."),
+    "points": Kind(
+        "POINTS.csv", read_points, "A file of x,y a line; a first line may say x,y or row,column.", file=True
+    ),
     "corrections": Kind("JSON|FILE.json", read_corrections, "As the page of texrs analyse --page lists them."),
     "edit": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
     "steps": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),

@@ -20,6 +20,7 @@ from texrs import io
 from texrs._arrays import as_list
 from texrs._typing import Array
 from texrs.cli import _provenance
+from texrs.cli._places import PLACED, say_places
 from texrs.cli._provenance import RUNNING, check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
@@ -343,7 +344,8 @@ def name_arguments(**names: str) -> Iterator[None]:
         if not colon or not all(each.isidentifier() for each in several):
             raise
         called = dict.fromkeys(names.get(each, "--" + each.replace("_", "-")) for each in several)
-        raise type(error)(f"{', '.join(called)}:{rest}") from None
+        said = say_places(rest) if set(several) & set(PLACED) else rest
+        raise type(error)(f"{', '.join(called)}:{said}") from None
 
 
 def read_kept_spacing(source: Any, out: str, axes: int) -> Sequence[float] | None:

@@ -21,6 +21,7 @@ from typing import Any
 
 from texrs import io
 from texrs._version import __version__
+from texrs.cli._places import has_rows_first
 from texrs.errors import InvalidInput
 from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
 from texrs.materials import guess_role
@@ -70,6 +71,8 @@ class Record:
     """What is read may lie in it: a database."""
     stacks: tuple[str, ...] = ()
     """Folders of maps, of which all files are read."""
+    placed: bool = False
+    """Whether places are among what was given; the record then states their order."""
     force: bool = False
     """Whether any file may be replaced."""
     original: Mapping[str, str] = field(default_factory=dict)
@@ -119,6 +122,8 @@ class Record:
         said["output"] = f"--{output}"
         if inside:
             said["file"] = os.path.basename(target)
+        if self.placed and not has_rows_first():
+            said["places"] = "x,y"
         if suffix:
             # What stands in a report or a map may depend on the format of the result.
             said["suffix"] = suffix
@@ -159,11 +164,14 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     arguments: list[str | None] = []
     options: dict[str, Any] = {}
     names: list[str] = []
+    # What a batch is given may be places of any command.
+    placed = command.name == "batch"
     for p in command.params:
         value = given.get(p.name)
         if p.name in LEFT or value in (None, [], ()):
             continue
         texts = [str(v) for v in value] if isinstance(value, list | tuple) else [str(value)]
+        placed = placed or (value != p.default and re.search("X,Y|csv", p.metavar or "") is not None)
         if p.param_type_name == "argument":
             arguments += texts
             names += texts
@@ -188,7 +196,9 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     folder = arguments[0] if command.name == "database" else given.get("folder")
     seed = given.get("seed")
     places = {name: os.path.realpath(name) for name in (*files, *stacks, *([folder] if folder is not None else []))}
-    return Record(command.name, arguments, options, seed, files, places, folder, stacks, force, ORIGINAL.get() or {})
+    return Record(
+        command.name, arguments, options, seed, files, places, folder, stacks, placed, force, ORIGINAL.get() or {}
+    )
 
 
 def is_map(path: str, said: Sequence[str]) -> bool:

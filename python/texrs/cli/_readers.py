@@ -17,6 +17,7 @@ from texrs._masks import mark
 from texrs._notices import assume, ignore
 from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
+from texrs.cli._places import turn_centre
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import check_file
@@ -174,7 +175,7 @@ def read_field(text: str, size: tuple[int, ...]) -> Any:
     from texrs import fields
 
     with name_arguments(field="--field"):
-        return fields.as_field(text, len(size), size)
+        return fields.as_field(turn_centre(text), len(size), size)
 
 
 def read_direction(text: str, about: About) -> Any:
@@ -211,29 +212,3 @@ def read_labels(path: str, about: About) -> Array:
     from texrs import elements
 
     return elements.load(path).labels if path.lower().endswith(".npz") else io.read(path)
-
-
-def read_points(path: str, about: About) -> list[list[float]]:
-    """Read a list of points, row,column a line; a first line of words and empty lines are passed over."""
-    try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "is no text"
-        raise FileError(f"{path}: cannot be read ({reason})") from None
-    found: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        parts = [p.strip() for p in re.split(r"[,;\t]", line.strip())]
-        if parts == [""]:
-            continue
-        try:
-            values = [float(p) for p in parts]
-        except ValueError:
-            if number == 1:
-                continue
-            values = []
-        if len(values) != 2:
-            raise InvalidInput(f"{path}: line {number} needs row,column, got {line.strip()[:60]!r}")
-        found.append(values)
-    if not found:
-        raise InvalidInput(f"{path}: holds no points")
-    return found

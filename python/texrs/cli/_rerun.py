@@ -9,6 +9,7 @@ import shutil
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,6 +20,7 @@ from texrs import io
 from texrs._version import __version__
 from texrs.cli._console import hush, note, say
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, show_sides, to_write
+from texrs.cli._places import put_rows_first
 from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING
 from texrs.cli._stacks import is_stack
 from texrs.errors import FileError, InvalidInput
@@ -29,6 +31,8 @@ from texrs.io._temporary import name_prefix
 from texrs.materials import Map, Material
 from texrs.source_map import SourceMap
 
+PLACED_FLAGS = {"--at", "--background", "--box", "--corners", "--oblique", "--points"}
+"""Options that took row,column before records stated an order."""
 SHORT = 16
 """Digits of a SHA-256 that are shown."""
 
@@ -50,6 +54,8 @@ class Recipe:
     file: str | None
     """Its name in the folder that is written, where it is a folder."""
     suffix: str
+    rows_first: bool
+    """Whether places in it are row,column: it does not say x,y."""
 
     @classmethod
     def read(cls, path: str) -> Recipe | None:
@@ -70,6 +76,7 @@ class Recipe:
                 str(said["output"]),
                 said.get("file"),
                 str(said.get("suffix", "")),
+                said.get("places") != "x,y",
             )
         except (KeyError, TypeError, AttributeError, ValueError):
             raise FileError(f"{path}: what it says of how it was made is damaged") from None
@@ -153,7 +160,7 @@ def rerun_command(
     folder = tempfile.mkdtemp(prefix=name_prefix(), dir=beside)
     token = ORIGINAL.set({place: name for name, place in names.items()})
     try:
-        with hush():
+        with hush(), put_rows_first() if recipe.rows_first else nullcontext():
             words = recipe.make_command(names, folder) + ([] if count is None else ["--threads", str(count)])
             command.main(words[1:] + ["--quiet"] * quiet, prog_name=recipe.verb, standalone_mode=False, parent=context)
         made = os.path.join(folder, recipe.file or os.path.basename(output))
@@ -240,6 +247,8 @@ def info_command(
     if recipe is None:
         return
     say(f"made by texrs {recipe.version}: {recipe.show()}")
+    if recipe.rows_first and PLACED_FLAGS & recipe.options.keys():
+        say("its places are row,column, as they were before files stated the order; texrs rerun reads them so")
     for name, sha in recipe.inputs.items():
         say(f"from {name}, SHA-256 {sha}")
     if not is_unchanged(file, recipe.text):

@@ -18,6 +18,7 @@ from texrs.cli._console import note, show_progress
 from texrs.cli._kinds import Kind
 from texrs.cli._options import Options, check_needed, take_options
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
+from texrs.cli._places import turn
 from texrs.cli._readers import read_volume
 from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
@@ -26,32 +27,32 @@ from texrs.volume._values import as_direction
 from texrs.volume.pictures import as_steps, check_cube, check_turntable
 from texrs.volume.transparent import check_transfer, parse_transfer
 
-_AXES = ("plane", "row", "column")
+_AXES = {"plane": 0, "row": 1, "column": 2, "z": 0, "y": 1, "x": 2}
+"""Names of axes: those of arrays, and those of places."""
 
 
-def parse_at(text: str, about: About) -> tuple[int, int] | list[int]:
-    """Return of ``plane=30`` an axis and a place, of ``30,20,10`` a place on each."""
+def parse_at(text: str, about: About) -> tuple[int, int] | list[float]:
+    """Return an axis and a place of ``z=30``, or (plane, row, column) of ``10,20,30``."""
     axis, equals, number = (p.strip() for p in text.partition("="))
     try:
         if equals and axis in _AXES:
-            return _AXES.index(axis), int(number)
+            return _AXES[axis], int(number)
         if not equals and text.count(",") == 2:
-            return [int(p) for p in text.split(",")]
+            return turn([int(p) for p in text.split(",")])
     except ValueError:
         pass
-    raise InvalidInput(
-        f"{about.option}: needs plane=, row= or column= and a number, or three such as 30,20,10; got {text!r}"
-    )
+    raise InvalidInput(f"{about.option}: needs x=, y= or z= and a number, or three such as 10,20,30; got {text!r}")
 
 
 def parse_oblique(text: str, about: About) -> tuple[list[float] | None, list[float]]:
-    """Return of ``30,20,10/1,1,0`` a point and a direction."""
+    """Return a point and a direction (plane, row, column) of ``10,20,30/0,1,1``."""
     point, slash, normal = text.partition("/")
-    wanted = "POINT/NORMAL such as 30,20,10/1,1,0, or /1,1,0"
+    wanted = "X,Y,Z/X,Y,Z, a point and a normal such as 10,20,30/0,1,1, or /0,1,1"
     if not slash:
         raise InvalidInput(f"{about.option}: needs {wanted}; got {text!r}")
     sides = [
-        parse_numbers(p, about.option, wanted, counts=(3,), between=",") if p.strip() else None for p in (point, normal)
+        turn(parse_numbers(p, about.option, wanted, counts=(3,), between=",")) if p.strip() else None
+        for p in (point, normal)
     ]
     if sides[1] is None:
         raise InvalidInput(f"{about.option}: needs {wanted}; got {text!r}")
@@ -62,14 +63,14 @@ ACROSS = Options(
     slices,
     only=("at",),
     kinds={
-        "at": Kind("AXIS=N|N,N,N", parse_at, "As in 30,20,10; or one slice: plane=30, row=-1 (the last), column=7.")
+        "at": Kind("AXIS=N|X,Y,Z", parse_at, "As in 10,20,30; or one slice: z=30 (a plane), y=-1 (the last row), x=7.")
     },
 )
 CUT = Options(
     oblique,
     only=("normal", "interpolation"),
     names={"normal": "oblique"},
-    kinds={"normal": Kind("POINT/NORMAL", parse_oblique, "As in 30,20,10/1,1,0; /1,1,0 is through the middle.")},
+    kinds={"normal": Kind("X,Y,Z/X,Y,Z", parse_oblique, "A point and a normal; /0,1,1 is through the middle.")},
 )
 BLOCK = Options(cube, only=("size", "azimuth", "elevation", "interpolation"))
 CLEAR = Options(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,8 +17,6 @@ FOUND = "found"
 """Stands for what is not said of a plane."""
 PLANE = "plane:"
 """Before the words that say how a plane lies."""
-PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
-"""A row and a column, as text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +105,6 @@ def parse_bytes(text: str, option: str = "--memory-limit") -> int:
     return int(found[1]) << 10 * " kmgt".index(found[2] or " ")
 
 
-def parse_box(text: str, about: About) -> list[float]:
-    """Return the middle and the sides of a box."""
-    return _parse_finite(text, 4, about.option, "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50")
-
-
 def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
     """Return a number for each plane, or None for one that is to be found."""
     found: list[float | None] = []
@@ -122,19 +114,6 @@ def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
             None if word == FOUND else parse_numbers(word, about.option, f"a number, or {FOUND}", counts=(1,))[0]
         )
     return found
-
-
-def parse_places(texts: Sequence[str], about: About) -> list[list[float]]:
-    """Return the points of one text or of several."""
-    parts = [p for text in texts for p in re.split(r"[\s;]+", text.strip()) if p]
-    return [_parse_finite(p, 2, about.option, "ROW,COL, as in 125,60") for p in parts]
-
-
-def _parse_finite(text: str, count: int, option: str, wanted: str) -> list[float]:
-    numbers = parse_numbers(text, option, wanted, counts=(count,), between=",")
-    if not all(math.isfinite(n) for n in numbers):
-        raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
-    return numbers
 
 
 def read_steps(text: str, about: About) -> Any:

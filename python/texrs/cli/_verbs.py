@@ -34,6 +34,7 @@ from texrs.cli._kinds import (
     Kind,
 )
 from texrs.cli._options import Options
+from texrs.cli._places import check_corners
 from texrs.cli._texts import PLANE
 from texrs.cli._verb import Verb
 from texrs.errors import InvalidInput
@@ -224,8 +225,16 @@ def make_views(
 def _see(verb: Callable[..., Synthesis], names: Mapping[str, str] | None = None, **more: Kind) -> Verb:
     left = {"view.plane": "the command says how it lies by corners or angles"}
     kinds = {"ground": GROUNDS, "corners": CORNERS, "slant": EACH, "tilt": EACH, "fov": EACH}
+
+    @wraps(verb)
+    def check_and_see(image: Any, *args: Any, view: Any = None, **given: Any) -> Synthesis:
+        for each in view if isinstance(view, list) else [view]:
+            if each is not None and each.corners is not None:
+                check_corners(each.corners, image.shape)
+        return verb(image, *args, view=view, **given)
+
     options = Options(
-        verb,
+        check_and_see,
         arguments={"image": EXAMPLE, **more},
         kinds={f"view.{name}": kind for name, kind in kinds.items()},
         names=names,

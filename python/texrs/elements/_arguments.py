@@ -134,8 +134,11 @@ def as_points(value: object, shape: Shape, name: str) -> Points:
     outside = ((points < -0.5) | (points > np.array(shape) - 0.5)).any(axis=1)
     if outside.any():
         row = int(np.flatnonzero(outside)[0])
+        turned = points[:, ::-1]
+        fits = ((turned >= -0.5) & (turned <= np.array(shape) - 0.5)).all()
+        hint = "; if the two numbers of each point are exchanged, all are inside" if fits else ""
         raise InvalidInput(
-            f"{name}: point {row}, (row, column) = {points[row].tolist()}, lies outside of the image of {shape}"
+            f"{name}: point {row}, (row, column) = {points[row].tolist()}, lies outside of the image of {shape}{hint}"
         )
     different, first = np.unique(points, axis=0, return_index=True)
     if len(different) < len(points):
