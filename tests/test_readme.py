@@ -52,6 +52,12 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, mask in (("hole", hole), ("thing", hole), ("ground", ground)):
         io.write(folder / f"{name}.png", mask)
     pebbles = samples.pebbles((96, 96)).image
+    for name in ("photos", "masks", "textures/walls", "textures/floors"):
+        (folder / name).mkdir(parents=True)
+    for name in ("photos/wall.jpg", "textures/walls/wall.jpg", "textures/floors/T_Moss_BaseColor.png"):
+        io.write(folder / name, samples.pebbles((128, 128)).image)
+    io.write(folder / "textures/floors/T_Moss_Roughness.png", samples.pebbles((128, 128)).image[..., 0])
+    io.write(folder / "masks/wall_mask.png", hole)
     texrs.Material({"albedo": pebbles, "height": pebbles[..., 1].astype("float32")}).save(folder / "rock")
     return folder
 

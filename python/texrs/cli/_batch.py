@@ -22,6 +22,7 @@ import typer
 
 from texrs import io
 from texrs._chunks import workers
+from texrs._notices import collect
 from texrs._show import preview
 from texrs._threads import count_threads
 from texrs._typing import Array
@@ -30,7 +31,16 @@ from texrs.cli._console import PARTLY, Stopped, UsageFailure, complain, hush, ke
 from texrs.cli._outputs import WORK, Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.cli._parts import read_scheduler
 from texrs.cli._provenance import check_free
-from texrs.cli._recipes import Job, check_recipe, check_results, list_jobs, list_maps, parse_options, read_recipe
+from texrs.cli._recipes import (
+    Job,
+    check_files,
+    check_recipe,
+    check_results,
+    list_jobs,
+    parse_options,
+    place_arguments,
+    read_recipe,
+)
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import is_unchanged
 from texrs.materials import Material
@@ -41,22 +51,51 @@ THERE, MADE = "is there", "wrote"
 """What became of a job; anything else is why it failed."""
 
 
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a job, in any process."""
+
+    said: str
+    ignored: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
+
+    def show(self) -> str:
+        """Return the notices of the job as the end of a line."""
+        parts = [f"{title}: {'; '.join(lines)}" for title, lines in self.list_notices() if lines]
+        return f" ({'; '.join(parts)})" if parts else ""
+
+    def list_notices(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """Return the notices by their title."""
+        return ("ignored", self.ignored), ("assumed", self.assumed)
+
+
 def batch_command(
     context: typer.Context,
     what: Annotated[str, make_argument("RECIPE.toml|VERB", "A recipe, or a command that makes one file.")],
     inputs: Annotated[
-        list[str] | None, make_argument("INPUT", "Of a command: files, folders, or patterns such as 'stones/*.jpg'.")
+        list[str] | None,
+        make_argument("INPUT", "Files, patterns such as 'stones/*.jpg', or folders, with all folders in them."),
     ] = None,
     folder: Annotated[
         str | None,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder for the results, or a name such as 'made/{name}-{seed}.png'."
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Folder for the results, or a name such as 'made/{folder}/{name}-{seed}.png'.",
         ),
     ] = None,
     seeds: Annotated[str | None, make_option("A:B", "Seeds from A to B - 1, as in 0:32, or some, as in 1,5,9.")] = None,
     options: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="OPTION=VALUE", help="Option of the command, as in size=512; may be repeated."),
+    ] = None,
+    argument: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TEXT",
+            help="Further argument of the command, as in mask.png or 'masks/{name}.png'; may be repeated.",
+        ),
     ] = None,
     sheet: Annotated[str | None, to_write("sheet")] = None,
     workers: Annotated[
@@ -78,8 +117,9 @@ def batch_command(
     """Do a command for many pictures, seeds and presets; what is done already is not done again."""
     start, who = time.monotonic(), read_scheduler(workers, scheduler)
     running = _provenance.RUNNING.get()
-    more = ["--force"] * bool(running and running.force)
+    more = ["--force"] * bool(running and running.force) + ["--strict"] * bool(context.params.get("strict"))
     over: dict[str, Any] = {"out": folder, "sheet": sheet, "seeds": seeds, "options": parse_options(options or [])}
+    over["arguments"] = argument
     if what.lower().endswith(".toml"):
         if inputs:
             raise InvalidInput(f"INPUT: a recipe says which, got {inputs[0]!r}")
@@ -96,17 +136,19 @@ def batch_command(
         command = root.get_command(context, recipe.verb)
         if command is None or recipe.verb in ("batch", "rerun", "info", "demo", "samples", "database"):
             raise InvalidInput(f"verb: needs a command that makes one file of others, got {recipe.verb!r}")
-        jobs = list(list_jobs(recipe))
+        recipe = place_arguments(recipe, command.params)
+        jobs = list(list_jobs(recipe, command.params))
         check_results(jobs)
-        for job in jobs:
-            command.make_context(recipe.verb, [*job.words, *more])
+        contexts = [(job, make_context(command, recipe.verb, [*job.words, *more])) for job in jobs]
+        check_files(contexts, command.params)
+        _provenance.add_inputs(*(file for job in jobs for file in _outputs.list_files([job.source])))
         if recipe.sheet is not None:
             _outputs.check_apart([job.source for job in jobs], {"sheet": recipe.sheet})
             check_free(recipe.sheet, "sheet")
         shown = who is None and not quiet and sys.stderr is not None and sys.stderr.isatty()
         more += ["--quiet"] * (not shown)
         work = Work(root.make_command, recipe.verb, jobs, more, os.getcwd(), who is not None or count is not None)
-        failed = run_jobs(work, who, count, quiet=quiet)
+        failed, partly = run_jobs(work, who, count, quiet=quiet)
         if recipe.sheet is not None:
             with _outputs.write_output(recipe.sheet, "sheet") as temporary:
                 io.write(temporary, draw_sheet([job.out for job in jobs]))
@@ -114,32 +156,50 @@ def batch_command(
     for job, reason in failed:
         complain(f"failed: {job.source} to {job.out}: {reason}")
     done = f"{len(jobs) - len(failed)} of {len(jobs)} results are there"
-    note(f"{done}, {len(failed)} failed, in {time.monotonic() - start:.1f} s", quiet=quiet and not failed)
+    parts = f", {partly} ignored parts of their inputs" if partly else ""
+    note(f"{done}, {len(failed)} failed{parts}, in {time.monotonic() - start:.1f} s", quiet=quiet and not failed)
     if failed:
         raise typer.Exit(PARTLY)
 
 
-def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: bool) -> list[tuple[Job, str]]:
-    """Do what is not done; return what failed, and why."""
+def make_context(command: Any, verb: str, words: list[str]) -> Any:
+    """Return the values of a job's options; say how a batch is given an argument that is missing."""
+    try:
+        return command.make_context(verb, words)
+    except UsageFailure as failure:
+        missing = getattr(failure, "param", None)
+        if type(failure).__name__ != "MissingParameter" or missing is None or missing.param_type_name != "argument":
+            raise
+        name = missing.metavar or missing.name.upper()
+        raise InvalidInput(
+            f"--argument: texrs {verb} needs {name} for each input, as in --argument 'masks/{{name}}.png'"
+        ) from None
+
+
+def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: bool) -> tuple[list[tuple[Job, str]], int]:
+    """Do the jobs that are not done; return those that failed, and why, and how many ignored a part of an input."""
     failed: dict[int, str] = {}
-    total, over = len(work.jobs), 0
+    total, over, partly = len(work.jobs), 0, 0
     try:
         with name_arguments(scheduler="--scheduler", count="--threads"):
-            for number, said in workers.run(work, range(total), who, threads_each=count, spare=True):
+            for number, outcome in workers.run(work, range(total), who, threads_each=count, spare=True):
                 over += 1
+                # A task that ended its workers has no outcome of its own.
+                one = outcome if isinstance(outcome, Outcome) else Outcome(str(outcome))
+                said, partly = one.said, partly + bool(one.ignored)
                 job, where = work.jobs[number], f"{number + 1} of {total}"
                 if said == THERE:
                     note(f"{where}: {job.out} is there", quiet=quiet)
                 elif said == MADE:
                     keep(job.out)
-                    note(f"{where}: wrote {job.out}", quiet=quiet)
+                    note(f"{where}: wrote {job.out}{one.show()}", quiet=quiet)
                 else:
-                    failed[number] = str(said)
+                    failed[number] = said
                     note(f"{where}: {job.source} failed", quiet=quiet)
     except (Stopped, KeyboardInterrupt, typer.Abort):
         complain(f"stopped after {over} of {total}; the same command goes on from there")
         raise
-    return [(work.jobs[number], failed[number]) for number in sorted(failed)]
+    return [(work.jobs[number], failed[number]) for number in sorted(failed)], partly
 
 
 _ALONE = threading.Lock()
@@ -161,22 +221,27 @@ class Work:
     limited: bool
     """Whether commands use as many threads as are in force."""
 
-    def __call__(self, number: int) -> str:
+    def __call__(self, number: int) -> Outcome:
+        """Do a job, if it is not done; return what became of it, and its notices."""
+        with _ALONE, silence_warnings(), collect() as notices:
+            said = self.attempt(self.jobs[number])
+        return Outcome(said, tuple(notices.ignored), tuple(notices.assumed))
+
+    def attempt(self, job: Job) -> str:
         """Do a job, if it is not done; return what became of it."""
-        with _ALONE, silence_warnings():
-            try:
-                with inside(self.folder), hush():
-                    return self.do(self.jobs[number])
-            except UsageFailure as failure:
-                return str(failure.format_message())  # type: ignore[attr-defined]
-            except MemoryError:
-                return "needs more memory than there is"
-            except (TexrsError, OSError) as error:
-                return say_sizes(str(error))
-            except Exception as error:  # One that is broken does not stop the others.
-                if isinstance(error, typer.Abort):
-                    raise
-                return f"internal error: {type(error).__name__}: {error}"
+        try:
+            with inside(self.folder), hush():
+                return self.do(job)
+        except UsageFailure as failure:
+            return str(failure.format_message())  # type: ignore[attr-defined]
+        except MemoryError:
+            return "needs more memory than there is"
+        except (TexrsError, OSError) as error:
+            return say_sizes(str(error))
+        except Exception as error:  # One that is broken does not stop the others.
+            if isinstance(error, typer.Abort):
+                raise
+            return f"internal error: {type(error).__name__}: {error}"
 
     def do(self, job: Job) -> str:
         """Do a job, if it is not done."""
@@ -203,7 +268,7 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
             return False
         if option == "out" and os.path.isdir(path):
             packed = context.params.get("pack") is not None
-            if not is_folder_done(record, path, 1 if packed else len(list_maps(job.source))):
+            if not is_folder_done(record, path, 1 if packed else job.maps):
                 return False
             continue
         made = io.read_notes(path).made if os.path.isfile(path) else None

@@ -49,6 +49,8 @@ LEFT = (
     "scheduler",
 )
 """Parameters of commands that change nothing in a result, or name one."""
+BRACES = re.compile(r"([^{}]*)\{([^{}/]*,[^{}/]*)\}([^{}/]*)")
+"""Names of several files of a folder."""
 CHANGED = "changed while it was read"
 """In place of the SHA-256 of such a file."""
 
@@ -134,6 +136,7 @@ class Record:
         texts = [*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))]
         folders = {Path(f) for f in (self.folder, *(s for s in self.stacks if s in texts)) if f is not None}
         inside = {n for n in self.files if Path(n).parent in folders}
+        inside |= {n for s in self.stacks if s in texts for n in expand_braces(s)} & self.files.keys()
         return {t for t in texts if isinstance(t, str)} | inside
 
 
@@ -152,10 +155,20 @@ def read_status(path: str) -> os.stat_result | None:
     return None
 
 
-def list_folder(name: str) -> list[str]:
-    """Return the files in a folder; none where it is not one."""
-    if not name or "\0" in name or not os.path.isdir(name) or io.is_store(name):
+def expand_braces(text: str) -> list[str]:
+    """Return the files that a name such as ``in/rock_{albedo,normal}.png`` lists; none if it is not such a name."""
+    found = BRACES.fullmatch(text)
+    if not found or os.path.lexists(text):
         return []
+    return [f"{found[1]}{part}{found[3]}" for part in found[2].split(",")]
+
+
+def list_folder(name: str) -> list[str]:
+    """Return the files in a folder, or those that braces list; none if a name is neither."""
+    if not name or "\0" in name or io.is_store(name):
+        return []
+    if not os.path.isdir(name):
+        return [file for file in expand_braces(name) if os.path.isfile(file)]
     return sorted(os.path.join(name, entry.name) for entry in os.scandir(name) if entry.is_file())
 
 
@@ -164,7 +177,7 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     arguments: list[str | None] = []
     options: dict[str, Any] = {}
     names: list[str] = []
-    # What a batch is given may be places of any command.
+    # The options of a batch may be places for any command.
     placed = command.name == "batch"
     for p in command.params:
         value = given.get(p.name)

@@ -18,6 +18,7 @@ from texrs._notices import assume, ignore
 from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.cli._places import turn_centre
+from texrs.cli._provenance import expand_braces
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import check_file
@@ -58,7 +59,7 @@ def read_example(text: str, about: About, *, finite: bool = True) -> Any:
         return read_picture(text, finite=finite)
 
     with name_arguments(roles="--role", maps=text):
-        return Material.read(text, roles=about.roles)
+        return Material.read(expand_braces(text) or text, roles=about.roles)
 
 
 def read_volume(text: str) -> Array:

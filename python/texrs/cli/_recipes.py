@@ -2,30 +2,44 @@
 
 from __future__ import annotations
 
-import glob
+import codecs
 import itertools
 import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from texrs import io
-from texrs.cli._outputs import SAMPLE
-from texrs.cli._provenance import read_status
+from texrs._arrays import as_list
+from texrs.cli._inputs import Source, fill, find_sources, list_known
+from texrs.cli._outputs import OUTPUTS, SAMPLE
+from texrs.cli._provenance import expand_braces, read_status
 from texrs.errors import FileError, InvalidInput
 from texrs.io._formats import READ_IMAGES, READ_VOLUMES, WRITTEN_IMAGES, WRITTEN_VOLUMES
-from texrs.materials import guess_role
 
-__all__ = ["Job", "Recipe", "check_recipe", "check_results", "list_jobs", "list_maps", "parse_options", "read_recipe"]
+__all__ = [
+    "Job",
+    "Recipe",
+    "check_files",
+    "check_recipe",
+    "check_results",
+    "list_jobs",
+    "parse_options",
+    "place_arguments",
+    "read_recipe",
+]
 
-KEPT = tuple(s for s in WRITTEN_IMAGES if s not in (".webp", ".jpg", ".jpeg", ".bmp", ".npz"))
-KEPT_VOLUMES = tuple(s for s in WRITTEN_VOLUMES if s not in (".npz", ".nii.gz"))
+KEPT = tuple(s for s in WRITTEN_IMAGES if s not in (".gif", ".npz"))
+KEPT_VOLUMES = tuple(s for s in WRITTEN_VOLUMES if s != ".npz")
 """Formats of inputs that results have too; of others the results are .png, or .npy."""
-OF_VOLUMES = ("solid", "slice")
-"""Commands that take volumes."""
+LOSSY = (".jpg", ".jpeg", ".webp", ".avif", ".jxl")
+EXACT = ("scale-map",)
+"""Commands whose results are measurements, which no lossy format may change."""
+NAMED = (*READ_IMAGES, *READ_VOLUMES, ".csv", ".json", ".npz")
+"""An argument with such a suffix is the name of a file."""
 KEYS = ("verb", "inputs", "arguments", "out", "seeds", "options", "presets", "sheet")
 """What a recipe may say."""
 MOST = 2**16
@@ -40,7 +54,7 @@ class Recipe:
     inputs: list[str]
     """Files, folders, patterns, or ``sample:NAME``."""
     arguments: list[str]
-    """Of the verb; ``{input}`` is one of the inputs."""
+    """Arguments of the verb; ``{input}`` is one of the inputs."""
     out: str
     seeds: list[int]
     options: dict[str, Any]
@@ -55,13 +69,17 @@ class Job:
     source: str
     out: str
     words: list[str]
+    maps: int = 0
+    """Number of maps of a material that it reads; 0 for a file."""
 
 
 def read_recipe(path: str) -> dict[str, Any]:
     """Return what a recipe says."""
     try:
-        with open(path, "rb") as file:
-            return tomllib.load(file)
+        content = Path(path).read_bytes()
+        # Editors of Windows put a mark before the text, and some write UTF-16.
+        wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        return tomllib.loads(content.decode("utf-16" if wide else "utf-8-sig"))
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({(error.strerror or str(error)).lower()})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -92,13 +110,18 @@ def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
     return Recipe(
         said["verb"],
         as_texts(said["inputs"], f"{where}: inputs"),
-        as_texts(said.get("arguments", ["{input}"]), f"{where}: arguments"),
+        place_input(as_texts(said.get("arguments", []), f"{where}: arguments")),
         said["out"],
         parse_seeds(said.get("seeds", []), f"{where}: seeds"),
         said.get("options", {}),
         presets,
         said.get("sheet"),
     )
+
+
+def place_input(arguments: list[str]) -> list[str]:
+    """Return the arguments of a command; the input is the first, unless one of them is or holds it."""
+    return arguments if any("{input}" in text for text in arguments) else ["{input}", *arguments]
 
 
 def as_texts(value: Any, where: str) -> list[str]:
@@ -133,56 +156,39 @@ def parse_options(texts: Sequence[str]) -> dict[str, Any]:
     return {(parts := text.partition("="))[0].lstrip("-"): parts[2] if parts[1] else True for text in texts}
 
 
-def find_inputs(recipe: Recipe) -> list[str]:
-    """Return the files that are meant, in the order of the recipe, each once; folders of maps where there are no files."""
-    found: dict[str, None] = {}
-    for text in recipe.inputs:
-        if text.startswith(SAMPLE) or os.path.isfile(text) or io.is_store(text):
-            some = [text]
-        elif os.path.isdir(text):
-            several = [os.path.join(text, name) for name in sorted(os.listdir(text)) if not name.startswith(".")]
-            suffixes = READ_VOLUMES if recipe.verb in OF_VOLUMES else READ_IMAGES
-            some = [p for p in several if (os.path.isfile(p) and p.lower().endswith(suffixes)) or io.is_store(p)]
-            some = some or [p for p in several if is_material(p, recipe.verb)]
-        else:
-            several = sorted(glob.glob(text, recursive=True))
-            some = [p for p in several if os.path.isfile(p) or io.is_store(p)]
-            some = some or [p for p in several if is_material(p, recipe.verb)]
-        if not some:
-            raise InvalidInput(f"inputs: nothing is found for {text!r}")
-        found |= dict.fromkeys(some)
-    return list(found)
-
-
-def is_material(path: str, verb: str) -> bool:
-    """Return whether a folder holds maps of a material, which a command takes as a whole."""
-    if verb in OF_VOLUMES or not os.path.isdir(path) or Path(path).name.startswith("."):
-        return False
-    return bool(list_maps(path))
-
-
-def list_maps(folder: str) -> list[str]:
-    """Return the pictures in a folder whose names say what they are for."""
-    names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
-    return [n for n in names if n.lower().endswith(READ_IMAGES) and guess_role(Path(n).stem) is not None]
-
-
-def list_jobs(recipe: Recipe) -> Iterator[Job]:
+def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
     """Return the commands, one for each input, preset and seed."""
-    inputs = find_inputs(recipe)
-    every = {source: list(expand(recipe, source)) for source in inputs}
-    # What an earlier run has made is no input, if it lies where inputs are looked for.
-    made = {os.path.realpath(job.out): source for source, jobs in every.items() for job in jobs}
-    taken: dict[str, str] = {}
+    base = recipe.out.partition("{")[0]
+    every: dict[Source, list[Job]] = {}
+    for source in find_sources(
+        recipe.inputs,
+        recipe.verb,
+        stacked=any(p.name == "role" for p in parameters),
+        templates=[*recipe.arguments, *list_files(recipe, parameters)],
+        out=base if base == recipe.out and not Path(base).suffix else os.path.dirname(base),
+    ):
+        every[source] = list(expand(recipe, source))
+    # The results of an earlier run are not inputs, if they are among the inputs.
+    flags = {flag for names, _, _ in OUTPUTS.values() for flag in names}
+    made: dict[str, Source] = {}
+    for source, jobs in every.items():
+        for job in jobs:
+            written = [after for word, after in itertools.pairwise(job.words) if word in flags]
+            made |= {os.path.realpath(path): source for path in written}
+    if recipe.sheet is not None and '"verb": "batch"' in (io.read_notes(recipe.sheet).made or ""):
+        made[os.path.realpath(recipe.sheet)] = Source("", "")
+    taken: dict[str, Source] = {}
     total = 0
     for source, jobs in every.items():
-        if made.get(os.path.realpath(source), source) != source:
+        place = Path(os.path.realpath(source.text))
+        if any(made.get(str(p), source) != source for p in (place, *place.parents)):
             continue
         for job in jobs:
             other = taken.setdefault(os.path.realpath(job.out), source)
             if other != source or len({os.path.realpath(j.out) for j in jobs}) < len(jobs):
                 raise InvalidInput(
-                    f"out: several results have the name {job.out}; it may hold {{name}}, {{parent}}, {{preset}}, {{seed}}"
+                    f"out: several results have the name {job.out}; "
+                    "it may hold {folder}, {name}, {suffix}, {parent}, {preset}, {seed}"
                 )
             total += 1
             if total > MOST:
@@ -190,52 +196,89 @@ def list_jobs(recipe: Recipe) -> Iterator[Job]:
             yield job
 
 
-def expand(recipe: Recipe, source: str) -> Iterator[Job]:
+def list_files(recipe: Recipe, parameters: Sequence[Any]) -> list[str]:
+    """Return the options that name a file to read, as the recipe has them."""
+    read = {max(p.opts, key=len) for p in parameters if names_file(p)}
+    several = {**recipe.options, **{k: v for each in recipe.presets.values() for k, v in each.items()}}
+    given = [(f"--{key.replace('_', '-')}", value) for key, value in several.items()]
+    return [text for flag, value in given if flag in read for text in as_list(value) if isinstance(text, str)]
+
+
+def names_file(parameter: Any) -> bool:
+    """Return whether an option or an argument of a command may be the name of a file to read."""
+    if parameter.param_type_name == "argument":
+        return True
+    return parameter.name not in OUTPUTS and re.search("FILE|csv", parameter.metavar or "") is not None
+
+
+def check_files(jobs: Sequence[tuple[Job, Any]], parameters: Sequence[Any]) -> None:
+    """Check that every other file that the jobs read is there; name all that are missing."""
+    missing = {}
+    for job, context in jobs:
+        for p in parameters:
+            if not names_file(p):
+                continue
+            for text in as_list(context.params.get(p.name)):
+                named = isinstance(text, str) and text != job.source and text.lower().endswith(NAMED)
+                if named and not (os.path.exists(text) or text.startswith(SAMPLE) or expand_braces(text)):
+                    missing[job.source, text] = f"{job.source} needs {text}"
+    if missing:
+        names = ", ".join(list(missing.values())[:8])
+        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+        count = len({source for source, _ in missing})
+        total = len({job.source for job, _ in jobs})
+        raise InvalidInput(f"arguments: {count} of {total} inputs lack a file: {names}{more}")
+
+
+def place_arguments(recipe: Recipe, parameters: Sequence[Any]) -> Recipe:
+    """Return a recipe whose options that are arguments of the command, as ``hole`` of complete, are in their place."""
+    options, arguments = dict(recipe.options), list(recipe.arguments)
+    flags = {flag.lstrip("-") for p in parameters for flag in p.opts if p.param_type_name == "option"}
+    for place, p in enumerate(q for q in parameters if q.param_type_name == "argument"):
+        if p.name in options and p.name not in flags and place == len(arguments):
+            arguments.append(str(options.pop(p.name)))
+    return replace(recipe, arguments=arguments, options=options)
+
+
+def expand(recipe: Recipe, source: Source) -> Iterator[Job]:
     """Return the commands for one input."""
-    path = Path(source.removeprefix(SAMPLE))
-    name = path.name.removesuffix(".gz") if path.suffix.lower() == ".gz" else path.name
-    stem, suffix = Path(name).stem, Path(name).suffix.lower()
     out = recipe.out
     if "{" not in out and not Path(out).suffix:
         parts = ["{name}", *(["{preset}"] if recipe.presets else []), *(["{seed}"] if len(recipe.seeds) > 1 else [])]
-        # The maps of a material go to a folder of their own.
-        kept, usual = (KEPT_VOLUMES, ".npy") if recipe.verb == "solid" else (KEPT, ".png")
-        end = suffix if suffix in kept else usual
-        if os.path.isdir(source) and not io.is_store(source):
-            end = ""
-        out = os.path.join(out, "-".join(parts) + end)
+        out = os.path.join(out, "{folder}", "-".join(parts) + choose_suffix(recipe.verb, source))
     presets = recipe.presets or {"": {}}
     chosen: list[int | None] = [*recipe.seeds] or [None]
     for (preset, options), seed in itertools.product(presets.items(), chosen):
-        known = {
-            "input": source,
-            "name": stem if not source.startswith(SAMPLE) else str(path),
-            "parent": path.parent.name,
-            "preset": preset,
-            "seed": "" if seed is None else str(seed),
-            "verb": recipe.verb,
-        }
+        known = list_known(source) | {"preset": preset, "seed": "" if seed is None else str(seed), "verb": recipe.verb}
         words = [fill(text, known) for text in recipe.arguments]
         for key, value in {**recipe.options, **options}.items():
             words += write_option(key, value, known)
         if seed is not None:
             words += ["--seed", str(seed)]
         target = fill(out, known)
-        yield Job(source, target, [*words, "--out", target])
+        yield Job(source.text, target, [*words, "--out", target], source.maps)
+
+
+def choose_suffix(verb: str, source: Source) -> str:
+    """Return the suffix of a result: that of the input, if the result can be written so."""
+    if source.maps:
+        # The maps of a material are written to a folder of their own.
+        return ""
+    suffix = source.suffix.lower()
+    if verb == "analyse":
+        return ".npz"
+    kept, usual = (KEPT_VOLUMES, ".npy") if verb == "solid" else (KEPT, ".png")
+    return source.suffix if suffix in kept and not (verb in EXACT and suffix in LOSSY) else usual
 
 
 def check_results(jobs: Sequence[Job]) -> None:
     """Check that no result takes the place of an input."""
-    read = {(s.st_dev, s.st_ino): job.source for job in jobs if (s := read_status(job.source)) is not None}
+    files = {file: None for job in jobs for file in (expand_braces(job.source) or [job.source])}
+    read = {(s.st_dev, s.st_ino): file for file in files if (s := read_status(file)) is not None}
     for job in jobs:
         status = read_status(job.out)
         if status is not None and (source := read.get((status.st_dev, status.st_ino))) is not None:
             raise InvalidInput(f"out: {job.out} is read as {source}, and would be lost; write to another folder")
-
-
-def fill(text: str, known: Mapping[str, str]) -> str:
-    """Return a text with what stands in braces filled in; other braces are left alone."""
-    return re.sub(r"\{(input|name|parent|preset|seed|verb)\}", lambda found: known[found[1]], text)
 
 
 def write_option(key: str, value: Any, known: Mapping[str, str]) -> list[str]:

@@ -21,7 +21,7 @@ from texrs._version import __version__
 from texrs.cli._console import hush, note, say
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, show_sides, to_write
 from texrs.cli._places import put_rows_first
-from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING
+from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING, expand_braces
 from texrs.cli._stacks import is_stack
 from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
@@ -131,6 +131,9 @@ class Recipe:
             inside = [found[name] for name in self.inputs if isinstance(text, str) and os.path.dirname(name) == text]
             if inside and text not in found:
                 found[str(text)] = os.path.dirname(inside[0])
+            listed = expand_braces(text) if isinstance(text, str) else []
+            if listed and all(name in found for name in listed):
+                found[text] = os.path.join(os.path.dirname(found[listed[0]]), os.path.basename(text))
         if self.verb == "database" and self.arguments[0] is not None:
             first = self.arguments[0]
             found[first] = os.path.normpath(os.path.join(folder, first))

@@ -16,7 +16,7 @@ import typer
 from texrs import io
 from texrs._notices import collect
 from texrs.cli import _outputs, _provenance
-from texrs.cli._provenance import check_free
+from texrs.cli._provenance import check_free, expand_braces
 from texrs.errors import FileError, InvalidInput
 from texrs.io._tags import list_exr_channels
 from texrs.materials import Map, Material
@@ -193,9 +193,11 @@ def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
 
 
 def is_stack(text: str) -> bool:
-    """Return whether a name is that of a folder, or of an EXR file whose channels are not those of one picture."""
+    """Return whether a name is that of a folder, of several files, or of an EXR file of several layers."""
     if os.path.isdir(text):
         return not io.is_store(text)
+    if expand_braces(text):
+        return True
     if Path(text).suffix.lower() != LAYERED or not os.path.isfile(text):
         return False
     with suppress(Exception):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from io import BytesIO
 from pathlib import Path as FilePath
+from typing import cast
 
 import numpy as np
 
@@ -42,12 +43,12 @@ SMALLER = "mipmaps"
 """Folder of what is not a map of the material itself, so that reading finds maps of one size."""
 
 
-def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Map], dict[str, Role]]:
+def read_maps(
+    path: Path | Sequence[Path], roles: dict[str, Role | str], axes: int
+) -> tuple[dict[str, Map], dict[str, Role]]:
     """Return the maps of a folder and their roles, by the names that they have without what is common to all."""
-    folder = as_path(path)
-    if not folder.is_dir():
-        raise FileError(f"{path}: is not a folder of maps")
-    files, left = list_files(folder, axes)
+    path, there = list_places(path)
+    files, left = list_files(there, axes)
     stems = {name: split_suffix(name)[0] for name in files}
     said: dict[str, Role] = {}
     for name, role in roles.items():
@@ -84,12 +85,12 @@ def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict
     return named, {name: each.role for name, each in named.items()}
 
 
-def list_files(folder: FilePath, axes: int) -> tuple[dict[str, FilePath], dict[str, list[str]]]:
-    """Return the files in a folder that may be maps, by name, and the names of all others by the reason."""
+def list_files(places: Iterable[FilePath], axes: int) -> tuple[dict[str, FilePath], dict[str, list[str]]]:
+    """Return the files that may be maps, by name, and the names of all others by the reason."""
     files: dict[str, FilePath] = {}
     formats, inner = list[str](), list[str]()
     known = READ_IMAGES if axes == 2 else READ_VOLUMES
-    for place in sorted(folder.iterdir()):
+    for place in sorted(places):
         name, lower = place.name, place.name.lower()
         if name.startswith(".") or lower in SYSTEM or lower.endswith(DOCUMENTS):
             continue
@@ -173,6 +174,22 @@ def name_profile(profile: bytes) -> str | None:
     with suppress(OSError, ImageCms.PyCMSError):
         title = " ".join(ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).split())
     return None if "srgb" in title.lower() else title
+
+
+def list_places(path: Path | Sequence[Path]) -> tuple[Path, list[FilePath]]:
+    """Return a folder and the files in it; of a list of files, their folder and the files."""
+    if not isinstance(path, list | tuple):
+        folder = as_path(cast(Path, path))
+        if not folder.is_dir():
+            raise FileError(f"{path}: is not a folder of maps")
+        return cast(Path, path), list(folder.iterdir())
+    several = [as_path(each) for each in path]
+    if not several or len({each.parent for each in several}) > 1:
+        raise InvalidInput(f"path: needs files of one folder, got {', '.join(map(str, several)) or 'an empty list'}")
+    for each in several:
+        if not each.is_file():
+            raise FileError(f"{each}: does not exist")
+    return several[0].parent, several
 
 
 def shorten(names: list[str]) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -134,13 +134,15 @@ class Material(Exports):
         return Map(kept, chosen, space or usual)
 
     @classmethod
-    def read(cls, path: Path, *, roles: Mapping[str, Role | str] | None = None, axes: int = 2) -> Material:
+    def read(
+        cls, path: Path | Sequence[Path], *, roles: Mapping[str, Role | str] | None = None, axes: int = 2
+    ) -> Material:
         """Return the material whose maps are the files of a folder, or the layers of a file, by the usual names.
 
         Parameters
         ----------
-        path : path_like
-            A folder, or an EXR file of several layers.
+        path : path_like, or a list of path_like
+            A folder, some files of a folder, or an EXR file of several layers.
         roles : mapping of str to Role or str, optional
             What files are for, by their names, with or without the suffix; what layers are for, by theirs.
         axes : int
@@ -180,14 +182,15 @@ class Material(Exports):
         from texrs.materials._exr import read_exr
         from texrs.materials._files import read_maps
 
-        place, axes = as_path(path), as_axes(axes)
+        axes = as_axes(axes)
+        place = None if isinstance(path, list | tuple) else as_path(cast(Path, path))
         if roles is not None and not isinstance(roles, Mapping):
             raise InvalidInput(f"roles: needs a mapping of names to roles, got {roles!r}")
         with collect() as notices:
-            if place.suffix.lower() == ".exr" and not place.is_dir():
+            if place is not None and place.suffix.lower() == ".exr" and not place.is_dir():
                 if axes != 2:
                     raise InvalidInput(f"axes: the layers of {path} are pictures, got {axes}")
-                layers, found, weights = read_exr(path, dict(roles or {}))
+                layers, found, weights = read_exr(place, dict(roles or {}))
                 made = cls(layers, roles=found, weights=weights)
             else:
                 maps, found = read_maps(path, dict(roles or {}), axes)

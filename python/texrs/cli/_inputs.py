@@ -1,0 +1,275 @@
+"""The inputs of a batch: files, folders with everything in them, and patterns. Whatever is not used is reported."""
+
+from __future__ import annotations
+
+import glob
+import itertools
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from texrs import io
+from texrs._notices import assume, ignore
+from texrs.cli._outputs import SAMPLE
+from texrs.cli._provenance import expand_braces
+from texrs.errors import InvalidInput
+from texrs.io._files import find_suffix
+from texrs.io._formats import READ_IMAGES, READ_VOLUMES
+from texrs.materials import Role, guess_role
+
+__all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
+
+OF_VOLUMES = ("solid", "slice")
+"""Commands that take volumes."""
+SHOWN = 8
+"""Names that a notice lists; it counts the others."""
+WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z0-9]+|[A-Z0-9]+")
+"""Words of a name."""
+LONGEST = 3
+"""Words that may name a map together."""
+FIELDS = re.compile(r"\{(input|name|folder|suffix|preset|seed|verb|parent(?:[2-9]|[1-9][0-9])?)\}")
+"""Words in braces that are filled in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """An input of one job or more."""
+
+    text: str
+    """The argument of the command."""
+    name: str
+    suffix: str = ""
+    """Suffix of the file; empty for a material."""
+    folder: str = ""
+    """Folder of the input, relative to the folder or pattern that was given."""
+    maps: int = 0
+    """Number of maps of a material; 0 for a file."""
+
+
+def find_sources(
+    texts: Sequence[str],
+    verb: str,
+    *,
+    stacked: bool = False,
+    templates: Sequence[str] = (),
+    out: str = "",
+) -> list[Source]:
+    """Return the inputs, each once, in the order of the texts.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Files, folders, patterns, or ``sample:NAME``. Folders are searched with all folders in them.
+    verb : str
+        The command that takes them.
+    stacked : bool
+        If True, files that are maps of one material are one input.
+    templates : sequence of str
+        Names of other files that jobs read, as ``masks/{name}.png``. Such files are not inputs.
+    out : str
+        Folder of the results, which is not searched.
+
+    """
+    found = _Found(READ_VOLUMES if verb in OF_VOLUMES else READ_IMAGES, os.path.realpath(out) if out else "")
+    for text in texts:
+        if not found.add(text):
+            raise InvalidInput(f"inputs: nothing is found for {text!r}")
+    found.drop_used(templates)
+    several = list(found.make_sources(stacked=stacked))
+    if not several:
+        raise InvalidInput(f"inputs: nothing is found for {' '.join(map(repr, texts))}")
+    return several
+
+
+@dataclass(slots=True)
+class _Found:
+    """The files of all inputs."""
+
+    suffixes: tuple[str, ...]
+    out: str
+    files: dict[str, str] = field(default_factory=dict)
+    """The folder that was given or precedes a pattern, by file; empty for a file that was named."""
+    walked: set[str] = field(default_factory=set)
+    """Folders whose files are all known."""
+
+    def add(self, text: str) -> bool:
+        """Add the files that a text stands for; return whether there are any."""
+        before = len(self.files)
+        if text.startswith(SAMPLE) or os.path.isfile(text) or io.is_store(text) or expand_braces(text):
+            self.files.setdefault(text, "")
+        elif os.path.isdir(text):
+            self._walk(text, text)
+        else:
+            there = sorted(glob.glob(text, recursive=True))
+            base = re.split(r"[*?\[]", text, maxsplit=1)[0]
+            base = os.path.dirname(base)
+            named = [p for p in there if os.path.isfile(p) or io.is_store(p)]
+            self._take(text, named, base)
+            for folder in (p for p in there if os.path.isdir(p) and p not in named):
+                self._walk(folder, base)
+        return len(self.files) > before or any(p == text or p.startswith(text) for p in self.files)
+
+    def _walk(self, folder: str, base: str) -> None:
+        """Add the files of a folder and of all folders in it, links to folders included."""
+        several: list[str] = []
+        seen: set[str] = set()
+        for place, folders, names in os.walk(folder, followlinks=True):
+            inner = sorted(os.path.join(place, n) for n in folders if not n.startswith("."))
+            stores = [p for p in inner if io.is_store(p)]
+            # A link may lead back to a folder above it.
+            go = [p for p in inner if p not in stores and os.path.realpath(p) not in seen | {self.out}]
+            seen |= {os.path.realpath(p) for p in go}
+            folders[:] = [os.path.basename(p) for p in go]
+            several += [os.path.join(place, n) for n in sorted(names) if not n.startswith(".")] + stores
+            self.walked.add(os.path.normpath(place))
+        self._take(folder, several, base)
+
+    def _take(self, text: str, paths: Sequence[str], base: str) -> None:
+        """Add the files whose format is read, and report the others."""
+        read = [p for p in paths if p.lower().endswith(self.suffixes) or io.is_store(p)]
+        # The suffix of a pattern may be one that is not known; the content of the file counts.
+        read = read or ([] if os.path.isdir(text) else list(paths))
+        left = [p for p in paths if p not in set(read) and not (p.endswith(".json") and p[:-5] in set(paths))]
+        if left:
+            ignore(
+                f"{text}: {_count(left, 'file')} not used, because the suffix is not that of a format: {_list(left)}"
+            )
+        for path in read:
+            self.files.setdefault(path, base)
+
+    def drop_used(self, templates: Iterable[str]) -> None:
+        """Drop the files that other inputs are done with."""
+        known = [list_known(_name(path, base)) for path, base in self.files.items()]
+        used = {os.path.realpath(fill(t, each)) for t in templates if t != "{input}" for each in known}
+        self.files = {path: base for path, base in self.files.items() if os.path.realpath(path) not in used}
+
+    def make_sources(self, *, stacked: bool) -> Iterator[Source]:
+        """Return the inputs; files of one material are one."""
+        folders: dict[str, list[str]] = {}
+        for path in self.files:
+            plain = path.startswith(SAMPLE) or not os.path.isfile(path)
+            folders.setdefault(path if plain else os.path.dirname(path), []).append(path)
+        for folder, paths in folders.items():
+            if paths == [folder] or not stacked:
+                yield from (_name(path, self.files[path]) for path in paths)
+            else:
+                yield from self._group(folder, paths)
+
+    def _group(self, folder: str, paths: Sequence[str]) -> Iterator[Source]:
+        """Return the inputs in a folder: the folder, if it is a material, or materials and images."""
+        stems = {path: os.path.basename(path)[: -len(find_suffix(Path(path))) or None] for path in paths}
+        roles = find_roles(stems)
+        keys: dict[str, list[str]] = {}
+        for path in roles:
+            keys.setdefault(cut_name(stems[path]), []).append(path)
+        materials = {key: own for key, own in keys.items() if len({roles[p] for p in own}) > 1}
+        base = self.files[paths[0]]
+        if len(materials) == len(keys) == 1 and os.path.normpath(folder or ".") in self.walked:
+            inside = os.path.normpath(folder or ".")
+            above = os.path.dirname(os.path.relpath(inside, base)) if base != folder else ""
+            name = os.path.basename(os.path.abspath(inside))
+            yield Source(folder, name, folder=above.removeprefix("."), maps=len(roles))
+            return
+        taken = {path: key for key, own in materials.items() for path in own}
+        for path in paths:
+            # A file whose name goes on from that of a material belongs to it; the reader reports it.
+            starts = [k for k in materials if k and re.match(rf"{re.escape(k)}[_\-. ]", stems[path])]
+            if path not in roles and starts:
+                taken[path] = max(starts, key=len)
+        done: set[str] = set()
+        for path in paths:
+            key = taken.get(path)
+            if key is None:
+                if path in roles and roles[path] is not Role.COLOUR:
+                    assume(
+                        f"{path}: taken as an image of its own, though its name is that of a map ({roles[path].value})"
+                    )
+                yield _name(path, self.files[path])
+            elif key not in done:
+                done.add(key)
+                own = [p for p in paths if taken.get(p) == key]
+                one = _name(path, self.files[path])
+                yield Source(join_braces(own), key or one.name, folder=one.folder, maps=len(materials[key]))
+
+
+def _name(path: str, base: str) -> Source:
+    """Return a file as an input."""
+    if path.startswith(SAMPLE):
+        return Source(path, path.removeprefix(SAMPLE))
+    inside = os.path.relpath(os.path.dirname(path) or ".", base or ".") if base or not os.path.dirname(path) else ""
+    suffix = find_suffix(Path(path))
+    name = os.path.basename(path.rstrip("/"))
+    folder = "" if inside == "." else inside
+    return Source(path, name.removesuffix(suffix), suffix, folder, len(expand_braces(path)))
+
+
+# --- materials -------------------------------------------------------------------------------------------------------
+
+
+def find_roles(stems: Mapping[str, str]) -> dict[str, Role]:
+    """Return the roles that names say, by file; files without one are left out."""
+    return {path: role for path, stem in stems.items() if (role := guess_role(stem)) is not None}
+
+
+def cut_name(stem: str) -> str:
+    """Return a name without the words for its map, so that all maps of a material have the same.
+
+    Examples
+    --------
+    >>> cut_name("T_Rock_BaseColor"), cut_name("rock_nor_gl_4k"), cut_name("albedo")
+    ('T_Rock', 'rock_4k', '')
+
+    """
+    words = list(WORDS.finditer(stem))
+    role = guess_role(stem)
+    for end in range(len(words), 0, -1):
+        for count in range(min(LONGEST, end), 0, -1):
+            run = words[end - count : end]
+            # A run without signs between its words has a role only if it is a name of a map as a whole.
+            if role is not None and guess_role("".join(word[0] for word in run).lower()) is role:
+                return (stem[: run[0].start()].rstrip("_-. ") + stem[run[-1].end() :]).lstrip("_-. ")
+    return stem
+
+
+def join_braces(paths: Sequence[str]) -> str:
+    """Return one text for some files of a folder, as ``in/rock_{albedo,normal}.png``."""
+    start = paths[0][: _count_alike(paths)]
+    rest = [p[len(start) :] for p in paths]
+    end = rest[0][len(rest[0]) - _count_alike([r[::-1] for r in rest]) :]
+    text = f"{start}{{{','.join(r[: len(r) - len(end)] for r in rest)}}}{end}"
+    if sorted(expand_braces(text)) != sorted(paths):
+        raise InvalidInput(f"inputs: {paths[0]} and {len(paths) - 1} more are one material; put its maps in a folder")
+    return text
+
+
+def _count_alike(texts: Sequence[str]) -> int:
+    """Return how many characters all texts begin with."""
+    return sum(1 for _ in itertools.takewhile(lambda each: len(set(each)) == 1, zip(*texts, strict=False)))
+
+
+# --- words -----------------------------------------------------------------------------------------------------------
+
+
+def list_known(source: Source) -> dict[str, str]:
+    """Return what words in braces stand for: ``{parent}`` is the folder of the input, ``{parent2}`` the one above it."""
+    known = {"input": source.text, "name": source.name, "folder": source.folder or ".", "suffix": source.suffix}
+    above = Path(os.path.abspath(source.text.removeprefix(SAMPLE))).parents
+    names = [] if source.text.startswith(SAMPLE) else [p.name for p in above]
+    return known | {"parent": names[0] if names else ""} | {f"parent{k}": n for k, n in enumerate(names[1:], 2)}
+
+
+def fill(text: str, known: Mapping[str, str]) -> str:
+    """Return a text with the words in braces filled in; other braces stay."""
+    filled = FIELDS.sub(lambda found: known.get(found[1], ""), text)
+    return os.path.normpath(filled) if "{folder}" in text else filled
+
+
+def _count(several: Sequence[str], what: str) -> str:
+    return f"{len(several)} {what}{'s' if len(several) > 1 else ''}"
+
+
+def _list(several: Sequence[str]) -> str:
+    more = f" and {len(several) - SHOWN} more" if len(several) > SHOWN else ""
+    return ", ".join(several[:SHOWN]) + more
