@@ -105,8 +105,10 @@ def test_a_proposed_box_is_one_that_the_option_takes(here: Path, capsys: Capture
 
 
 def test_the_centre_of_a_field_is_x_first() -> None:
-    assert read_field("circular:centre=1x2x3", (8, 9, 10)) == fields.circular(centre=(3, 2, 1)).over((8, 9, 10))
-    assert read_field("circular:centre=1x2", (8, 9)) == fields.circular(axes=2, centre=(2, 1)).over((8, 9))
+    assert read_field("circular:centre=1x2x3", About(size=(8, 9, 10))) == fields.circular(centre=(3, 2, 1)).over(
+        (8, 9, 10)
+    )
+    assert read_field("circular:centre=1x2", About(size=(8, 9))) == fields.circular(axes=2, centre=(2, 1)).over((8, 9))
 
 
 def test_records_without_an_order_mean_rows_first(here: Path, capsys: Capture) -> None:

@@ -12,6 +12,7 @@ from PIL import Image
 from texrs import fields, io, samples, volume
 from texrs.cli import main
 from texrs.cli._readers import read_field
+from texrs.cli._texts import About
 from texrs.errors import TexrsError
 
 VOLUME = samples.stripes((32, 36, 40)).image
@@ -90,7 +91,7 @@ def test_turntables_and_samples(here, capsys):
         ("v.npy -o none/out.png", "there is no folder"),
         ("w.npy -o out.png", "there is no such file"),
         ("out.png -o out.png", "out.png"),
-        ("sample:bricks -o out.png", "sample:bricks: is a picture; volumes are particles, stripes, weave_solid"),
+        ("sample:bricks -o out.png", "sample:bricks: is an image; volumes are particles, stripes, weave_solid"),
         ("v.npy", "Missing option"),
     ],
 )
@@ -117,10 +118,10 @@ def test_labels_are_painted(here, capsys, dtype):
 
 def test_fields_in_words_and_in_files(here):
     size = (40, 48, 56)
-    assert read_field("circular:axis=y", size) == fields.circular("y").over(size)
+    assert read_field("circular:axis=y", About(size=size)) == fields.circular("y").over(size)
     frames = np.stack([fields.slant_3d(a, a).constant for a in range(8)]).reshape(2, 2, 2, 3, 3)
     np.savez("frames.npz", frames)
-    assert read_field("frames.npz", size) == fields.from_array(frames, size)
+    assert read_field("frames.npz", About(size=size)) == fields.from_array(frames, size)
     np.savez("two.npz", frames, frames)
     np.savez("flat.npz", frames * 0)
     for text, extent, says in (
@@ -132,7 +133,7 @@ def test_fields_in_words_and_in_files(here):
         ("none.npz", size, "none.npz: there is no such file"),
     ):
         with pytest.raises(TexrsError) as caught:
-            read_field(text, extent)
+            read_field(text, About(size=extent))
         assert says in str(caught.value)
 
 

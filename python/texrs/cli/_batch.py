@@ -27,7 +27,18 @@ from texrs._show import preview
 from texrs._threads import count_threads
 from texrs._typing import Array
 from texrs.cli import _outputs, _provenance
-from texrs.cli._console import PARTLY, Stopped, UsageFailure, complain, hush, keep, note, say_sizes, silence_warnings
+from texrs.cli._console import (
+    PARTLY,
+    Stopped,
+    UsageFailure,
+    complain,
+    hush,
+    keep,
+    note,
+    say_error,
+    silence_warnings,
+    suggest,
+)
 from texrs.cli._outputs import WORK, Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.cli._parts import read_scheduler
 from texrs.cli._provenance import check_free
@@ -47,6 +58,8 @@ from texrs.materials import Material
 
 CELL = 256
 """Side of a cell of the contact sheet."""
+NOT_ONE = ("batch", "rerun", "info", "demo", "samples", "database")
+"""Commands that do not write one file from others."""
 THERE, MADE = "is there", "wrote"
 """What became of a job; anything else is why it failed."""
 
@@ -134,8 +147,9 @@ def batch_command(
     with inside(base):
         root: Any = context.find_root().command
         command = root.get_command(context, recipe.verb)
-        if command is None or recipe.verb in ("batch", "rerun", "info", "demo", "samples", "database"):
-            raise InvalidInput(f"verb: needs a command that makes one file of others, got {recipe.verb!r}")
+        if command is None or recipe.verb in NOT_ONE:
+            near = suggest(recipe.verb, (name for name in root.list_commands(context) if name not in NOT_ONE))
+            raise InvalidInput(f"verb: must be a command that writes one file, got {recipe.verb!r}{near}")
         recipe = place_arguments(recipe, command.params)
         jobs = list(list_jobs(recipe, command.params))
         check_results(jobs)
@@ -237,7 +251,7 @@ class Work:
         except MemoryError:
             return "needs more memory than there is"
         except (TexrsError, OSError) as error:
-            return say_sizes(str(error))
+            return say_error(error)
         except Exception as error:  # One that is broken does not stop the others.
             if isinstance(error, typer.Abort):
                 raise

@@ -11,7 +11,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from types import FrameType
@@ -44,6 +44,11 @@ ANY_SHAPE = re.compile(r"\([A-Za-z.]\w*,|\(\d+, [A-Za-z]")
 SPEAKS_OF_SIZES = re.compile(r"\b(?:pixels|voxels|sides?|sizes?|shapes?)\b")
 MOST_CHANNELS = 4
 """How errors speak of sizes."""
+PYTHON = {
+    r"texrs\.io\.read_volume reads \w+(?: as a volume)?": "texrs slice and texrs solid take volumes",
+    r"a mask, 'alpha', or an image that is a masked array": "a mask, or 'alpha'",
+}
+"""Words of errors and help texts for Python, and those of the command line."""
 _HUSHED: ContextVar[bool] = ContextVar("hushed", default=False)
 KEPT: list[str] = []
 """Files of a batch that are done, which stay when the rest fails."""
@@ -90,7 +95,7 @@ def _run(work: Callable[[], object]) -> int:
         complain(_describe_usage(failure))
         code = BAD_INPUT
     except TexrsError as error:
-        complain(say_sizes(str(error)))
+        complain(say_error(error))
         code = BAD_INPUT
     except MemoryError:
         complain("this needs more memory than there is; a smaller size or exemplar needs less")
@@ -160,6 +165,47 @@ def say_sizes(message: str) -> str:
         return " x ".join(reversed(sides)) + many
 
     return SIDES.sub(turn, message)
+
+
+def name_commands(message: str) -> str:
+    """Return a text that names the commands, not the functions of Python that they stand for.
+
+    Examples
+    --------
+    >>> name_commands("texrs.elements.analyse takes a box")
+    'texrs analyse takes a box'
+
+    """
+    from texrs.cli import COMMANDS
+
+    for python, words in PYTHON.items():
+        message = re.sub(python, words, message)
+
+    def turn(found: re.Match[str]) -> str:
+        name = found[1].replace("_", "-")
+        return f"texrs {name}" if name in COMMANDS else found[0]
+
+    return re.sub(r"\btexrs\.(?:[a-z_]+\.)*([a-z_]+)\b", turn, message)
+
+
+def say_error(error: Exception) -> str:
+    """Return what an error says, in the words of the command line."""
+    return name_commands(say_sizes(str(error)))
+
+
+def suggest(word: str, known: Iterable[str]) -> str:
+    """Return a question about the known word that is most similar to another; nothing if none is similar.
+
+    Examples
+    --------
+    >>> suggest("desing", ["design", "tile"])
+    '; did you mean design?'
+
+    """
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, list(known), 1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def complain(message: str) -> None:
@@ -248,6 +294,10 @@ def _end_stopped(number: int) -> int:
 def _describe_usage(failure: Exception) -> str:
     """Return what was wrong with the arguments, and where the right ones are listed."""
     message = failure.format_message() if hasattr(failure, "format_message") else str(failure)
+    if (wrong := getattr(failure, "option_name", None)) and hasattr(failure, "possibilities"):
+        message = f"No such option: {wrong}{suggest(wrong, failure.possibilities or ())}"
     context = getattr(failure, "ctx", None)
     command = context.command_path if context is not None else "texrs"
+    # The command of a batch is not below that of texrs.
+    command = command if command.startswith("texrs") else f"texrs {command}"
     return f"{message.rstrip('.')} ({command} --help lists what is allowed)"

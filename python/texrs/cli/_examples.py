@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,11 +10,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from texrs import io, samples
+from texrs._notices import ignore
 from texrs._threads import threads
 from texrs.cli import _outputs, _provenance
-from texrs.cli._console import note, say, show_progress
+from texrs.cli._console import note, say, show_progress, suggest
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, make_option, name_arguments, to_write
 from texrs.cli._provenance import check_free
+from texrs.cli._readers import is_solid
 from texrs.cli._texts import parse_size
 from texrs.errors import InvalidInput
 
@@ -51,7 +52,8 @@ def samples_command(
     known = (*samples.names(), *samples.photographs())
     for name in names or ():
         if name not in known:
-            raise InvalidInput(f"there is no sample {name!r}; allowed are {', '.join(known)}")
+            near = suggest(name, known) or f"; it must be one of {', '.join(known)}"
+            raise InvalidInput(f"NAME: there is not a sample {name!r}{near}")
     chosen = names or list(known)
     if out is None:
         for name in chosen:
@@ -67,9 +69,13 @@ def samples_command(
     for name in chosen:
         options: dict[str, Any] = {} if seed is None else {"seed": seed}
         if size is not None:
-            # A size of three sides is that of a volume.
-            options["size"] = parse_size(size, axes=max(2, len(re.split("[x×]", size))))
-        made[name] = samples.load(name, **(options if name in samples.names() else {})).image
+            options["size"] = parse_size(size, axes=3 if is_solid(name) else 2)
+        if name not in samples.names():
+            for option in options:
+                ignore(f"{name}: --{option} is not used, because it is a photograph")
+            options = {}
+        with name_arguments():
+            made[name] = samples.load(name, **options).image
     Path(out).mkdir(parents=True, exist_ok=True)
     for name, image in made.items():
         volume = image.ndim == 4

@@ -89,7 +89,7 @@ ENTRY = Kind(
 LAYOUT = Kind(
     "FILE|JSON",
     read_layout,
-    "As the first, or a layout: JSON, or a file of it (.json), as texrs.layouts.make takes it.",
+    "As the first, or a layout: JSON, or a file of it (.json).",
     file=True,
 )
 ENTRIES = replace(
@@ -181,7 +181,7 @@ KINDS = {
     ),
     "field": Kind(
         "WORDS|FILE",
-        lambda text, about: read_field(text, about.size),
+        read_field,
         "As in circular:axis=z,centre=16x24x0 (x first) or zigzag:period=64, or a file of frames or directions.",
         file=True,
     ),

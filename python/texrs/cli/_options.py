@@ -17,11 +17,14 @@ from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_orig
 import typer
 
 from texrs._masks import Mask
+from texrs.cli._console import name_commands
 from texrs.cli._kinds import KINDS, Kind
 from texrs.cli._texts import About
 from texrs.errors import InvalidInput
 
 MISSING = inspect.Parameter.empty
+PLACES = re.compile("X,Y|csv|WIDTHx")
+"""Forms of texts that hold places or sizes."""
 LONGEST = 200
 """Characters of a help text."""
 AMERICAN = {"color": "colour", "optimize": "optimise"}
@@ -215,6 +218,10 @@ class Options:
             kind.pick(kind.note, self.axes) if kind else "",
         )
         help_ = " ".join(t for t in texts if t)
+        if kind is not None and PLACES.search(kind.pick(kind.metavar, self.axes)):
+            # The form of the text has x or the width first.
+            help_ = re.sub(r" \((?:plane, )?row, column\)| \((?:planes, )?rows, columns\)", "", help_)
+            help_ = help_.replace("Plane, row and column", "Place")
         if not flag.startswith("--"):
             info: Any = typer.Argument(metavar=flag, help=help_, show_default=False)
         else:
@@ -368,4 +375,4 @@ def _shorten(text: str, flags: Mapping[str, str], flag: str, default: Any, words
     if flag:
         chosen = re.sub(r"\bFalse\b", f"--no-{flag[2:]}", re.sub(r"\bTrue\b", flag, chosen))
     chosen = re.sub(r"(?<=[;:] )None\b", "the default", re.sub(r"(^|(?<=[.] ))None\b", "The default", chosen))
-    return re.sub(r"`|(?<!\w)\"(?=\w)|(?<=\w)\"(?!\w)", "", chosen)
+    return name_commands(re.sub(r"`|(?<!\w)\"(?=\w)|(?<=\w)\"(?!\w)", "", chosen))

@@ -345,6 +345,9 @@ def name_arguments(**names: str) -> Iterator[None]:
             raise
         called = dict.fromkeys(names.get(each, "--" + each.replace("_", "-")) for each in several)
         said = say_places(rest) if set(several) & set(PLACED) else rest
+        # Other arguments may be in the text; a name of two words is not a word of its own.
+        for other in (name for name in names if "_" in name):
+            said = re.sub(rf"\b{other}\b", names[other], said)
         raise type(error)(f"{', '.join(called)}:{said}") from None
 
 

@@ -23,6 +23,9 @@ from texrs.cli._texts import PLANE, About, parse_numbers, read_json
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import check_file
 
+VOLUMES = "a TIFF of several slices, .npy, .npz, .vti, .vtk, NRRD, NIfTI or Zarr"
+"""Files of volumes, as errors list them."""
+
 
 def read_picture(text: str, *, finite: bool = True) -> Array:
     """Read an image file, or make the built-in exemplar that ``sample:NAME`` names."""
@@ -62,15 +65,33 @@ def read_example(text: str, about: About, *, finite: bool = True) -> Any:
         return Material.read(expand_braces(text) or text, roles=about.roles)
 
 
+def is_solid(sample: str) -> bool:
+    """Return whether a built-in example is a volume."""
+    return sample.endswith("solid") or sample in ("particles", "stripes")
+
+
+def find_image(path: str) -> tuple[int, ...] | None:
+    """Return the shape of an image; None if a file is not one."""
+    with suppress(FileError):
+        return tuple(io.read(path).shape)
+    return None
+
+
 def read_volume(text: str) -> Array:
     """Read a volume, or make the built-in one that ``sample:NAME`` names; all of it must be finite."""
     if text.startswith(SAMPLE):
         volume: Array = samples.load(text.removeprefix(SAMPLE)).image
         if volume.ndim != 4:
-            known = ", ".join(n for n in samples.names() if n.endswith("solid") or n in ("particles", "stripes"))
-            raise InvalidInput(f"{text}: is a picture; volumes are {known}")
+            known = ", ".join(n for n in samples.names() if is_solid(n))
+            raise InvalidInput(f"{text}: is an image; volumes are {known}")
     else:
-        volume = io.read_volume(text)
+        try:
+            volume = io.read_volume(text)
+        except FileError:
+            if (shape := find_image(text)) is None:
+                raise
+            message = f"{text}: is an image of {shape[1]} x {shape[0]}, but a volume is needed: {VOLUMES}"
+            raise FileError(f"{message}. texrs synthesize grows images") from None
     as_image(volume, text, axes=3)
     return volume
 
@@ -171,12 +192,12 @@ def read_target(text: str) -> Any:
     return values[..., :3]
 
 
-def read_field(text: str, size: tuple[int, ...]) -> Any:
+def read_field(text: str, about: About) -> Any:
     """Return the field that words describe, or that of the frames or directions in a file, over an output of a size."""
     from texrs import fields
 
-    with name_arguments(field="--field"):
-        return fields.as_field(turn_centre(text), len(size), size)
+    with name_arguments(field=about.option or "--field"):
+        return fields.as_field(turn_centre(text), len(about.size), about.size)
 
 
 def read_direction(text: str, about: About) -> Any:
@@ -186,7 +207,7 @@ def read_direction(text: str, about: About) -> Any:
     except ValueError:
         pass
     suffix = Path(text).suffix.lower()
-    return io.read(text) if suffix and suffix != ".npz" and "=" not in text else read_field(text, about.size)
+    return io.read(text) if suffix and suffix != ".npz" and "=" not in text else read_field(text, about)
 
 
 def read_entry(text: str, about: About) -> Any:

@@ -86,7 +86,7 @@ def analyse(
     seed : int
         Chooses the samples of the mixtures.
     corrections : sequence of dict, optional
-        What is put right in the end, as `texrs.elements.correct` does.
+        Corrections of the result (`texrs.elements.correct`).
     progress : callable or True, optional
         Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
 

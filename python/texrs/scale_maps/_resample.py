@@ -33,7 +33,7 @@ def resample(
     scale : array_like
         Shape (H, W): the map of the exemplar. ``"user"`` and ``"angles"`` do not look at it; it may be None there.
     size : (int, int) or int
-        Rows and columns of the output.
+        Size of the output in pixels (rows, columns); one number is a square.
     mode : {"stretch", "extend", "user", "angles"}
         ``"stretch"``: the same map, wider or narrower, linear in log S, with the borders on the borders.
         ``"extend"``: the map in the middle as it is, and beyond it the plane that it follows (`extend`); what is smaller

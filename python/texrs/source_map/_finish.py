@@ -46,7 +46,7 @@ class Finish:
     flatten : bool
         Whether uneven light is taken out of colours before they are looked up, see `texrs.materials.flatten`.
     within : (rows, columns) bool, optional
-        Correct only pixels that are True; all else keeps its values. None: everything.
+        Correct only marked pixels; all others keep their values. None: correct all.
     known : tuple of (h, w) bool, optional
         What of each exemplar may be looked at beyond a seam. None: everything.
     parts : (rows, columns) uint16, optional

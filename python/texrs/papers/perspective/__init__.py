@@ -89,14 +89,14 @@ def perspective(
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16.
     scale_map : (H, W) float array, Plane, "auto" or "front"
-        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). A `texrs.Plane`,
-        or its words ``"plane:slant=50,tilt=90,fov=60"``: those of a plane. "auto": those of the plane that is found in it
-        (`texrs.planes.find`), or else measured (`texrs.planes.measure`). "front": all alike.
+        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`).
+        `texrs.Plane` or its words ``"plane:slant=50,tilt=90,fov=60"`` give the sizes on a plane. "auto": those of the
+        plane that is found in it (`texrs.planes.find`), or else measured (`texrs.planes.measure`). "front": all alike.
     size : int or (int, int), optional
-        Rows and columns of the result, in pixels: by default those of the ``target``, else twice the exemplar's.
+        Size of the result in pixels: by default that of the ``target``, else twice the exemplar's.
     target : array or Plane, optional
         How large they are to be at each pixel of the result, in the units of ``scale_map``: a map (rows, columns); or a surface
-        that the texture is to lie on. A `texrs.Plane`, or its words: another plane, with elements of size 1 in its middle.
+        that the texture is to lie on. `texrs.Plane` or its words give another plane, with elements of size 1 in its middle.
         Normals (rows, columns, 3) of a curved surface, seen from far away. Coordinates (rows, columns, 2) on a surface, or
         Jacobians (rows, columns, 2, 2): for each pixel the step on the texture that a step in the picture is
         (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`, `texrs.Plane.jacobians`). One of
@@ -108,7 +108,7 @@ def perspective(
         What maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope; "area",
         square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
     fov : float, optional
-        Degrees that the longer side of the exemplar spans, 1 to 170; `texrs.planes.FOV` by default. How much a plane is
+        Degrees that the longer side of the exemplar spans, 1 to 170; 60 by default (`texrs.planes.FOV`). How much a plane is
         foreshortened besides what a scale map says; a ``target`` that is a surface, and ``direction``, need it. Not of a
         ``scale_map`` that is a plane, which has its own.
     direction : float, (rows, columns) array or Field, optional

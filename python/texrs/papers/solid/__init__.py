@@ -100,11 +100,10 @@ def solid(
         Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
         are labels and along which axes it repeats, which are measured otherwise.
     size : int or (int, int, int)
-        Planes, rows and columns of the result, in voxels.
+        Size of the result in voxels (planes, rows, columns); one number is a cube.
     field : Field, str, array_like or path_like, optional
-        How the texture is turned and scaled at each voxel (`texrs.fields`), with three axes: a field, its words, or
-        directions (P, R, C, 3) or frames (P, R, C, 3, 3), spread over the output, as an array or
-        a file; none leaves it as it is.
+        Frame field that turns and scales the texture at each voxel (`texrs.fields`); none leaves it as it is. A field, its
+        words, or directions (P, R, C, 3) or frames (P, R, C, 3, 3), spread over the output, as an array or a file.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
     wrap : bool or (bool, bool, bool), optional
@@ -128,7 +127,7 @@ def solid(
         Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
         sample whatever it says.
     memory_limit : int, optional
-        Bytes that the work may take; None is what `texrs.limits` allows.
+        Bytes that the work may take. None: all that the limits in force allow (`texrs.limits`).
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
         True shows a bar.
@@ -214,11 +213,10 @@ def synthesize(
         Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
         along which axes it repeats, which are measured otherwise.
     size : int or (int, int)
-        Rows and columns of the result, in pixels.
+        Size of the result in pixels (rows, columns); one number is a square.
     field : Field, str, array_like or path_like, optional
-        How the texture is turned and scaled at each pixel (`texrs.fields`), with two axes: a field, its words, or
-        directions (R, C, 2) or frames (R, C, 2, 2), spread over the output, as an array or
-        a file; none leaves it as it is.
+        Frame field that turns and scales the texture at each pixel (`texrs.fields`); none leaves it as it is. A field, its
+        words, or directions (R, C, 2) or frames (R, C, 2, 2), spread over the output, as an array or a file.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
     wrap : bool or (bool, bool), optional
@@ -246,7 +244,7 @@ def synthesize(
         Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
         sample whatever it says.
     memory_limit : int, optional
-        Bytes that the work may take; None is what `texrs.limits` allows.
+        Bytes that the work may take. None: all that the limits in force allow (`texrs.limits`).
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
         True shows a bar.

@@ -47,7 +47,7 @@ class PlaneTexture(Texture):
     cache_bytes : int
         Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
     memory_limit : int, optional
-        Bytes that one window may take; None is what `texrs.limits` allows.
+        Bytes that one window may take. None: all that the limits in force allow (`texrs.limits`).
 
     Raises
     ------
@@ -95,7 +95,7 @@ class SolidTexture(Texture):
     cache_bytes : int
         Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
     memory_limit : int, optional
-        Bytes that one window may take; None is what `texrs.limits` allows.
+        Bytes that one window may take. None: all that the limits in force allow (`texrs.limits`).
 
     Raises
     ------
