@@ -82,15 +82,15 @@ def test_maps_of_one_material_in_a_folder_of_several_are_one_job(here: Path, cap
         put(f"in/{name}_Roughness.png", IMAGE[..., 0])
     put("in/T_Rock_preview.png")
     put("in/photo.jpg")
-    put("in/bark_height.png", IMAGE[..., 0])
+    put("in/bark_normal.png")
     for number, inputs in enumerate((["in"], ["in/*"], sorted(map(str, Path("in").iterdir())))):
         assert main(["batch", "tile", *inputs, "-o", f"out{number}"]) == 0
         err = capsys.readouterr().err
         assert "5 of 5 results are there, 0 failed, 1 ignored parts of their inputs" in err
         assert err.count("T_Rock_preview.png") == 1
-        assert "in/bark_height.png: taken as an image of its own, though its name is that of a map (height)" in err
+        assert "bark_normal.png (assumed: in/bark_normal.png: read as colours" in err
         folders = {Path(name).parts[0] for name in made(f"out{number}")}
-        assert folders == {"T_Rock", "T_Moss", "T_Rock_Wet", "photo.jpg", "bark_height.png"}
+        assert folders == {"T_Rock", "T_Moss", "T_Rock_Wet", "photo.jpg", "bark_normal.png"}
         assert len(made(f"out{number}")) == 8
     # As the command makes it of the same files, and again from what a file says.
     one = "in/T_Moss_{BaseColor,Roughness}.png"
@@ -135,11 +135,11 @@ def test_each_job_shows_its_notices(here: Path, capsys: Capture, how: str | None
 def test_files_that_are_not_read_are_counted(here: Path, capsys: Capture) -> None:
     put("in/a.png")
     put("in/sub/b.png")
-    for name in ("notes.txt", "sub/Thumbs.db", *(f"sub/{k}.blend" for k in range(9))):
+    for name in ("notes.txt", "sub/Thumbs.db", "list.sbs", "sub/0.psb", *(f"sub/{k}.blend" for k in range(9))):
         Path("in", name).write_bytes(b"x")
     assert main(["batch", "tile", "in", "-o", "out"]) == 0
     err = capsys.readouterr().err
-    assert "in: 11 files not used, because the suffix is not that of a format: in/notes.txt, " in err
+    assert "in: 11 files not used, because the suffix is not that of a format: in/list.sbs, " in err
     assert " and 3 more" in err
     assert main(["batch", "tile", "in", "-o", "strict", "--strict"]) == 2
     assert not Path("strict").exists()

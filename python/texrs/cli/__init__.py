@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from texrs.cli._console import run, say, suggest
+from texrs.cli._console import NAMES, run, say, suggest
 
 __all__ = ["main"]
 
@@ -58,6 +58,7 @@ GROUPS: dict[str, dict[str, str]] = {
 }
 """All commands, and what they are for, as the help shows them."""
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
+NAMES.update(COMMANDS)
 
 
 def load(name: str) -> Callable[..., None]:

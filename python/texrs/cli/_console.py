@@ -44,6 +44,8 @@ ANY_SHAPE = re.compile(r"\([A-Za-z.]\w*,|\(\d+, [A-Za-z]")
 SPEAKS_OF_SIZES = re.compile(r"\b(?:pixels|voxels|sides?|sizes?|shapes?)\b")
 MOST_CHANNELS = 4
 """How errors speak of sizes."""
+NAMES: set[str] = set()
+"""Names of all commands."""
 PYTHON = {
     r"texrs\.io\.read_volume reads \w+(?: as a volume)?": "texrs slice and texrs solid take volumes",
     r"a mask, 'alpha', or an image that is a masked array": "a mask, or 'alpha'",
@@ -176,14 +178,12 @@ def name_commands(message: str) -> str:
     'texrs analyse takes a box'
 
     """
-    from texrs.cli import COMMANDS
-
     for python, words in PYTHON.items():
         message = re.sub(python, words, message)
 
     def turn(found: re.Match[str]) -> str:
         name = found[1].replace("_", "-")
-        return f"texrs {name}" if name in COMMANDS else found[0]
+        return f"texrs {name}" if name in NAMES else found[0]
 
     return re.sub(r"\btexrs\.(?:[a-z_]+\.)*([a-z_]+)\b", turn, message)
 

@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from texrs import io
-from texrs._notices import assume, ignore
+from texrs._notices import ignore
 from texrs.cli._outputs import SAMPLE
 from texrs.cli._provenance import expand_braces
 from texrs.errors import InvalidInput
 from texrs.io._files import find_suffix
 from texrs.io._formats import READ_IMAGES, READ_VOLUMES
 from texrs.materials import Role, guess_role
+from texrs.materials._files import DOCUMENTS, SYSTEM
 
 __all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
 
@@ -131,7 +132,8 @@ class _Found:
         read = [p for p in paths if p.lower().endswith(self.suffixes) or io.is_store(p)]
         # The suffix of a pattern may be one that is not known; the content of the file counts.
         read = read or ([] if os.path.isdir(text) else list(paths))
-        left = [p for p in paths if p not in set(read) and not (p.endswith(".json") and p[:-5] in set(paths))]
+        taken = {*read, *(p for p in paths if os.path.basename(p).lower() in SYSTEM or p.lower().endswith(DOCUMENTS))}
+        left = [p for p in paths if p not in taken]
         if left:
             ignore(
                 f"{text}: {_count(left, 'file')} not used, because the suffix is not that of a format: {_list(left)}"
@@ -170,7 +172,10 @@ class _Found:
             inside = os.path.normpath(folder or ".")
             above = os.path.dirname(os.path.relpath(inside, base)) if base != folder else ""
             name = os.path.basename(os.path.abspath(inside))
-            yield Source(folder, name, folder=above.removeprefix("."), maps=len(roles))
+            # A folder with other inputs in it is not read as a whole.
+            deeper = any(path.startswith(os.path.join(folder, "")) for path in self.files if path not in paths)
+            text = join_braces(paths) if deeper else folder
+            yield Source(text, name, folder=above.removeprefix("."), maps=len(roles))
             return
         taken = {path: key for key, own in materials.items() for path in own}
         for path in paths:
@@ -182,10 +187,6 @@ class _Found:
         for path in paths:
             key = taken.get(path)
             if key is None:
-                if path in roles and roles[path] is not Role.COLOUR:
-                    assume(
-                        f"{path}: taken as an image of its own, though its name is that of a map ({roles[path].value})"
-                    )
                 yield _name(path, self.files[path])
             elif key not in done:
                 done.add(key)
