@@ -209,7 +209,7 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
                     note(f"{where}: wrote {job.out}{one.show()}", quiet=quiet)
                 else:
                     failed[number] = said
-                    note(f"{where}: {job.source} failed", quiet=quiet)
+                    note(f"{where}: {job.source} failed{one.show()}", quiet=quiet)
     except (Stopped, KeyboardInterrupt, typer.Abort):
         complain(f"stopped after {over} of {total}; the same command goes on from there")
         raise
