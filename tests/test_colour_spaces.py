@@ -180,6 +180,19 @@ def test_values_that_integers_cannot_hold_are_reported(tmp_path: Path) -> None:
     assert io.read(tmp_path / "height.exr").tolist() == [[-2, 3]]
 
 
+@pytest.mark.parametrize("width", [2, 4, 5])
+@pytest.mark.parametrize("channels", [(), (3,), (4,)])
+def test_volumes_are_converted_too(width: int, channels: tuple[int, ...], tmp_path: Path) -> None:
+    """The last columns of a volume of one channel are not its transparency."""
+    light = RNG.uniform(0, 1, (6, 3, width, *channels)).astype(np.float32)
+    Material({"albedo": light}, axes=3).save(tmp_path, depth=8)
+    back = io.read_volume(tmp_path / "albedo.tif") / 255
+    colours = light[..., :3] if channels else light
+    assert np.abs((back[..., :3] if channels else back) - to_srgb(colours)).max() < 1 / 255
+    if channels == (4,):
+        assert np.abs(back[..., 3] - light[..., 3]).max() < 1 / 255
+
+
 def test_mipmaps_and_packed_maps_follow(tmp_path: Path) -> None:
     light = TRUTH[..., :3].astype(np.float32)
     material = Material({"albedo": light, "roughness": light[..., 0], "ao": light[..., 1]})

@@ -118,11 +118,13 @@ class Stack:
         while not there.exists():
             there = there.parent
         for name, each in self.list_maps(material).items():
-            file = f"{name}{self.suffix or choose_suffix(each, self.depth)}"
+            file = f"{name}{self.suffix or choose_suffix(each, self.depth, material.axes)}"
             _outputs.check_apart(read, {"out": os.path.join(out, file)})
             check_free(os.path.join(out, file))
             # Tried beside what is there, in the folder or where it will be made.
-            _outputs.check_output(str(there / f".texrs-{file}"), convert(name, each, self.depth).pixels, material.shape)
+            _outputs.check_output(
+                str(there / f".texrs-{file}"), convert(name, each, self.depth, material.axes).pixels, material.shape
+            )
 
     def list_maps(self, material: Material) -> Mapping[str, Map]:
         """Return the maps that are written."""

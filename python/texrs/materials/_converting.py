@@ -36,7 +36,7 @@ def choose_dtype(dtype: np.dtype[Any], depth: int | None) -> np.dtype[Any]:
     return np.dtype(np.float32 if depth == 32 else f"u{depth // 8}")
 
 
-def convert(name: str, each: Map, depth: int | None) -> Map:
+def convert(name: str, each: Map, depth: int | None, axes: int = 2) -> Map:
     """Return a map in a depth, and in the space that a reader of its dtype expects.
 
     Raises
@@ -52,7 +52,7 @@ def convert(name: str, each: Map, depth: int | None) -> Map:
     if each.role is Role.LABELS:
         made = keep_labels(name, pixels, dtype)
     elif space != each.space:
-        made = to_pixels(recode(name, each, space, dtype), dtype)
+        made = to_pixels(recode(name, each, space, dtype, axes), dtype)
     elif dtype.kind == "f":
         made = read_vectors(pixels, each.role) if pixels.dtype.kind == "i" else to_float(pixels, dtype)
     else:
@@ -69,18 +69,18 @@ def keep_labels(name: str, pixels: Array, dtype: np.dtype[Any]) -> Array:
     return pixels.astype(dtype)
 
 
-def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any]) -> Floats:
+def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any], axes: int) -> Floats:
     """Return values in the other space; alpha is a share in both."""
-    flat = each.pixels.ndim == 2
+    clear = each.pixels.shape[axes:] in ((2,), (4,))
     light = to_light(each.pixels, each.space)
-    if not flat and each.pixels.shape[-1] in (2, 4):
+    if clear:
         light[..., -1:] = to_light(each.pixels[..., -1:], "linear")
     if space == "linear":
         return light
     if dtype.kind != "f":
         report_cut(name, light)
     shown = encode_srgb(light)
-    if not flat and each.pixels.shape[-1] in (2, 4):
+    if clear:
         shown[..., -1] = light[..., -1]
     return shown
 

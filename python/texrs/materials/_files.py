@@ -227,7 +227,7 @@ def write_maps(
             raise FileError(f"{needed}: is not a folder")
     if suffix is not None:
         as_instance(suffix, "suffix", str)
-    endings = {name: suffix or choose_suffix(each, depth) for name, each in maps.items()}
+    endings = {name: suffix or choose_suffix(each, depth, axes) for name, each in maps.items()}
     write = io.write if axes == 2 else io.write_volume
     files: list[FilePath] = []
     small: list[FilePath] = []
@@ -237,18 +237,18 @@ def write_maps(
         for name, each in maps.items():
             files.append(place / f"{name}{endings[name]}")
             work.append((stack.enter_context(io.atomic(files[-1])), name, each))
-            for level, less in enumerate(halve(convert(name, each, depth), axes) if mipmaps else (), 1):
+            for level, less in enumerate(halve(convert(name, each, depth, axes), axes) if mipmaps else (), 1):
                 small.append(smaller / f"{name}.{level}{endings[name]}")
                 work.append((stack.enter_context(io.atomic(small[-1])), name, less))
         with SideBySide(AT_ONCE) as beside:
-            beside.do(lambda each, _: write(each[0], convert(each[1], each[2], depth).pixels), work)
+            beside.do(lambda each, _: write(each[0], convert(each[1], each[2], depth, axes).pixels), work)
     return files + small
 
 
-def choose_suffix(each: Map, depth: int | None) -> str:
+def choose_suffix(each: Map, depth: int | None, axes: int = 2) -> str:
     """Return the format that keeps a map as it is: PNG for 8 and 16 bit of up to four channels, TIFF or EXR for the rest."""
     shape, dtype = each.pixels.shape, choose_dtype(each.pixels.dtype, depth)
-    if len(shape) > 3 or (len(shape) == 3 and shape[-1] > 4):
+    if axes == 3 or (len(shape) == 3 and shape[-1] > 4):
         return ".tif"
     if dtype in (np.bool_, np.uint8, np.uint16):
         return ".png"
