@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from texrs._conversion import as_ndarray
+from texrs._masks import Mask
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.errors import TexrsError
@@ -68,21 +69,22 @@ def ask(kept: bool | None) -> Iterator[None]:
 def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) -> Palette | None:
     """Return the examples among the arguments of a verb, if its result has only their colours.
 
-    Arguments that ask for other colours turn this off.
+    A path among the arguments is replaced by the image in it. Arguments that ask for other colours turn this off.
     """
     asked, blend, how = _ASKED.get(), given.get("blend"), given.get("interpolation")
     # Values of other types are refused by the verb.
     wanted = isinstance(blend, int | float) and blend not in (0, usual.get("blend"))
     smooth = isinstance(how, str) and how not in ("nearest", usual.get("interpolation"))
-    if asked is False or wanted or smooth or given.get("flatten") is True:
+    fading = any(isinstance(value, Mask) and value.feather for value in given.values())
+    if asked is False or wanted or smooth or fading or given.get("flatten") is True:
         return None
     images: list[tuple[str, Array]] = []
     for name in names:
         value = given.get(name)
         if isinstance(value, str | os.PathLike):
             with suppress(TexrsError):
-                # The verb reads the file again, because only it knows whether nodata values are a hole.
-                value = as_ndarray(value, name, used=False)
+                # A verb that fills holes takes no pixel without data for a value.
+                value = given[name] = as_ndarray(value, name, used="hole" not in usual)
         images += [(name, image) for image in _list_images(value)]
     if not images or not all(image.ndim in (2, 3) and image.shape[2:] < (5,) for _, image in images):
         return None

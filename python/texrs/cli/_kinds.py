@@ -124,7 +124,7 @@ HOLE = Kind(
     read_hole,
     "nan: pixels that are NaN or infinite; nodata: the value that the file states; or a value.",
     file=True,
-    words=("alpha", "nan"),
+    words=("alpha", "nan", "nodata"),
 )
 MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs scale-map wrote.", file=True)
 SEEN = Kind(

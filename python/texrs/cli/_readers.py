@@ -141,12 +141,7 @@ def name_file(path: str) -> str:
 
 
 def read_hole(text: str, about: About) -> Any:
-    """Return a number, the nodata value that the first argument states, or the name of a file."""
-    if text == "nodata" and not os.path.exists(text):
-        value = io.read_notes(about.first).nodata
-        if value is None:
-            raise InvalidInput(f"{about.first}: states no nodata value; give the value, or nan")
-        return value
+    """Return a number, or the name of a file."""
     with suppress(ValueError):
         if not os.path.exists(text):
             return float(text)

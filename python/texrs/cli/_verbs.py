@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import wraps
@@ -76,7 +75,12 @@ def make_verb(name: str) -> Verb:
                 names=names | {"hole.marks": "hole"},
                 optional={"marks": ""},
             )
-            return Verb(options, says=lambda made: tell_filled(made) + tell_sizes(made), knows=read_nodata, fills=True, placed=True)
+            return Verb(
+                options,
+                says=lambda made: tell_filled(made) + tell_sizes(made),
+                fills=True,
+                placed=True,
+            )
         case "design":
             from texrs.papers.design import design, design_variants
 
@@ -136,16 +140,6 @@ def count_moved(result: Synthesis) -> str:
 def tell_filled(result: Synthesis) -> str:
     """Return the share of the image that is filled."""
     return f", {100 * result.report['filled']:.3g} % filled"
-
-
-def read_nodata(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the value for pixels without data that the image states, as the hole."""
-    image = given["image"]
-    value = None if given["hole_marks"] or image.startswith(_outputs.SAMPLE) else io.read_notes(image).nodata
-    if value is None:
-        return {}
-    assume(f"{os.path.basename(image)}: its pixels without data ({value:g}) are filled, because no hole is given")
-    return {("hole", "marks"): value}
 
 
 def tell_sizes(result: Synthesis) -> str:

@@ -17,6 +17,7 @@ from texrs._masks import Mask, adjust, as_marks, check_share, mark, name_marks
 from texrs._notices import assume
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
+from texrs.io import _origins, read_notes
 
 
 def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) -> tuple[Array, Bools]:
@@ -102,19 +103,28 @@ def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | N
     """Return which pixels have no value: those that are NaN or infinite in any channel, or nodata in all channels."""
     bad = ~np.isfinite(pixels) if pixels.dtype.kind == "f" else np.zeros(pixels.shape, np.bool_)
     missing = np.asarray(bad.any(axis=-1) if pixels.ndim > axes else bad, np.bool_)
+    path, stated = _find_nodata(image) if marks in (None, "nodata") else ("", None)
+    if marks == "nodata" and stated is None:
+        known = (
+            f"{path} states no nodata value" if path else "'nodata' needs an image of a file, which states the value"
+        )
+        raise InvalidInput(f"hole: {known}; give the value, or 'nan'")
+    value = math.nan if marks == "nan" else stated if marks in (None, "nodata") else _as_number(marks)
+    if value is not None and math.isfinite(value):
+        missing |= find_value(pixels, value, axes)
     if marks is None:
         if masked is None and not missing.any():
             raise InvalidInput(
                 "hole: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image must be a masked array or hold NaN"
             )
         if missing.any():
-            assume(f"image: {np.count_nonzero(missing)} pixels are NaN or infinite; they are filled")
+            what = "NaN or infinite" if stated is None else f"without data ({stated:g}), NaN or infinite"
+            assume(
+                f"{os.path.basename(path) or 'image'}: {np.count_nonzero(missing)} pixels are {what}; they are filled"
+            )
         return missing if masked is None else missing | masked
-    value = _read_nodata(image) if marks == "nodata" else math.nan if marks == "nan" else _as_number(marks)
-    if math.isfinite(value):
-        missing |= find_value(pixels, value, axes)
     if not missing.any():
-        what = f"is {value:g}" if math.isfinite(value) else "is NaN or infinite"
+        what = f"is {value:g}" if value is not None and math.isfinite(value) else "is NaN or infinite"
         raise InvalidInput(f"hole: no pixel of the image {what}, so there is nothing to fill")
     return missing
 
@@ -126,16 +136,11 @@ def _as_number(value: object) -> float:
         raise InvalidInput("hole: must be a number that a double can hold") from None
 
 
-def _read_nodata(image: object) -> float:
-    """Return the value that a file states for pixels without data."""
-    from texrs.io import read_notes
-
-    if not isinstance(image, str | os.PathLike):
-        raise InvalidInput("hole: 'nodata' needs the path of an image, whose file states the value; or give the value")
-    value = read_notes(image).nodata
-    if value is None:
-        raise InvalidInput(f"hole: {os.fspath(image)} states no nodata value; give the value, or 'nan'")
-    return value
+def _find_nodata(image: object) -> tuple[str, float | None]:
+    """Return the file of an image, and the value that it states for pixels without data."""
+    known = _origins.find(image) if isinstance(image, np.ndarray) else None
+    path = os.fspath(image) if isinstance(image, str | os.PathLike) else "" if known is None else known[0]
+    return path, read_notes(path).nodata if path else None
 
 
 def look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> Region:
