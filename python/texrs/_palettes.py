@@ -33,6 +33,10 @@ SPARE = 8
 """Number of pixels for each colour, at least: a small cut-out of a photograph has a colour for each pixel."""
 STEP, SHARE = 8, 0.75
 """Neighbours that differ do so by 8 of 255 levels, in three of four pairs. Smooth pictures have steps of 1 or 2 levels."""
+ENOUGH = 2**18
+"""Number of pixels, about, whose neighbours are compared: rows and columns that are spread over the picture."""
+CHUNK, MANY = 2**16, 2**12
+"""Pixels whose colours are listed at once, and number of colours from which one sort of all pixels is faster."""
 _ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
 """If True, any picture keeps its colours; if False, none. If None, indexed pictures and those of few colours do."""
 
@@ -94,7 +98,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
         kept = [_keeps(image, has_table) for (_, image), has_table in zip(images, indexed, strict=True)]
         if not all(kept):
             return None
-    tables = [np.unique(_pack(image)) for _, image in images]
+    tables = [_list_colours(image) for _, image in images]
     for (name, _), origin, table in zip(images, known, tables, strict=True):
         what = name if origin is None else origin[0]
         assume(f"{what}: {len(table)} colours, looked up to the nearest pixel and never corrected; see --no-palette")
@@ -115,12 +119,13 @@ def has_few_colours(image: Array) -> bool:
     """
     if image.dtype not in (np.uint8, np.uint16) or image.ndim not in (2, 3) or image.shape[2:] >= (5,):
         return False
-    if min(image.shape) == 0 or len(np.unique(_pack(image[: max(1, 2**14 // image.shape[1])]))) > MOST:
+    if min(image.shape) == 0:
         return False
-    if not 2 <= len(np.unique(_pack(image))) <= min(MOST, image.shape[0] * image.shape[1] // SPARE):
+    if not 2 <= len(_list_colours(image, MOST)) <= min(MOST, image.shape[0] * image.shape[1] // SPARE):
         return False
-    pixels = image.reshape(*image.shape[:2], -1).astype(np.int32)
-    steps = np.concatenate([np.abs(np.diff(pixels, axis=a)).max(axis=-1).ravel() for a in (0, 1)])
+    pixels, apart = image.reshape(*image.shape[:2], -1), max(1, image.shape[0] * image.shape[1] // ENOUGH)
+    lines = (pixels[::apart], pixels[:, ::apart].swapaxes(0, 1))
+    steps = np.concatenate([np.abs(np.diff(p.astype(np.int32), axis=1)).max(axis=-1).ravel() for p in lines])
     least = STEP * np.iinfo(image.dtype).max // 255
     return bool((steps >= least).sum() >= SHARE * (steps > 0).sum())
 
@@ -146,7 +151,7 @@ def _keeps(image: Array, indexed: bool) -> bool:
     if not indexed or image.dtype != np.uint8:
         return has_few_colours(image)
     grey = image.ndim == 2 or (image.shape[2] >= 3 and bool((image[..., :3] == image[..., :1]).all()))
-    return has_few_colours(image) or not (grey and len(np.unique(_pack(image))) > MOST)
+    return has_few_colours(image) or not (grey and len(_list_colours(image, MOST)) > MOST)
 
 
 def _list_images(value: object) -> Iterator[Array]:
@@ -160,12 +165,21 @@ def _list_images(value: object) -> Iterator[Array]:
             yield image
 
 
+def _list_colours(image: Array, most: int = MANY) -> Array:
+    """Return the colours of an image as numbers, each once; only some of them if there are more than ``most``."""
+    found, rows = _pack(image[:0]), max(1, CHUNK // max(image.shape[1], 1))
+    for first in range(0, image.shape[0], rows):
+        found = np.union1d(found, _pack(image[first : first + rows]))
+        if len(found) > most:
+            return found if most < MANY else np.unique(_pack(image))
+    return found
+
+
 def _pack(image: Array) -> Array:
     """Return the colours of pixels as one number each."""
     if image.ndim == 2:
         return image.ravel()
     flat = np.ascontiguousarray(image).reshape(-1, image.shape[2])
-    if image.dtype.itemsize > 2 or image.dtype.kind not in "bu":
-        return np.unique(flat, axis=0, return_inverse=True)[1].ravel()
-    weights = np.array([1 << 16 * k for k in range(image.shape[2])], np.uint64)
-    return flat.astype(np.uint64) @ weights
+    if image.dtype.kind in "bu" and image.dtype.itemsize <= 2:
+        return flat.astype(np.uint64) @ np.array([1 << 16 * k for k in range(image.shape[2])], np.uint64)
+    return flat.view(f"V{flat.itemsize * flat.shape[1]}").ravel()
