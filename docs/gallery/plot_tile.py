@@ -2,8 +2,8 @@
 A photograph without a seam
 ===========================
 
-What were the borders of a photograph is joined along the cuts that show least; the rest of it stays as it was. Laid twice by
-twice, the photograph shows its borders as a cross, and the tile shows none.
+The borders of a photograph are joined along the cuts that show least; the rest of the photograph stays where it was. Two by two
+copies of the photograph show its borders as a cross, and copies of the tile show none.
 """
 
 import matplotlib.pyplot as plt

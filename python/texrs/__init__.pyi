@@ -40,7 +40,7 @@ from .removal import remove
 from .source_map import Finish, Reuse, SourceMap
 from .synthesis import Gallery, Synthesis
 from .tile_set import TileSet
-from .tiling import tile
+from .tiling import Tiling, check_tiling, tile
 
 __all__ = [
     "Constraints",
@@ -61,10 +61,12 @@ __all__ = [
     "Synthesis",
     "TextureDatabase",
     "TileSet",
+    "Tiling",
     "View",
     "__version__",
     "apply",
     "blend",
+    "check_tiling",
     "complete",
     "design",
     "design_variants",

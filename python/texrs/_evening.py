@@ -27,6 +27,8 @@ BRIGHTEST = 1e15
 TURNS = 3
 """Of telling bright things from dark ones, and light from both."""
 BINS = 128
+LOOKED_AT = 256
+"""Pixels of the longer side that are enough to find how uneven light is."""
 STRIP = 1 << 20
 """Pixels that are brought into even light at a time."""
 
@@ -108,6 +110,17 @@ def flatten(
         shown = values if encoding == "srgb" else decode_srgb(values)
         made[part, :, :colours] = to_pixels(shown, pixels.dtype)
     return made.reshape(np.shape(image))
+
+
+def measure_unevenness(image: Array, space: Space | None = None) -> float:
+    """Return how many times brighter the best lit part of colours is than the worst lit part; 1: no evidence."""
+    pixels = as_image(image, "image")
+    step = max(1, max(pixels.shape[:2]) // LOOKED_AT)
+    few = pixels[::step, ::step]
+    usual: Space = "srgb" if few.dtype.kind in "ui" else "linear"
+    over = SHARE * min(few.shape[:2])
+    gains = measure(few, few.shape[-1] - (few.shape[-1] in (2, 4)), space or usual, over, (False, False))
+    return float(exp_single(np.asarray(np.ptp(gains))))
 
 
 def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[bool, bool]) -> Floats:

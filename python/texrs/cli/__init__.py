@@ -31,7 +31,8 @@ GROUPS: dict[str, dict[str, str]] = {
     },
     "Pictures": {
         "tiles": "Cut corner tiles from designs: an endless texture, of which any window is looked up.",
-        "tile": "Make a picture cyclic, so that copies side by side have no edge between them.",
+        "tile": "Make a picture tileable, so that copies side by side have no edge between them.",
+        "check": "Test whether a picture tiles along each axis, and how bold its borders are.",
         "complete": "Fill a hole in a picture with patches of what is known of it, or of another picture.",
         "extend": "Make a photograph of a plane larger, on any side, in the same perspective.",
         "rectify": "Make the flat texture of a plane that was photographed aslant.",
@@ -96,6 +97,10 @@ def load(name: str) -> Callable[..., None]:
             from texrs.cli import _rerun
 
             return _rerun.COMMANDS[name]
+        case "check":
+            from texrs.cli import _check
+
+            return _check.COMMAND
         case "compare":
             from texrs.cli import _compare
 

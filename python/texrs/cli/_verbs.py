@@ -82,10 +82,11 @@ def make_verb(name: str) -> Verb:
                 placed=True,
             )
         case "design":
+            from texrs.cli._check import tell_tiling
             from texrs.papers.design import design, design_variants
 
             options = Options(design, arguments={"exemplar": ENTRIES}, names={"elements": "element"})
-            return Verb(options, times=2, several=design_variants, beyond=TILES)
+            return Verb(options, times=2, several=design_variants, says=tell_tiling, beyond=TILES)
         case "perspective":
             from texrs.papers.perspective import perspective
 
@@ -127,9 +128,10 @@ def make_verb(name: str) -> Verb:
 
             return Verb(Options(self_splice, arguments={"a": ENTRY}), says=count_moved)
         case _:
+            from texrs.cli._check import tell_tiling
             from texrs.tiling import tile
 
-            return Verb(Options(tile, arguments={"image": EXAMPLE}), beyond=TILES)
+            return Verb(Options(tile, arguments={"image": EXAMPLE}), says=tell_tiling, beyond=TILES)
 
 
 def count_moved(result: Synthesis) -> str:

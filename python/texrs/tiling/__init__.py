@@ -1,21 +1,21 @@
-"""Any picture made cyclic: its outer edges meet inside, along cuts that show the least.
+"""Any picture made tileable: its opposite edges meet along cuts that show the least.
 
-J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.5. Along an
-axis the second half of the picture comes first and its first half second, so that what meets across the wrap are
-neighbours of the picture. The former edges overlap in the middle and are joined by a minimum cut.
+J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.5. There the
+halves of the picture are swapped, and its former edges overlap in the middle, where a minimum cut joins them.
 
 Departures, with their reasons:
 
-- The paper swaps the halves for columns, but prints them in order for rows, which would not be cyclic: here both swap.
-- The cut of the second axis lives on a cylinder and closes on itself. One that is cut open ends at two heights and
+- An axis along which the picture tiles already is left as it is.
+- The halves are not swapped back and forth: the cut lies at the border, and pixels far from it stay where they are.
+- The cut of the second axis lives on a cylinder and closes on itself. A cut that is open ends at two heights and
   opens the wrap of the first axis again.
-- The overlap is searched, up to seven sixteenths of the side, not fixed at 50 pixels. It is the period of the result: in
+- The overlap is searched, up to seven sixteenths of the side, not fixed at 50 pixels. It gives the period of the result: in
   brickwork few of them make the courses meet, and large stones can only be parted where they end. What is laid over each
   other must fit, which a cheap cut through plain ground does not say.
-- Where two cuts are about as cheap as one, what is shown around the former edges is taken from elsewhere in the picture,
-  and the result keeps the picture's size; not on a lattice, which goes on only where its period does.
+- Where two cuts cost little more than one, the former edges are covered from elsewhere in the picture,
+  and the result keeps the size of the picture.
 - A cut costs more the deeper inside elements it runs.
-- The picture is parted at a calm line near its middle, so that the border of the result does not follow an edge.
+- Uneven light is evened out first if there is evidence of it.
 - A result larger than the picture is a cyclic quilt of it; a lattice is stretched by as little as makes it close, as in
   `texrs.design`.
 """
@@ -28,8 +28,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_float, as_int, as_size, as_wrap, check_work
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_size, as_wrap, check_work
 from texrs._evening import flatten as even_light
+from texrs._notices import assume, collect
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Progress
 from texrs._verbs import takes_materials
@@ -39,12 +40,14 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.materials import Material
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
+from texrs.tiling._check import AXES, Tiling, check_tiling, find_tiled, report_tiling
 from texrs.tiling._extend import extend
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
-from texrs.tiling._maps import PIECES, find_calm_line, lay_out
-from texrs.tiling._things import SMALLEST, find_things
+from texrs.tiling._light import is_uneven
+from texrs.tiling._maps import PIECES, lay_out
+from texrs.tiling._things import SMALLEST, Things, find_things
 
-__all__ = ["tile"]
+__all__ = ["Tiling", "check_tiling", "tile"]
 
 SHARE, LEAST = 8, 25
 """An overlap that is chosen is at least the side divided by the one, or the other in pixels."""
@@ -52,12 +55,15 @@ LARGER = "texrs.TileSet makes an endless design, and gives it in parts"
 """How larger ones are made."""
 MOST = 7
 """Sixteenths of the side that it is at most."""
-LARGE = 0.22
-"""Elements larger than this share of a side are seldom whole between two cuts: their ends are not covered."""
-AXES = ("rows", "columns")
+REGULAR, DEAR = 1.0, 0.5
+"""How many times more a cut beside a cover may cost if elements are on a lattice, and if they are large or the length of the
+axis is not a multiple of their period."""
+PERIODIC = 3.0
+"""Share of the price of a cut that an overlap of the whole side would add, among multiples of a period."""
+ELEMENT = 0.22
+"""Elements larger than this share of a side are seldom whole between two cuts."""
 
 
-@takes_materials("image")
 def tile(
     image: Array | Exemplar | Material,
     *,
@@ -65,10 +71,12 @@ def tile(
     size: int | Sequence[int] | None = None,
     overlap: int | Sequence[int] | None = None,
     blend: float | None = None,
-    flatten: bool = False,
+    flatten: bool | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Make a picture cyclic: copies of the result side by side have no edge between them.
+    """Make a picture tileable: copies of the result side by side have no edge between them.
+
+    An axis along which the picture tiles already stays as it is. Pixels far from the border stay where they are.
 
     Parameters
     ----------
@@ -77,8 +85,8 @@ def tile(
     wrap : bool or (rows, columns), optional
         Axes along which the result repeats; None: both.
     size : int or (rows, columns), optional
-        Size of the result in pixels, at least 2 along an axis that wraps. By default the picture's, or less along an axis
-        where one cut between its ends shows clearly less than a cover of them. A result larger than the picture, at
+        Size of the result in pixels, at least 2 along an axis that wraps. By default the size of the picture, or less along an
+        axis where that shows clearly less: the report contains the reason. A result larger than the picture, at
         least 8 pixels a side, is a quilt of it, for which a lattice is stretched so that it closes.
     overlap : int or (rows, columns), optional
         How many pixels of two opposite edges are laid over each other, 1 to half the side, instead of a size. By
@@ -86,9 +94,10 @@ def tile(
     blend : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear: the smaller, the wider the
         correction. None or 0: no correction, so that each pixel is one of the picture. See `texrs.blend`.
-    flatten : bool
-        Whether uneven light is taken out first, as far as there is evidence of it: copies of a lawn that is lighter at one end
-        show bands. Of a material colours are flattened. See `texrs.materials.flatten`.
+    flatten : bool, optional
+        If True, uneven light is evened out first, as far as there is evidence of it. By default only if one part is lit at
+        least 1.6 times brighter than another part, and no side is shorter than 128 pixels. Of a material only colours
+        are flattened. See `texrs.materials.flatten`.
     progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
         True shows a bar.
@@ -99,8 +108,10 @@ def tile(
         The image, in the dtype and with the channels of the picture; an axis that does not wrap keeps its length, or that
         much of its middle that was asked for. The stages are ``"swapped"`` (the halves
         exchanged, nothing cut yet), ``"pieces"`` (which part of the picture each pixel is from) and ``"composite"``, the
-        result before ``blend``. The report names for each axis the overlap, 0 where the ends are covered, how many joints were
-        tried, and the cost of the cuts.
+        result before ``blend``. The report contains for each axis the overlap, 0 if the ends are covered, the number of joints
+        that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles. ``unchanged`` is
+        the share of the pixels that are those of the picture at the same place. ``resized`` is the reason for another size,
+        and ``tiling`` is what `texrs.check_tiling` finds in the result.
 
     Raises
     ------
@@ -124,43 +135,100 @@ def tile(
     True
 
     """
-    progress = listen(progress)
-    exemplar, cyclic = as_exemplar(image, "image"), as_wrap(wrap, usual=True)
-    evened = as_bool(flatten, "flatten")
-    if evened:
-        exemplar = as_exemplar(even_light(exemplar.image))
+    given = image if isinstance(image, Material) else as_exemplar(image, "image")
+    cyclic = as_wrap(wrap, usual=True)
+    pixels = as_image(given.base, "image") if isinstance(given, Material) else given.pixels
+    rows, columns = pixels.shape[:2]
+    wanted, weight = as_sides(size, (rows, columns), cyclic), as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    choices = as_choices(overlap, size is None, (rows, columns), wanted, cyclic)
+    check_work("tile", [pixels], wanted, "image" if size is None else "size", way=LARGER)
+    evened = None if flatten is None else as_bool(flatten, "flatten")
+    with collect() as notices:
+        free = [cyclic[a] and overlap is None and wanted == (rows, columns) for a in range(2)]
+        already = [] if evened else find_tiled(given, free)
+        if evened is None:
+            evened = len(already) < sum(cyclic) and is_uneven(given)
+        if evened:
+            even = given.flatten() if isinstance(given, Material) else as_exemplar(even_light(given.image))
+            already = find_tiled(even, free)
+            given = given if isinstance(given, Material) else even
+        if already:
+            along = " and ".join(AXES[a] for a in already)
+            assume(f"image: tiles already along the {along}, which are not changed")
+        made = join_edges(
+            given,
+            wrap=cyclic,
+            size=wanted,
+            choices=choices,
+            already=already,
+            weight=weight,
+            flatten=evened,
+            progress=listen(progress),
+        )
+    return replace(made, report=notices.add_to(made.report)) if notices else made
+
+
+tile.takes = ("image",)  # type: ignore[attr-defined]
+
+
+@takes_materials("image")
+def join_edges(
+    image: Array | Exemplar | Material,
+    *,
+    wrap: Sequence[bool],
+    size: tuple[int, int],
+    choices: Sequence[Choice],
+    already: Sequence[int],
+    weight: float,
+    flatten: bool,
+    progress: Progress | None,
+) -> Synthesis:
+    """Return a picture whose edges are joined along the axes that wrap, and do not tile ``already``.
+
+    ``flatten``: whether the picture is in even light, which it was not.
+    """
+    exemplar, watch = as_exemplar(image, "image"), progress or (lambda stage, share: None)
     shape = (exemplar.shape[0], exemplar.shape[1])
-    wanted, weight = as_sides(size, shape, cyclic), as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    choices = as_choices(overlap, size is None, shape, wanted, cyclic)
-    watch = progress or (lambda stage, share: None)
-    check_work("tile", [exemplar.pixels], wanted, "image" if size is None else "size", way=LARGER)
+    larger = any(n > m for n, m in zip(size, shape, strict=True))
     watch("segment", 0.0)
     found: dict[int, Joined] = {}
-    if any(n > m for n, m in zip(wanted, shape, strict=True)):
-        source, firsts = extend(exemplar.guidance, wanted, cyclic, watch), (0, 0)
+    reasons: dict[str, str] = {}
+    things = None if len(already) == sum(wrap) else find_things(exemplar.guidance)
+    if larger:
+        source = extend(exemplar.guidance, size, wrap, watch)
     else:
-        source, found, firsts = join_ends(exemplar.guidance, wanted, choices, cyclic, watch)
-    source = source.finished(cyclic, screening=weight or None, flatten=evened)
+        source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, watch)
+    weight = weight if found or larger else 0.0
+    source = source.finished(wrap, screening=weight or None, flatten=flatten)
     composite = source.render(exemplar.image)
     # The picture is in even light already.
     finish = None if source.finish is None else replace(source.finish, flatten=False)
     result = apply(source, exemplar.image, finish=finish, progress=progress) if weight else composite
     watch("done", 1.0)
     stages = {
-        "swapped": np.roll(exemplar.image, [-first for first in firsts], (0, 1)),
+        "swapped": np.roll(exemplar.image, [n // 2 if c else 0 for n, c in zip(shape, wrap, strict=True)], (0, 1)),
         "pieces": (source.label * 85 % 256).astype(np.uint8),
         "composite": composite,
     }
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
         "size": list(source.shape),
-        "wrap": list(cyclic),
+        "wrap": list(wrap),
         "blend": weight,
-        "flatten": evened,
+        "flatten": flatten,
+        "already": [AXES[a] for a in already],
+        "resized": reasons,
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
-        "joints": {AXES[a]: describe(joined, firsts[a]) for a, joined in found.items()},
+        "joints": {AXES[a]: describe(joined) for a, joined in found.items()},
+        "unchanged": round(measure_unchanged(source), 4),
+        "tiling": report_tiling(result, wrap, regular=things is not None and things.regular),
     }
     return Synthesis(result, source, stages, report)
+
+
+def measure_unchanged(source: SourceMap) -> float:
+    """Return the share of the pixels that come from the same place of the picture."""
+    return float((source.coordinates == np.moveaxis(np.indices(source.shape, np.float32), 0, -1)).all(axis=-1).mean())
 
 
 def as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tuple[int, int]:
@@ -213,9 +281,18 @@ def _choose(side: int, wanted: int, free: bool) -> Choice:
 
 
 def join_ends(
-    colours: Floats, wanted: tuple[int, int], choices: Sequence[Choice], wrap: Sequence[bool], watch: Progress
-) -> tuple[SourceMap, dict[int, Joined], tuple[int, int]]:
-    """Return the map of a picture no larger than it, the joints of its axes, and which lines of it come first."""
+    colours: Floats,
+    things: Things | None,
+    wanted: tuple[int, int],
+    choices: Sequence[Choice],
+    wrap: Sequence[bool],
+    already: Sequence[int],
+    watch: Progress,
+) -> tuple[SourceMap, dict[int, Joined], dict[str, str]]:
+    """Return the map of a picture no larger than it, the joints of its axes, and the reasons for another length.
+
+    ``already``: axes along which the picture tiles.
+    """
     shape = (colours.shape[0], colours.shape[1])
     # Of more than can be laid over each other the middle is taken.
     kept = [min(n, 2 * m) if cyclic else m for n, m, cyclic in zip(shape, wanted, wrap, strict=True)]
@@ -224,41 +301,57 @@ def join_ends(
     # What each pixel shows: which pixel of the picture, and which piece of it.
     place = np.arange(shape[0] * shape[1]).reshape(shape)[part]
     label: NDArray[np.uint32] = np.zeros(place.shape, np.uint32)
-    things = find_things(colours)
-    shown, depth = colours[part], things.depth[part]
     found: dict[int, Joined] = {}
-    firsts = [0, 0]
+    reasons: dict[str, str] = {}
     # Columns before rows, as in the paper.
     for axis in (1, 0):
-        if not wrap[axis]:
+        if not wrap[axis] or axis in already or things is None:
             continue
-        if found:
-            shown = colours.reshape(-1, colours.shape[-1]).take(place, axis=0)
-            depth = things.depth.take(place)
+        shown = colours.reshape(-1, colours.shape[-1]).take(place, axis=0) if found else colours[part]
+        depth = things.depth.take(place) if found else things.depth[part]
+        choice = choices[axis]
+        if things.side > ELEMENT * place.shape[axis]:
+            choice = replace(choice, covered=DEAR)
+        elif things.is_out_of_step(axis, place.shape[axis]):
+            # Any multiple of the period fits: the largest one is wanted.
+            choice = replace(choice, covered=DEAR, loss=PERIODIC)
+        elif things.regular:
+            choice = replace(choice, covered=REGULAR)
         joined = find_joint(
             make_levels(shown, depth),
             axis,
-            # Ends that are covered keep the picture's length, which no lattice has but by chance.
-            choices[axis].without_cover(things.regular or things.side > LARGE * place.shape[axis]),
-            closed=bool(found),
+            choice,
+            closed=bool(found) or 1 - axis in already,
             progress=lambda share, axis=axis: watch(f"join {AXES[axis]}", share),  # type: ignore[misc]
         )
-        first = find_calm_line(shown, axis, joined)
-        line, piece = lay_out(place.shape[1 - axis], joined, first)
+        line, piece = lay_out(place.shape[1 - axis], joined)
         line, piece = np.moveaxis(line, 0, axis), np.moveaxis(piece, 0, axis)
         place = np.take_along_axis(place, line, axis)
         label = np.take_along_axis(label, line, axis) * np.uint32(len(PIECES)) + piece if found else piece
-        found[axis], firsts[axis] = joined, first + corner[axis]
+        found[axis] = joined
+        if choice.period and not joined.joint.cover:
+            reasons[AXES[axis]] = give_reason(joined, things, axis, shape[axis])
     coordinates = np.stack(np.divmod(place, shape[1]), axis=-1).astype(np.float32)
-    return SourceMap.from_coordinates(coordinates, shape, label=label), found, (firsts[0], firsts[1])
+    return SourceMap.from_coordinates(coordinates, shape, label=label), found, reasons
 
 
-def describe(joined: Joined, first: int) -> dict[str, object]:
+def give_reason(joined: Joined, things: Things, axis: int, side: int) -> str:
+    """Return why an axis became shorter."""
+    length, period = joined.joint.period, things.find_period(axis)
+    if times := things.count_periods(axis, length):
+        return f"{side} -> {length} pixels: {times} whole periods of {period:.1f}"
+    if things.side > ELEMENT * side:
+        return f"{side} -> {length} pixels: elements are large, and fewer are cut at this length"
+    if things.is_out_of_step(axis, side):
+        return f"{side} -> {length} pixels: the period of {period:.1f} does not divide {side}"
+    return f"{side} -> {length} pixels: a joint that keeps the length costs {joined.dearer:.1f} times as much"
+
+
+def describe(joined: Joined) -> dict[str, object]:
     """Return what was done at one axis."""
     joint, edges = joined.joint, sum(cut.edges for cut in joined.cuts)
     cost = sum(cut.value for cut in joined.cuts)
     return {
-        "split": first,
         "overlap": 0 if joint.cover else joint.width,
         "cover": joint.cover,
         "joints_tried": joined.tried,

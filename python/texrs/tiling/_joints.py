@@ -24,10 +24,10 @@ FOLLOWED = 3
 """Joints that are followed from the coarsest level to the next, of which one goes on."""
 APART = 2
 """Pixels of the coarsest level by which they differ at least."""
-LOSS = 0.5
-"""What an overlap of the whole side would add to the price of its cut, as a share of it: what is overlapped is lost."""
-COVERED = 1.1
-"""How many times more a cut beside a cover may cost, where there are two of them but nothing is lost."""
+LOSS = 1.5
+"""Share of the price of a cut that an overlap of the whole side would add: what is overlapped is lost."""
+COVERED = 1.6
+"""How many times more a cut beside a cover may cost than the cut of an overlap: there are two cuts, but nothing is lost."""
 BAND = 4
 """Either cut of a cover is made in the side divided by this."""
 NEAR = 6
@@ -95,10 +95,10 @@ class Choice:
     high: int
     period: int = 0
     """The length of what is covered; 0: no cover."""
-
-    def without_cover(self, large: bool) -> Choice:
-        """Return the choice without a cover of ``large`` things, where there is another."""
-        return Choice(self.low, self.high) if large and self.high >= self.low else self
+    covered: float = COVERED
+    """How many times more a cut beside a cover may cost than the cut of an overlap."""
+    loss: float = LOSS
+    """Share of the price of a cut that an overlap of the whole side would add."""
 
     def coarsen(self, times: int, side: int) -> Choice:
         """Return the choice at a level of ``side``, halved so many times."""
@@ -106,7 +106,7 @@ class Choice:
             return self
         low = max(1, (self.low >> times) - 1)
         high = min((self.high >> times) + 1, side // 2) if self.high >= self.low else low - 1
-        return Choice(low, high, min(self.period >> times, side))
+        return replace(self, low=low, high=high, period=min(self.period >> times, side))
 
     def list_joints(self, side: int) -> list[Joint]:
         """Return all joints; those that lose nothing come first."""
@@ -124,6 +124,8 @@ class Joined:
     factor: float = 1.0
     """What the joint's price is multiplied by, besides the cost of its cuts."""
     tried: int = 1
+    dearer: float = 1.0
+    """How many times more the best joint that keeps the length costs, at the coarsest level."""
 
     @property
     def price(self) -> float:
@@ -158,11 +160,13 @@ def find_joint(
     cuts = cut_joints(levels[0], axis, all_joints)
     misfits = np.array([measure_misfit(levels[0], axis, joint) for joint in all_joints])
     usual = float(np.median(misfits)) or 1.0
+    # Where a seam runs through plain ground its cost does not say that a course or a lattice is out of step.
+    costs = misfits / usual * [sum(each.value for each in cut) / len(cut) for cut in cuts]
+    whole = min((cost for joint, cost in zip(all_joints, costs, strict=True) if joint.cover), default=0.0)
     found = []
-    for joint, cut, misfit in zip(all_joints, cuts, misfits.tolist(), strict=True):
-        loss = 1 / COVERED if joint.cover else 1 + LOSS * joint.width / sides[0]
-        # Where a seam runs through plain ground its cost does not say that a course or a lattice is out of step.
-        found.append(Joined(joint, cut, loss * misfit / usual, len(all_joints)))
+    for joint, cut, misfit, cost in zip(all_joints, cuts, misfits.tolist(), costs.tolist(), strict=True):
+        loss = 1 / choice.covered if joint.cover else 1 + choice.loss * joint.width / sides[0]
+        found.append(Joined(joint, cut, loss * misfit / usual, len(all_joints), whole / cost if cost else 1.0))
     best = _spread(found, FOLLOWED if last else 1)
     if closed:
         # Seams that close cost little more, and take longer.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texrs._typing import Floats
 from texrs.exemplar.segmentation import segment
@@ -14,6 +15,12 @@ REACH = 3.0
 """Depth in pixels of the coarsest level from which on all of an element is as deep."""
 CLOSE = 0.5
 """Share of the picture that elements on a lattice cover from which on they lie close: seams then need not keep to joints."""
+STEPS, ASLANT = 4, 0.08
+"""Multiples of the shifts of a lattice among which a period is looked for, and the largest slope of a shift along an axis."""
+STRICT = 0.45
+"""Correlation of a picture with itself from which on a lattice is strict."""
+WHOLE = 0.2
+"""Part of a period by which a length may differ from a multiple of it."""
 SMALLEST = 8
 """A picture of fewer pixels a side has no elements, and no patches of a quilt."""
 
@@ -26,8 +33,34 @@ class Things:
     """(H, W): how deep inside an element each pixel is, 0 to 1; 0 where none stand out."""
     side: float = 0.0
     """What the element at a pixel of one measures on the average, in pixels."""
-    regular: bool = False
-    """Whether they lie on a lattice."""
+    lattice: NDArray[np.float64] | None = None
+    """Two shifts as columns (2, 2), in pixels of the picture, by which it repeats; None if it does not."""
+    strict: bool = False
+    """Whether the lattice is so regular that a length must be a multiple of its period."""
+
+    @property
+    def regular(self) -> bool:
+        """Whether the elements lie on a lattice."""
+        return self.lattice is not None
+
+    def find_period(self, axis: int) -> float:
+        """Return the length of the shortest shift along an axis, in pixels; 0 if there is none."""
+        if self.lattice is None:
+            return 0.0
+        steps = np.stack(np.meshgrid(*(np.arange(-STEPS, STEPS + 1),) * 2), axis=-1).reshape(-1, 2)
+        shifts = steps @ self.lattice.T
+        along = shifts[(shifts[:, axis] > 0) & (np.abs(shifts[:, 1 - axis]) <= ASLANT * shifts[:, axis]), axis]
+        return float(along.min()) if len(along) else 0.0
+
+    def count_periods(self, axis: int, length: int) -> int:
+        """Return the number of periods in a length of an axis; 0 if it is not a multiple of the period."""
+        period = self.find_period(axis)
+        times = round(length / period) if period else 0
+        return times if abs(length - times * period) <= WHOLE * period else 0
+
+    def is_out_of_step(self, axis: int, length: int) -> bool:
+        """Return whether a length must be a multiple of the period of an axis and is not."""
+        return self.strict and self.find_period(axis) > 0 and not self.count_periods(axis, length)
 
 
 def find_things(colours: Floats) -> Things:
@@ -36,12 +69,15 @@ def find_things(colours: Floats) -> Things:
     if min(colours.shape[:2]) < SMALLEST:
         return nothing
     parts = segment(make_levels(colours, nothing.depth)[0].colours)
-    regular, close = parts.lattice is not None, (parts.elements > 0).mean() > CLOSE
+    scale = len(colours) / len(parts.elements)
+    lattice = None if parts.lattice is None else scale * parts.lattice.vectors
+    strict = parts.lattice is not None and parts.lattice.correlation >= STRICT
+    close = (parts.elements > 0).mean() > CLOSE
     # The joints between bricks go on across every seam: one that kept to them would show.
-    if parts.kind != "components" or (regular and close):
-        return replace(nothing, regular=regular)
+    if parts.kind != "components" or (lattice is not None and close):
+        return replace(nothing, lattice=lattice, strict=strict)
     depth = parts.measure_depth(REACH)
     rows, columns = (np.arange(n) * m // n for n, m in zip(colours.shape, depth.shape, strict=False))
     area = np.bincount(parts.elements.ravel())[1:].astype(np.float64)
-    side = np.sqrt((area**2).sum() / area.sum()) * len(colours) / len(depth)
-    return Things(np.ascontiguousarray(depth[rows][:, columns]), float(side), regular)
+    side = np.sqrt((area**2).sum() / area.sum()) * scale
+    return Things(np.ascontiguousarray(depth[rows][:, columns]), float(side), lattice, strict)

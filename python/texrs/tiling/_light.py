@@ -1,0 +1,50 @@
+"""Whether the light of a picture is evened before it is made tileable, if nobody decides it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from texrs._arrays import as_image, to_unit
+from texrs._colours import Space
+from texrs._evening import BRIGHTEST, measure_unevenness
+from texrs._notices import assume
+from texrs._typing import Array
+from texrs.exemplar import Exemplar
+from texrs.materials import Material, Role
+
+UNEVEN, SMALL = 1.6, 128
+"""How many times brighter the best lit part is than the worst lit part, and the least side in pixels: of less, content that
+differs by chance looks the same. Of crops of textures in even light 0 of 81 are taken for lit unevenly, of others 4 of 89."""
+SHORT = 0.05
+"""Normals are vectors whose length differs from 1 by at most this, on the average."""
+STEP = 4
+"""One of so many pixels along each axis shows whether an image contains normals."""
+
+
+def is_uneven(image: Exemplar | Material) -> bool:
+    """Return whether there is evidence that a picture, or colours of a material, are lit unevenly, and report it."""
+    if isinstance(image, Exemplar):
+        return _is_lit_unevenly(image.image)
+    return any(_is_lit_unevenly(each.pixels, each.space) for each in image.values() if each.role is Role.COLOUR)
+
+
+def _is_lit_unevenly(image: Array, space: Space | None = None) -> bool:
+    pixels = as_image(image)
+    colours = pixels.dtype == np.uint8 or (pixels.shape[-1] >= 3 and pixels.dtype.kind in "uf")
+    # Grey levels of more bits are heights as often, and normals are not lit.
+    if (
+        not colours
+        or min(pixels.shape[:2]) < SMALL
+        or (pixels.dtype.kind == "f" and not 0 <= pixels.min() <= pixels.max() <= BRIGHTEST)
+    ):
+        return False
+    if pixels.shape[-1] == 3:
+        lengths = np.sqrt(np.square(to_unit(pixels[::STEP, ::STEP]) * 2 - 1).sum(axis=-1))
+        if np.abs(lengths - 1).mean() < SHORT:
+            return False
+    times = round(measure_unevenness(pixels, space), 2)
+    if times >= UNEVEN:
+        assume(
+            f"image: is lit unevenly, one part {times:g} times brighter than another part; its light is evened out first"
+        )
+    return times >= UNEVEN
