@@ -70,7 +70,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         orientation = int(tag.value) if tag is not None and tag.value in range(1, 9) else 1
         _report_others(path, tif, series)
         if first.photometric == _SEPARATED or first.compression not in tifffile.TIFF.DECOMPRESSORS:
-            return _part_alpha(path, _read_otherwise(path, series, sides, channels, limit), first), orientation
+            return _read_otherwise(path, series, sides, channels, limit), orientation
         _check_unfolded(path, tif.filehandle, series)
         try:
             array = series.asarray(maxworkers=1)
@@ -80,7 +80,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
             reasons = ("imagecodecs", "INSUFFICIENT_SPACE")
             if not isinstance(error, ImportError) and not any(reason in str(error) for reason in reasons):
                 raise
-            return _part_alpha(path, _read_otherwise(path, series, sides, channels, limit), first), orientation
+            return _read_otherwise(path, series, sides, channels, limit), orientation
         if array.shape != series.shape:
             raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
         order = [a for a in series.axes if a not in "YXSC"] + [a for a in "YXCS" if a in series.axes]
@@ -97,17 +97,20 @@ def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channe
     compiled = plain and first.compression == _LZW and series.dtype in _image_io.OF_TIFF
     # The compiled decoder is quiet about corrupt strips, but does not know all tiles.
     if compiled and not first.is_tiled and (channels > 1 or series.dtype.kind == "u"):
-        return _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels)
+        return _part_alpha(path, _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels), first)
     with suppress(FileError, OSError, ValueError, SyntaxError, TypeError, KeyError):
         if set(first.axes) <= set("YXS") and len(pages) == prod(size[a] for a in outer):
             array = _pillow.read_pages(path, series.dtype, sides[1:], pages)
             array = array.reshape(*(size[a] for a in outer), *array.shape[1:])
             if "C" in outer:
                 array = np.moveaxis(array, outer.index("C"), -2)
-            return np.ascontiguousarray(array.reshape(*sides, -1))
+            # Pillow has divided the colours by an associated alpha.
+            return _part_alpha(path, np.ascontiguousarray(array.reshape(*sides, -1)), first, divided=True)
     with suppress(FileError):
         if compiled:
-            return _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels)
+            return _part_alpha(
+                path, _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels), first
+            )
     scheme = getattr(first.compression, "name", first.compression)
     colours = getattr(first.photometric, "name", first.photometric)
     raise FileError(
@@ -294,11 +297,13 @@ def _apply_colours(path: Path, array: Array, page: Any) -> Array:
     raise FileError(f"{path}: holds {name} colours of {array.dtype}; grey, RGB and palettes are read")
 
 
-def _part_alpha(path: Path, array: Array, page: Any) -> Array:
+def _part_alpha(path: Path, array: Array, page: Any, *, divided: bool = False) -> Array:
     """Return colours that are not multiplied by alpha, which is how all other files and verbs have them."""
     if array.shape[-1] not in (2, 4) or tuple(page.extrasamples) != (_ASSOCIATED,) or array.dtype.kind not in "uf":
         return array
     assume(f"{path.name}: colours are divided by alpha, because the file has them multiplied by it (associated alpha)")
+    if divided:
+        return array
     most = np.iinfo(array.dtype).max if array.dtype.kind == "u" else 1
     alpha = array[..., -1:].astype(np.float64)
     colours = array[..., :-1] * np.divide(most, alpha, out=np.ones_like(alpha), where=alpha > 0)
