@@ -239,6 +239,15 @@ def test_a_feathered_filling_fades_into_the_image() -> None:
     assert np.isin(texrs.apply(made.source, labels, kind="label"), labels).all()
 
 
+def test_feather_asks_for_colours_between_those_of_a_palette() -> None:
+    checks = np.where((ROWS // 8 + COLUMNS // 8) % 2, 200, 40).astype(np.uint8)
+    assert "palette" in texrs.complete(checks, WHITE).report
+    faded = texrs.complete(checks, Mask(WHITE, feather=6))
+    assert "palette" not in faded.report
+    assert faded.source.finish is not None
+    assert faded.source.finish.fade is not None
+
+
 def test_feathered_normals_keep_their_length_and_the_map_its_fade(tmp_path: Path) -> None:
     made = texrs.complete(BRICKS, Mask(WHITE, feather=8))
     made.source.save(tmp_path / "map.npz")
