@@ -79,6 +79,14 @@ MASKS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: np.dstack([WHITE] * 3 + [np.where(COLUMNS < 90, 255, 0).astype(np.uint8)]),
         "read as a mask in black and white with transparent parts",
     ),
+    "the picture itself with the hole erased": (
+        lambda: np.dstack([samples.load("pebbles", size=SIZE).image, 255 - WHITE]),
+        "read as a picture with a transparent part, which is marked",
+    ),
+    "a plain layer over much of the picture": (
+        lambda: Mask(as_layer((9, 9, 9), 255 - WHITE), invert=True),
+        "as a layer",
+    ),
     "picture of PIL": (lambda: Image.fromarray(WHITE), ""),
     "one bit of PIL": (lambda: Image.fromarray(WHITE).convert("1"), ""),
     "inverted": (lambda: Mask(255 - WHITE, invert=True), ""),
@@ -121,7 +129,7 @@ def test_threshold_and_grey() -> None:
     soft = np.rint(255 * np.clip((30 - FAR) / 30, 0, 1)).astype(np.uint8)
     usual, said = read(soft)
     np.testing.assert_array_equal(usual, soft >= 128)
-    assert "dark grey, which is not marked" in said[0]
+    assert "less than half white or opaque, so not marked" in said[0]
     for share in (0.0, 0.1, 0.9, 1.0):
         marked, said = read(Mask(soft, threshold=share))
         np.testing.assert_array_equal(marked, (soft >= share * 255) & (soft > 0))

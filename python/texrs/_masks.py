@@ -32,6 +32,8 @@ GREY, LEAST_GREY = 1 / 16, 0.01
 """Share of white above which a pixel is grey, and share of all pixels from which unmarked grey is reported."""
 TWO = 0.1
 """Share of the pixels other than 0 that may lie between the two values of a mask: edges, and noise of JPEG."""
+PLAIN = 0.25
+"""Share of the opaque pixels of a layer that have the same brightness, at least: a stroke is plain, and a picture is not."""
 MUCH = 0.5
 """Share of an image above which a mask is probably inverted."""
 FARTHEST = 4096
@@ -194,7 +196,7 @@ def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:
         cut = HALF * white
         grey = float(np.mean((levels > GREY * white) & (levels < cut)))
         if mask.threshold is None and grey >= LEAST_GREY:
-            assume(f"{called}: {100 * grey:.0f} % is dark grey, which is not marked (a smaller threshold marks it)")
+            assume(f"{called}: {100 * grey:.0f} % is less than half white or opaque, so not marked (see --threshold)")
     if mask.threshold is not None:
         cut = mask.threshold * white
     return np.asarray((levels >= cut) & (levels > 0))
@@ -208,6 +210,12 @@ def _look_through(levels: Array, alpha: Array, called: str) -> Array:
     if min(dark, light) >= LEAST_GREY and dark + light >= 1 - TWO:
         assume(f"{called}: read as a mask in black and white with transparent parts, which are not marked")
         return np.where(alpha >= HALF * full, levels, 0).astype(levels.dtype)
+    if (
+        seen.size > MUCH * alpha.size
+        and np.bincount(np.rint(255 * seen.clip(0, 1)).astype(np.intp)).max() < PLAIN * seen.size
+    ):
+        assume(f"{called}: read as a picture with a transparent part, which is marked")
+        return np.where(alpha < full, full, 0).astype(alpha.dtype)
     assume(f"{called}: read as a layer, because its transparency varies; its opaque pixels are marked")
     return alpha
 
