@@ -34,6 +34,7 @@ def takes_folder(command: str, parameter: Any) -> bool:
 
 
 FOLDERS = [(command, p.name) for command, p in PARAMETERS if takes_folder(command, p)]
+MASKS = [(command, p.name) for command, p in PARAMETERS if re.match("Mask of|Measure in a mask of", p.help or "")]
 POINTS = [(command, p.name) for command, p in PARAMETERS if "csv" in (p.metavar or "")]
 
 
@@ -124,6 +125,21 @@ def test_assumptions_are_shown(here: Path, capsys: Capture, command: str, name: 
     main(make_words(command, name, "rock"))
     said = capsys.readouterr()
     assert "blocks.png read as" in said.err + said.out
+
+
+@pytest.mark.parametrize(("command", "name"), MASKS)
+def test_masks_that_mark_nothing_are_refused(here: Path, capsys: Capture, command: str, name: str) -> None:
+    io.write("empty.png", np.zeros((64, 96), np.uint8))
+    place = next(p for p in GROUP.get_command(None, command).params if p.name == name)
+    words = ["out.tif" if word == "made" else word for word in make_words(command, name, "empty.png")]
+    if place.param_type_name == "option":
+        words = ["in.png" if word == "empty.png" else word for word in words]
+    if command == "database":
+        words = ["database", "db", "add", "in.png", "--mask", "empty.png"]
+    elif command == "scale-map":
+        words = [word for word in words if word not in ("--slant", "20")]
+    assert main(words) == 2, capsys.readouterr().err
+    assert "empty.png" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("command", "name"), POINTS)

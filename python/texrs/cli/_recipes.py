@@ -235,8 +235,9 @@ def place_arguments(recipe: Recipe, parameters: Sequence[Any]) -> Recipe:
     options, arguments = dict(recipe.options), list(recipe.arguments)
     flags = {flag.lstrip("-") for p in parameters for flag in p.opts if p.param_type_name == "option"}
     for place, p in enumerate(q for q in parameters if q.param_type_name == "argument"):
-        if p.name in options and p.name not in flags and place == len(arguments):
-            arguments.append(str(options.pop(p.name)))
+        name = (p.metavar or p.name).lower()
+        if name in options and name not in flags and place == len(arguments):
+            arguments.append(str(options.pop(name)))
     return replace(recipe, arguments=arguments, options=options)
 
 
