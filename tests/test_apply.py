@@ -160,7 +160,7 @@ def test_a_material_takes_labels_without_a_role_and_says_so(tmp_path: Path, caps
     (place / "rock_small.png").unlink()
     assert main(words) == 0
     assert "read as labels" in json.loads((tmp_path / "s" / "report.json").read_text())["assumed"][0]
-    assert set(np.unique(io.read(out / "pieces.png"))) <= set(np.unique(IDS))
+    assert set(np.unique(io.read(out / "rock_pieces.png"))) <= set(np.unique(IDS))
     assert main(["rerun", str(out)]) == 0
     io.write(place / "rock_pieces.png", IDS[::-1])
     assert main(["rerun", str(out)]) == 2

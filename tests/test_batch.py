@@ -318,15 +318,17 @@ def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> Non
     for inputs in (["stacks/*"], ["stacks"]):
         assert main([*words, *inputs]) == 0, capsys.readouterr().err
         made = sorted(str(p.relative_to(here)) for p in Path("made").resolve().rglob("*.png"))
-        assert made == [f"made/{n}-{s}/{m}.png" for n in ("moss", "rock") for s in (0, 1) for m in ("albedo", "height")]
+        assert made == [
+            f"made/{n}-{s}/{n}_{m}.png" for n in ("moss", "rock") for s in (0, 1) for m in ("albedo", "height")
+        ]
     # The second time all was there.
     assert capsys.readouterr().err.count("is there") == 4
     assert main([*words, "stacks", "--sheet", "sheet.png", "-q"]) == 0
-    assert io.read("made/rock-0/height.png").dtype == np.uint16
+    assert io.read("made/rock-0/rock_height.png").dtype == np.uint16
     assert io.read("sheet.png").std() > 5
     # What was lost or changed since is made again, and nothing else.
     whole = files(here)
-    Path("made/rock-1/height.png").unlink()
+    Path("made/rock-1/rock_height.png").unlink()
     capsys.readouterr()
     assert main([*words, "stacks"]) == 0
     assert capsys.readouterr().err.count("is there") == 3

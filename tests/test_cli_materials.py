@@ -35,19 +35,19 @@ def files(folder: Path) -> dict[str, bytes]:
 def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["design", "rock", "-o", "new", *SIZE, "--seed", "3", "--preview", "lit.png", "--map", "map.npz"]
     assert main([*words, "--role", "rock_wet.png=other"]) == 0
-    assert sorted(p.name for p in Path("new").iterdir()) == ["albedo.png", "height.png", "wet.png"]
+    assert sorted(p.name for p in Path("new").iterdir()) == ["rock_albedo.png", "rock_height.png", "rock_wet.png"]
     material = Material.read("rock", roles={"rock_wet": "other"})
     made = texrs.design(material, 64, seed=3).material
     assert made is not None
     for name, each in made.items():
-        assert (io.read(f"new/{name}.png") == each.pixels).all()
+        assert (io.read(f"new/rock_{name}.png") == each.pixels).all()
     assert (io.read("lit.png") == made.preview()).all()
     # What was made of one map is what apply makes of it, without options.
     assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
     assert (io.read("again.png") == made["height"].pixels).all()
-    assert main(["rerun", "new/height.png", "-q"]) == 0
+    assert main(["rerun", "new/rock_height.png", "-q"]) == 0
     assert "the same bytes" in capsys.readouterr().out
-    assert main(["info", "new/albedo.png"]) == 0
+    assert main(["info", "new/rock_albedo.png"]) == 0
     said = capsys.readouterr().out
     assert "rock/rock_wet.png" in said
     assert "--role rock_wet.png=other" in said
@@ -60,8 +60,8 @@ def test_colours_are_brought_into_even_light_and_heights_are_not(here: Path) -> 
     source = texrs.SourceMap.load("map.npz")
     for name in ("albedo", "height"):
         assert main(["apply", "map.npz", f"rock/rock_{name}.png", "-o", f"{name}.png", "-q"]) == 0
-        assert (io.read(f"{name}.png") == io.read(f"new/{name}.png")).all()
-    assert (io.read("new/height.png") == source.render(io.read("rock/rock_height.png"))).all()
+        assert (io.read(f"{name}.png") == io.read(f"new/rock_{name}.png")).all()
+    assert (io.read("new/rock_height.png") == source.render(io.read("rock/rock_height.png"))).all()
     assert main(["apply", "map.npz", "rock/rock_albedo.png", "-o", "lit.png", "--no-flatten", "-q"]) == 0
     assert (io.read("lit.png") == source.render(lit)).all()
     assert (io.read("albedo.png") != io.read("lit.png")).any()
@@ -70,14 +70,14 @@ def test_colours_are_brought_into_even_light_and_heights_are_not(here: Path) -> 
 def test_what_names_do_not_tell_is_left_out_and_said(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tile", "rock", "-o", "new"]) == 0
     assert "rock_wet.png not used: the name gives no role" in capsys.readouterr().err
-    assert sorted(p.name for p in Path("new").iterdir()) == ["albedo.png", "height.png"]
+    assert sorted(p.name for p in Path("new").iterdir()) == ["rock_albedo.png", "rock_height.png"]
 
 
 def test_depth_and_format(here: Path) -> None:
     assert main(["design", "rock", "-o", "new/deep", *SIZE, "--depth", "16", "--format", "tif"]) == 0
-    assert io.read("new/deep/albedo.tif").dtype == np.uint16
+    assert io.read("new/deep/rock_albedo.tif").dtype == np.uint16
     assert main(["design", "rock", "-o", "float", *SIZE, "--depth", "32"]) == 0
-    assert io.read("float/height.exr").dtype == np.float32
+    assert io.read("float/rock_height.exr").dtype == np.float32
 
 
 VERBS = {
@@ -149,7 +149,7 @@ def test_what_else_lies_in_a_folder_of_maps_does_not_count(here: Path, capsys: p
     io.write("rock/lit.png", np.zeros((8, 8), np.uint8))
     assert main(["rerun", "new", "-q"]) == 0
     capsys.readouterr()
-    assert main(["info", "new/albedo.png"]) == 0
+    assert main(["info", "new/rock_albedo.png"]) == 0
     out = capsys.readouterr().out
     assert "rock_albedo.png" in out
     assert "notes" not in out
@@ -170,8 +170,8 @@ def test_a_folder_is_made_again_as_a_whole(here: Path, capsys: pytest.CaptureFix
     capsys.readouterr()
     assert main(["rerun", "new", "-q"]) == 0
     assert [line.split(":")[:2] for line in capsys.readouterr().out.splitlines()] == [
-        ["new/albedo.png", " the same bytes, SHA-256 " + texrs_hash("new/albedo.png")],
-        ["new/height.png", " the same bytes, SHA-256 " + texrs_hash("new/height.png")],
+        ["new/rock_albedo.png", " the same bytes, SHA-256 " + texrs_hash("new/rock_albedo.png")],
+        ["new/rock_height.png", " the same bytes, SHA-256 " + texrs_hash("new/rock_height.png")],
     ]
     assert main(["rerun", "small", "-q"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 12
@@ -180,7 +180,7 @@ def test_a_folder_is_made_again_as_a_whole(here: Path, capsys: pytest.CaptureFix
     assert main(["rerun", "rock", "-q"]) == 2
     assert "rock: no file in it says how it was made" in capsys.readouterr().err
     assert main(["tile", "rock", "-o", "other", "-q"]) == 0
-    os.rename("other/albedo.png", "new/other.png")
+    os.rename("other/rock_albedo.png", "new/other.png")
     assert main(["rerun", "new", "-q"]) == 2
     assert "holds what several commands made" in capsys.readouterr().err
 
@@ -210,13 +210,13 @@ def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> No
     io.write("rock/rock_rough.png", samples.pebbles((48, 64)).image[..., 0])
     shown = ["--mipmaps", "small", "--gltf", "rock.glb", "--materialx", "mtlx", "--pack", "orm"]
     assert main(["design", "rock", "-o", "new", *SIZE, *shown]) == 0
-    assert "orm.png" in {p.name for p in Path("new").iterdir()}
-    assert {"albedo.1.png", "albedo.6.png", "orm.1.png"} <= {p.name for p in Path("small").iterdir()}
-    assert io.read("small/albedo.1.png").shape == (32, 32, 3)
+    assert "rock_orm.png" in {p.name for p in Path("new").iterdir()}
+    assert {"rock_albedo.1.png", "rock_albedo.6.png", "rock_orm.1.png"} <= {p.name for p in Path("small").iterdir()}
+    assert io.read("small/rock_albedo.1.png").shape == (32, 32, 3)
     assert Path("rock.glb").read_bytes()[:4] == b"glTF"
     assert "standard_surface" in Path("mtlx/material.mtlx").read_text()
     for made, says in {
-        "small/height.2.png": "image: 16 x 16, 1 channel, uint16",
+        "small/rock_height.2.png": "image: 16 x 16, 1 channel, uint16",
         "rock.glb": "scene: glTF 2.0, plane, sphere, textures ",
         "mtlx/material.mtlx": "material: MaterialX 1.",
     }.items():
@@ -237,7 +237,7 @@ def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> No
 
 def test_variants_go_to_folders_of_their_own(here: Path) -> None:
     assert main(["design", "rock", "-o", "new", *SIZE, "--variants", "2"]) == 0
-    assert sorted(files(here / "new-0")) == sorted(files(here / "new-1")) == ["albedo.png", "height.png"]
+    assert sorted(files(here / "new-0")) == sorted(files(here / "new-1")) == ["rock_albedo.png", "rock_height.png"]
     assert files(here / "new-0") != files(here / "new-1")
     assert not Path("new").exists()
 
@@ -258,7 +258,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock/rock_albedo.png -o new.png --depth 16", "--depth: is for materials"),
         ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: is for materials"),
         ("design rock rock/rock_albedo.png -o new", "either all are materials or none is"),
-        ("design rock -o mine", "mine/albedo.png is there already"),
+        ("design rock -o mine", "mine/rock_albedo.png is there already"),
         ("design same -o same", "--out: same is read, and would hold other maps beside its own"),
         ("tile rock -o new --mipmaps links/../rock", "rock is read, and would hold other maps"),
         ("tile uneven -o new", "uneven: all must have one size; height has"),
@@ -271,14 +271,14 @@ def test_nothing_is_lost_and_nothing_half_written(
     words: str, says: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("mine").mkdir()
-    Path("mine/albedo.png").write_bytes(b"somebody's")
+    Path("mine/rock_albedo.png").write_bytes(b"somebody's")
     Path("uneven").mkdir()
     io.write("uneven/albedo.png", np.zeros((32, 32, 3), np.uint8))
     io.write("uneven/height.png", np.zeros((32, 33), np.uint8))
     Path("same").mkdir()
     io.write("same/albedo.png", np.zeros((32, 32, 3), np.uint8))
     Path("links").mkdir()
-    os.symlink("../rock/rock_albedo.png", "links/albedo.png")
+    os.symlink("../rock/rock_albedo.png", "links/rock_albedo.png")
     Path("empty").mkdir()
     before = files(here)
     assert main([*words.split(), "-q"]) == 2

@@ -230,7 +230,7 @@ def test_bad_materials_are_refused() -> None:
         ({}, {}, "maps: needs a mapping"),
         ({"thing": picture}, {}, "thing: the name does not say"),
         ({"albedo": picture, "height": picture[:-1, :, 0]}, {}, "maps: all must have one size; height has"),
-        ({"normal": picture[..., 0]}, {}, "normal: a map of role normal has 3 or 4 channels, got 1"),
+        ({"normal": picture[..., 0]}, {}, "normal: a map of role normal must have 2, 3 or 4 channels, got 1"),
         ({"albedo": picture}, {"roles": {"albedo": "shiny"}}, "allowed roles are"),
         ({"albedo": picture}, {"roles": {"colour": "mask"}}, "there is no map 'colour'"),
         ({"albedo": picture}, {"spaces": {"albedo": "lab"}}, "allowed are srgb and linear"),

@@ -16,7 +16,8 @@ from texrs.materials._surface import measure_relief
 
 STONES = texrs.samples.pebbles((48, 64)).image
 GREYS = STONES[..., 0]
-NORMAL = np.dstack([STONES[..., 0] // 4 + 96, STONES[..., 1] // 2 + 64, np.full((48, 64), 230, np.uint8)])
+SLOPES = np.dstack([STONES[..., 0] / 512 - 0.25, STONES[..., 1] / 256 - 0.5, np.ones((48, 64))])
+NORMAL = np.rint((SLOPES / np.linalg.norm(SLOPES, axis=-1, keepdims=True) + 1) / 2 * 255).astype(np.uint8)
 LIBRARY = MaterialX.createDocument()
 MaterialX.loadLibraries(MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath(), LIBRARY, set())
 

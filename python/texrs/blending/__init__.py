@@ -108,7 +108,8 @@ def blend(
     antialias : bool
         As in `SourceMap.render`.
     kind, green
-        As in `SourceMap.render`; of normals the slopes are corrected, and they are brought back to unit length.
+        As in `SourceMap.render`. The slopes of normals are corrected, and normals get unit length again; only the channels that
+        store normals are corrected.
     progress : callable or True, optional
         Called as ``progress("blend", share)``, with the share that is done; raising stops the work. True shows a bar.
 

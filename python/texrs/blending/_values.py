@@ -10,6 +10,7 @@ import numpy as np
 
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
+from texrs.source_map._vectors import stores_z
 
 STRIP = 2**22
 """Pixels that are solved at once; up to four times as many where corrections reach far."""
@@ -33,6 +34,8 @@ class Samples:
     least: Array
     most: Array
     """Range of each channel."""
+    stored: int = 3
+    """How many channels of normals are stored: 2 if z is not."""
 
     @classmethod
     def scale(cls, exemplars: Sequence[Array], kind: str) -> Samples | None:
@@ -40,13 +43,14 @@ class Samples:
         dtype, channels = exemplars[0].dtype, exemplars[0].shape[-1]
         if kind != "colour":
             # Half way is no slope, or no step, so that they can be turned as they are.
-            top, channels = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0, 3 if kind == "normal" else 2
+            top = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0
+            channels = 3 if kind == "normal" and stores_z(exemplars) else 2
             low = -top if dtype.kind != "u" and min(float(e[..., :channels].min()) for e in exemplars) < 0 else 0.0
             high = top
             if kind == "normal":
                 # Slopes add up where heights do; normals do not.
-                shown = [_scale_slopes(e[..., :3], low, high) for e in exemplars]
-                return cls(shown, low, high - low, 2, np.full(3, low), np.full(3, high))
+                shown = [_scale_slopes(e[..., :channels], low, high) for e in exemplars]
+                return cls(shown, low, high - low, 2, np.full(3, low), np.full(3, high), channels)
         else:
             if dtype.kind in "bi":
                 return None
@@ -78,7 +82,7 @@ class Samples:
         for rows in divide_rows(len(pixels)):
             change = correction[rows].astype(exact)
             if kind == "normal":
-                mine = pixels[rows, :, :3]
+                mine = pixels[rows, :, : self.stored]
                 value = self._tilt(mine.astype(exact), change)
             else:
                 mine = pixels[rows, :, channels]
@@ -87,19 +91,28 @@ class Samples:
 
     def _tilt(self, values: Array, change: Array) -> Array:
         """Return normals whose slopes are changed; those of no change are as they were."""
-        vector = 2 * (values - self.low) / self.span - 1
+        vector = _add_z(2 * (values - self.low) / self.span - 1)
         slope = vector[..., :2] / np.maximum(vector[..., 2:], FLATTEST) + change * (2 * STEEPEST)
         tilted = np.concatenate([slope, np.ones_like(slope[..., :1])], axis=-1)
         tilted /= np.linalg.norm(tilted, axis=-1, keepdims=True)
         changed = (change != 0).any(axis=-1, keepdims=True)
+        tilted = tilted[..., : self.stored]
         return np.asarray(np.where(changed, (tilted + 1) / 2 * self.span + self.low, values))
+
+
+def _add_z(vector: Array) -> Array:
+    """Return vectors with the z that unit length gives, if they have none."""
+    if vector.shape[-1] > 2:
+        return vector
+    z = np.sqrt(np.maximum(1 - (vector * vector).sum(axis=-1, keepdims=True), 0))
+    return np.concatenate([vector, z], axis=-1)
 
 
 def _scale_slopes(normals: Array, low: float, high: float) -> Floats:
     """Return the slopes of normals, (rows, columns, 2): the steepest that count are 0 and 1, none is half way."""
     result = np.empty((*normals.shape[:2], 2), np.float32)
     for rows in divide_rows(len(normals)):
-        vector = 2 * (normals[rows].astype(np.float64) - low) / (high - low) - 1
+        vector = _add_z(2 * (normals[rows].astype(np.float64) - low) / (high - low) - 1)
         slope = vector[..., :2] / np.maximum(vector[..., 2:], FLATTEST)
         result[rows] = 0.5 + np.clip(slope, -STEEPEST, STEEPEST) / (2 * STEEPEST)
     return result

@@ -281,7 +281,7 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
             # What is in it already its writer knows, chunk by chunk.
             return False
         if option == "out" and os.path.isdir(path):
-            packed = context.params.get("pack") is not None
+            packed = any(context.params.get(option) is not None for option in ("pack", "convention"))
             if not is_folder_done(record, path, 1 if packed else job.maps):
                 return False
             continue

@@ -17,7 +17,8 @@ from texrs.cli._provenance import expand_braces
 from texrs.errors import InvalidInput
 from texrs.io._files import find_suffix
 from texrs.io._formats import READ_IMAGES, READ_VOLUMES
-from texrs.materials import Role, guess_role
+from texrs.materials import Role
+from texrs.materials._conventions import cut_name, guess_roles
 from texrs.materials._files import DOCUMENTS, SYSTEM
 
 __all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
@@ -26,10 +27,6 @@ OF_VOLUMES = ("solid", "slice")
 """Commands that take volumes."""
 SHOWN = 8
 """Names that a notice lists; it counts the others."""
-WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z0-9]+|[A-Z0-9]+")
-"""Words of a name."""
-LONGEST = 3
-"""Words that may name a map together."""
 FIELDS = re.compile(r"\{(input|name|folder|suffix|preset|seed|verb|parent(?:[2-9]|[1-9][0-9])?)\}")
 """Words in braces that are filled in."""
 
@@ -211,27 +208,8 @@ def _name(path: str, base: str) -> Source:
 
 def find_roles(stems: Mapping[str, str]) -> dict[str, Role]:
     """Return the roles that names say, by file; files without one are left out."""
-    return {path: role for path, stem in stems.items() if (role := guess_role(stem)) is not None}
-
-
-def cut_name(stem: str) -> str:
-    """Return a name without the words for its map, so that all maps of a material have the same.
-
-    Examples
-    --------
-    >>> cut_name("T_Rock_BaseColor"), cut_name("rock_nor_gl_4k"), cut_name("albedo")
-    ('T_Rock', 'rock_4k', '')
-
-    """
-    words = list(WORDS.finditer(stem))
-    role = guess_role(stem)
-    for end in range(len(words), 0, -1):
-        for count in range(min(LONGEST, end), 0, -1):
-            run = words[end - count : end]
-            # A run without signs between its words has a role only if it is a name of a map as a whole.
-            if role is not None and guess_role("".join(word[0] for word in run).lower()) is role:
-                return (stem[: run[0].start()].rstrip("_-. ") + stem[run[-1].end() :]).lstrip("_-. ")
-    return stem
+    found, _ = guess_roles(list(stems.values()))
+    return {path: found[stem] for path, stem in stems.items() if stem in found}
 
 
 def join_braces(paths: Sequence[str]) -> str:

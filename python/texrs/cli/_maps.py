@@ -21,8 +21,8 @@ from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arg
 from texrs.cli._parts import is_stored
 from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
-from texrs.materials import apply
-from texrs.materials._applying import Green, Kind, choose_finish, choose_kind
+from texrs.materials import Map, apply
+from texrs.materials._applying import Green, Kind, choose_finish, choose_kind, find_packed, look_up
 from texrs.source_map import Finish, SourceMap
 
 APPLIED = Options(
@@ -78,8 +78,7 @@ def apply_command(
             like = replace(io.read_notes(paths[0]).fit(channels), made=None)
             temporary = stack.enter_context(_outputs.write_output(target, like=like, made=made))
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
-                kind, green = read_kind(paths[0], images, places, values)
-                image = apply(places, images, kind=kind, green=green, finish=fit(finish, paths, given))
+                image = make_map(paths[0], images, places, values, fit(finish, paths, given))
             if places.axes == 2:
                 io.write(temporary, image)
             else:
@@ -134,6 +133,21 @@ def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> F
     if "band" in fields:
         fields["band"] = as_int(fields["band"], "--band", 1, 2**31)
     return replace(known, **fields)
+
+
+def make_map(
+    path: str,
+    images: Sequence[Array],
+    places: SourceMap,
+    values: Mapping[tuple[str, ...], Any],
+    finish: Finish,
+) -> Array:
+    """Return what a source map makes of a map, by the options or else by its name."""
+    packed = None if {("kind",), ("green",)} & values.keys() else find_packed(path)
+    if packed is not None:
+        return look_up(places, [Map(image, packed, "linear") for image in images], finish, lambda share: None)
+    kind, green = read_kind(path, images, places, values)
+    return apply(places, images, kind=kind, green=green, finish=finish)
 
 
 def read_kind(

@@ -24,7 +24,7 @@ from texrs._version import __version__
 from texrs.cli._places import has_rows_first
 from texrs.errors import InvalidInput
 from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
-from texrs.materials import guess_role
+from texrs.materials._conventions import guess_roles
 from texrs.materials._files import read_labels, split_suffix
 
 LEFT = (
@@ -204,7 +204,8 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
     said = [str(text).partition("=")[0] for text in given.get("role") or ()]
     # Of a folder of maps what else lies there does not count; a batch takes all pictures.
-    inside = [f for name in stacks for f in list_folder(name) if command.name == "batch" or is_map(f, said)]
+    every = command.name == "batch"
+    inside = [f for name in stacks for f in (list_folder(name) if every else list_maps(name, said))]
     files |= {f: status for f in inside if (status := read_status(f)) is not None}
     folder = arguments[0] if command.name == "database" else given.get("folder")
     seed = given.get("seed")
@@ -214,13 +215,16 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     )
 
 
-def is_map(path: str, said: Sequence[str]) -> bool:
-    """Return whether a file of a folder is a map of the material in it: by its name, its values, or an option."""
-    name = os.path.basename(path)
-    stem, suffix = split_suffix(name)
-    if not suffix:
-        return False
-    return name in said or stem in said or guess_role(stem) is not None or read_labels(Path(path)) is not None
+def list_maps(folder: str, said: Sequence[str]) -> list[str]:
+    """Return the files in a folder that are maps of the material in it: by their names, their values, or an option."""
+    parts = {f: split_suffix(os.path.basename(f)) for f in list_folder(folder)}
+    stems = {f: stem for f, (stem, suffix) in parts.items() if suffix}
+    known = {*said, *guess_roles(list(stems.values()))[0]}
+    return [
+        f
+        for f, stem in stems.items()
+        if stem in known or os.path.basename(f) in known or read_labels(Path(f)) is not None
+    ]
 
 
 @contextmanager

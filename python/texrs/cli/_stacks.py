@@ -19,10 +19,10 @@ from texrs.cli import _outputs, _provenance
 from texrs.cli._provenance import check_free, expand_braces
 from texrs.errors import FileError, InvalidInput
 from texrs.io._tags import list_exr_channels
-from texrs.materials import Map, Material
+from texrs.materials import Material
+from texrs.materials._conventions import CONVENTIONS, as_convention
 from texrs.materials._converting import convert
 from texrs.materials._files import SMALLER, choose_suffix, split_suffix
-from texrs.materials._packing import pack_maps, unpack_maps
 from texrs.synthesis import Synthesis
 
 PANEL = "Materials"
@@ -66,6 +66,13 @@ OPTIONS: dict[str, Any] = {
         "Occlusion, roughness and metallic as one map, or as maps of their own.",
         "as they came",
     ),
+    "convention": _option(
+        str,
+        "--convention",
+        "NAME",
+        f"Names, packings and direction of y of the maps: {', '.join(CONVENTIONS)}.",
+        "those that came in",
+    ),
 }
 """How materials are read and written, as options of a command."""
 
@@ -78,11 +85,12 @@ class Stack:
     depth: int | None
     suffix: str | None
     pack: str | None
+    convention: str | None
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Stack:
         """Take the options out of what a command was given, and check them."""
-        roles, depth, suffix, pack = (given.pop(name, None) for name in OPTIONS)
+        roles, depth, suffix, pack, convention = (given.pop(name, None) for name in OPTIONS)
         said = read_roles(roles)
         if depth not in (None, *DEPTHS):
             raise InvalidInput(f"--depth: allowed are 8, 16 and 32, got {depth}")
@@ -90,11 +98,16 @@ class Stack:
             raise InvalidInput(f"--format: allowed are png, tif and exr, got {suffix!r}")
         if pack not in (None, "orm", "none"):
             raise InvalidInput(f"--pack: allowed are orm and none, got {pack!r}")
-        return cls(said, depth, None if suffix is None else f".{suffix}", pack)
+        if convention is not None:
+            as_convention(convention, "--convention")
+            if pack is not None:
+                raise InvalidInput("--pack: cannot be combined with --convention, which has its own packings")
+        return cls(said, depth, None if suffix is None else f".{suffix}", pack, convention)
 
     def refuse(self, paths: Mapping[str, str | None]) -> None:
         """Refuse what only a material can have."""
-        given = {"--role": self.roles, "--depth": self.depth, "--format": self.suffix, "--pack": self.pack}
+        given: dict[str, object] = {"--role": self.roles, "--depth": self.depth, "--format": self.suffix}
+        given |= {"--pack": self.pack, "--convention": self.convention}
         given |= {f"--{name}": paths.get(name) for name in SHOWN}
         for flag, value in given.items():
             if value:
@@ -104,9 +117,10 @@ class Stack:
         """Check before the work that all can be written, over nothing that is read or somebody else's."""
         out = paths["out"] or ""
         if Path(out).suffix.lower() == LAYERED:
-            if self.suffix or self.depth or self.pack:
+            if self.suffix or self.depth or self.pack or self.convention:
                 raise InvalidInput(
-                    "--out: a file of layers keeps each map as it is; give a folder for --depth and --format"
+                    "--out: a file of layers keeps each map as it is; "
+                    "give a folder for --depth, --format, --pack and --convention"
                 )
             _outputs.check_output(out)
             return
@@ -117,8 +131,8 @@ class Stack:
         there = Path(out)
         while not there.exists():
             there = there.parent
-        for name, each in self.list_maps(material).items():
-            file = f"{name}{self.suffix or choose_suffix(each, self.depth, material.axes)}"
+        for name, each in material._list_files(self.pack, self.convention).items():
+            file = f"{each.file or name}{self.suffix or choose_suffix(each, self.depth, material.axes)}"
             _outputs.check_apart(read, {"out": os.path.join(out, file)})
             check_free(os.path.join(out, file))
             # Tried beside what is there, in the folder or where it will be made.
@@ -126,17 +140,12 @@ class Stack:
                 str(there / f".texrs-{file}"), convert(name, each, self.depth, material.axes).pixels, material.shape
             )
 
-    def list_maps(self, material: Material) -> Mapping[str, Map]:
-        """Return the maps that are written."""
-        if self.pack is None:
-            return material
-        return pack_maps(material, material.axes) if self.pack == "orm" else unpack_maps(material)
-
     def save(self, material: Material, folder: Path, *, mipmaps: bool = False) -> list[Path]:
         """Write the maps, or also those in halves of their size, to a folder."""
         depth: Any = self.depth
         pack: Any = self.pack
-        return material.save(folder, depth=depth, suffix=self.suffix, pack=pack, mipmaps=mipmaps)
+        how = {"pack": pack, "convention": self.convention, "mipmaps": mipmaps}
+        return material.save(folder, depth=depth, suffix=self.suffix, **how)
 
     def save_smaller(self, material: Material, folder: Path) -> None:
         """Write the maps in halves of their size alone."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Literal
+
+import numpy as np
 
 from texrs import blending
 from texrs._arrays import as_choice, as_instance, as_list, as_ndarray
@@ -14,6 +16,7 @@ from texrs._notices import assume
 from texrs._progress import listen
 from texrs._typing import Array, Path, Progress
 from texrs.materials._labels import REASON, holds_labels
+from texrs.materials._map import Map, split_channels
 from texrs.materials._roles import Role, guess_role
 from texrs.source_map import Finish, SourceMap
 
@@ -44,7 +47,7 @@ def apply(
         Source map of a picture or a volume.
     exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels. The name of a file gives its role, as
-        in a folder of maps (`texrs.materials.guess_role`).
+        in a folder of maps (`texrs.materials.guess_role`). Each channel of a packed map is looked up by itself.
     kind : {"colour", "normal", "vector", "label"}, optional
         "colour": also heights and all other values that may be mixed; if the finish removes uneven light, it does so here.
         "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values without
@@ -94,8 +97,38 @@ def apply(
     name = os.fspath(given[0]) if given and isinstance(given[0], str | os.PathLike) else None
     if finish is None and source.finish is not None:
         finish = choose_finish(source.finish, name)
+    if kind is None and green is None and (packed := find_packed(name)) is not None:
+        maps = [Map(each, packed, "linear") for each in several]
+        return look_up(source, maps, finish, lambda share: progress and progress("blend", share))
     kind, green = choose_kind(name, several, source.axes, kind, green)
     return blending.apply(source, several, kind=kind, green=green, finish=finish, progress=progress)
+
+
+def find_packed(name: str | None) -> Role | None:
+    """Return the role that the name of a file gives if its channels are different quantities, and report it."""
+    role = None if name is None else guess_role(FilePath(name).stem)
+    if role is None or not role.packed:
+        return None
+    assume(f"{name}: read as {role.value}: {', '.join(word or 'not used' for word in role.layout)}")
+    return role
+
+
+def look_up(
+    source: SourceMap, several: Sequence[Map], finish: Finish | None, watch: Callable[[float], object]
+) -> Array:
+    """Return what a source map makes of one map of each exemplar: each group of channels as it must be, by the role."""
+    groups = list(zip(*(split_channels(each, source.axes) for each in several), strict=True))
+    made = []
+    for done, group in enumerate(groups):
+        role = group[0].role
+
+        def tell(_: str, share: float, done: int = done) -> None:
+            watch((done + share) / len(groups))
+
+        green: Green = "down" if role.down else "up"
+        images = [each.pixels for each in group]
+        made.append(blending.apply(source, images, kind=find_kind(role), green=green, finish=finish, progress=tell))
+    return made[0] if len(made) == 1 else np.concatenate(made, axis=-1)
 
 
 def choose_kind(
@@ -112,7 +145,7 @@ def choose_kind(
     if role is None and kind is None and pixels and all(holds_labels(each, axes) for each in pixels):
         found = "label"
         assume(f"{title}: read as {REASON}")
-    y: Green = green or ("down" if role is Role.NORMAL_DX else "up")
+    y: Green = green or ("down" if role is not None and role.down else "up")
     if kind is None and role is not None and usual in ("normal", "vector"):
         assume(f"{title}: read as {usual}s, y {y}")
     elif kind is None and role is not None and usual == "label":

@@ -81,9 +81,12 @@ class Exports(Mapping[str, Map]):
         depth: Literal[8, 16, 32] | None = None,
         suffix: str | None = None,
         pack: Literal["orm", "none"] | None = None,
+        convention: str | None = None,
         mipmaps: bool = False,
     ) -> list[FilePath]:
-        """Write each map to a file of its name, all or none.
+        """Write each map to a file, all or none.
+
+        A map that was read from a file gets the name of that file, others get their own name.
 
         Parameters
         ----------
@@ -94,8 +97,11 @@ class Exports(Mapping[str, Map]):
         suffix : str, optional
             Of all files, such as ``".tif"``, which says the format; by default PNG, or TIFF and EXR for what it cannot hold.
         pack : {"orm", "none"}, optional
-            "orm" writes occlusion, roughness and metal, as far as there are any, to one file ``orm`` as red, green and blue;
-            "none" writes what is packed to three. By default maps stay as they are.
+            "orm" writes occlusion, roughness and metallic, as far as there are any, to one file ``orm`` as red, green and blue.
+            "none" writes each quantity of packed maps to a file of its own. By default maps stay as they are.
+        convention : str, optional
+            Names, packings and direction of y: "ambientcg", "polyhaven", "gltf", "unreal", "unity", "urp", "hdrp", "labpbr",
+            "substance" or "substance-unreal". By default the names and packings of the maps that were read.
         mipmaps : bool
             Whether each map is also written in half, a quarter, ... of its size, until each side is 1, to the folder
             ``mipmaps``: ``albedo.1.png``, ``albedo.2.png``, ... Colours are averaged as light, normals keep their length,
@@ -111,7 +117,12 @@ class Exports(Mapping[str, Map]):
         FileError
             A file cannot be written. What was there is as it was.
         InvalidInput
-            Another depth or way to pack, or values that the format cannot hold.
+            Another depth, way to pack or convention, or values that the format cannot hold.
+
+        Warns
+        -----
+        InputWarning
+            The convention has no file for a channel of a packed map.
 
         Examples
         --------
@@ -122,18 +133,33 @@ class Exports(Mapping[str, Map]):
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in stones.save(folder)], texrs.Material.read(folder)["height"].depth
         (['albedo.png', 'height.exr'], 32)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in stones.save(folder, convention="unreal")]
+        ['T_material_D.png', 'T_material_H.exr']
 
         """
         from texrs.materials._files import write_maps
-        from texrs.materials._packing import pack_maps, unpack_maps
 
         as_one(depth, "depth", None, 8, 16, 32)
-        as_one(pack, "pack", None, "orm", "none")
         as_bool(mipmaps, "mipmaps")
-        maps: Mapping[str, Map] = self
-        if pack is not None:
-            maps = pack_maps(self, self.axes) if pack == "orm" else unpack_maps(self)
+        maps = self._list_files(pack, convention)
         return write_maps(maps, folder, axes=self.axes, depth=depth, suffix=suffix, mipmaps=mipmaps)
+
+    def _list_files(self, pack: str | None, convention: str | None) -> Mapping[str, Map]:
+        """Return the maps that are written."""
+        from texrs.materials._arranging import arrange_maps
+        from texrs.materials._conventions import as_convention
+        from texrs.materials._packing import pack_maps, unpack_maps
+
+        as_one(pack, "pack", None, "orm", "none")
+        if convention is not None:
+            as_convention(convention, "convention")
+            if pack is not None:
+                raise InvalidInput("pack: cannot be combined with convention, which has its own packings")
+            return arrange_maps(self, convention, self.axes)
+        if pack is None:
+            return self
+        return pack_maps(self, self.axes) if pack == "orm" else unpack_maps(self)
 
     def save_exr(self, path: Path, *, depth: Literal[16, 32] | None = None) -> FilePath:
         """Write all maps to one EXR file, a layer each, that `Material.read` reads again.

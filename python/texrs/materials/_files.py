@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path as FilePath
 from typing import cast
@@ -19,11 +20,12 @@ from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._files import as_path, find_suffix
 from texrs.io._formats import FORMATS, READ, READ_IMAGES, READ_VOLUMES
+from texrs.materials._conventions import guess_roles, report_guesses
 from texrs.materials._converting import choose_dtype, convert
 from texrs.materials._labels import REASON, holds_labels
 from texrs.materials._map import Map, Space, find_space
 from texrs.materials._mipmaps import halve
-from texrs.materials._roles import Role, as_role, guess_role
+from texrs.materials._roles import Role, as_role
 
 __all__ = ["read_maps", "write_maps"]
 
@@ -43,10 +45,8 @@ SMALLER = "mipmaps"
 """Folder of what is not a map of the material itself, so that reading finds maps of one size."""
 
 
-def read_maps(
-    path: Path | Sequence[Path], roles: dict[str, Role | str], axes: int
-) -> tuple[dict[str, Map], dict[str, Role]]:
-    """Return the maps of a folder and their roles, by the names that they have without what is common to all."""
+def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Map], set[str]]:
+    """Return the maps of a folder, by their names without what is common to all, and those whose role is given."""
     path, there = list_places(path)
     files, left = list_files(there, axes)
     stems = {name: split_suffix(name)[0] for name in files}
@@ -56,15 +56,16 @@ def read_maps(
         if not chosen:
             raise InvalidInput(f"roles: there is no picture {name!r} in {path}; there are {', '.join(files) or 'none'}")
         said |= dict.fromkeys(chosen, as_role(role, f"roles[{name!r}]"))
-    found = {name: said.get(name) or guess_role(stems[name]) for name in files}
+    guessed, why = guess_roles(list(stems.values()))
+    found = {name: said.get(name) or guessed.get(stems[name]) for name in files}
     taken = {name: role for name, role in found.items() if role is not None}
     unknown = [name for name, role in found.items() if role is None]
     if not taken:
         left["the name gives no role"] = unknown
-        why = "; ".join(describe_unused(left))
+        lines = "; ".join(describe_unused(left))
         raise FileError(
             f"{path}: no picture has a name that says what it is for, such as albedo.png; say it by roles"
-            f"{f' ({why})' if why else ''}"
+            f"{f' ({lines})' if lines else ''}"
         )
     if len(taken) > MOST:
         raise FileError(f"{path}: has {len(taken)} maps, up to {MOST} are allowed")
@@ -81,8 +82,9 @@ def read_maps(
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)
         raise FileError(f"{path}: two files are the map {twice}; a material has one of each")
-    named = dict(zip(short, maps.values(), strict=True))
-    return named, {name: each.role for name, each in named.items()}
+    report_guesses(why, guessed, {stems[name] for name in said})
+    named = {key: replace(each, file=stems[name]) for key, (name, each) in zip(short, maps.items(), strict=True)}
+    return named, {key for key, name in zip(short, maps, strict=True) if name in said}
 
 
 def list_files(places: Iterable[FilePath], axes: int) -> tuple[dict[str, FilePath], dict[str, list[str]]]:
@@ -235,10 +237,11 @@ def write_maps(
     with ExitStack() as stack:
         work: list[tuple[FilePath, str, Map]] = []
         for name, each in maps.items():
-            files.append(place / f"{name}{endings[name]}")
+            stem = each.file or name
+            files.append(place / f"{stem}{endings[name]}")
             work.append((stack.enter_context(io.atomic(files[-1])), name, each))
             for level, less in enumerate(halve(convert(name, each, depth, axes), axes) if mipmaps else (), 1):
-                small.append(smaller / f"{name}.{level}{endings[name]}")
+                small.append(smaller / f"{stem}.{level}{endings[name]}")
                 work.append((stack.enter_context(io.atomic(small[-1])), name, less))
         with SideBySide(AT_ONCE) as beside:
             beside.do(lambda each, _: write(each[0], convert(each[1], each[2], depth, axes).pixels), work)

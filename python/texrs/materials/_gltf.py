@@ -28,6 +28,7 @@ from texrs.io._image_io import encode
 from texrs.materials._light import find_map
 from texrs.materials._map import Map
 from texrs.materials._meshes import Mesh, make_plane, make_sphere
+from texrs.materials._packing import make_plain
 from texrs.materials._roles import Role
 from texrs.materials._surface import (
     GREY,
@@ -113,6 +114,7 @@ def write_shapes(
 
 def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[dict[str, Array], dict[str, Any]]:
     """Return the pictures of a material by name, and the material whose textures are these, by number from the first."""
+    maps = make_plain(maps)
     pictures: dict[str, Array] = {}
     rough: dict[str, Any] = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0], "metallicFactor": METAL, "roughnessFactor": ROUGH}
     material: dict[str, Any] = {"pbrMetallicRoughness": rough}

@@ -16,20 +16,15 @@ from texrs.materials._roles import Role
 
 __all__ = ["WEIGHTS", "make_guides", "take_features"]
 
-WEIGHTS: dict[Role, float] = {
+WEIGHTS: dict[Role, float] = dict.fromkeys(Role, 0.5) | {
     Role.COLOUR: 1.0,
     Role.NORMAL: 1.0,
     Role.NORMAL_DX: 1.0,
+    Role.NORMAL_XY: 1.0,
+    Role.NORMAL_DX_XY: 1.0,
+    Role.LABPBR_NORMAL: 1.0,
     Role.HEIGHT: 0.75,
-    Role.ROUGHNESS: 0.5,
-    Role.METALLIC: 0.5,
-    Role.OCCLUSION: 0.5,
-    Role.OPACITY: 0.5,
-    Role.EMISSION: 0.5,
-    Role.ORM: 0.5,
-    Role.MASK: 0.5,
     Role.LABELS: 0.0,
-    Role.VECTOR: 0.5,
     Role.OTHER: 0.25,
 }
 """How much maps count, unless it is said: light falls on normals, heights are seen by them."""

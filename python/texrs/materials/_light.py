@@ -24,16 +24,20 @@ def find_map(maps: Mapping[str, Map], *roles: Role) -> Map | None:
 def decode_normals(pixels: Array, role: Role, *, signed: bool) -> Floats:
     """Return normals (..., 3) of unit length, x to the right, y up and z out of the picture.
 
-    Of unsigned values 2 v - 1 is meant, and so is of floats where ``signed`` says that none of the whole map is negative.
+    Unsigned values mean 2 v - 1, and so do floats unless ``signed``: a value of the whole map is negative. If z is not stored,
+    it is that of unit vectors.
     """
-    values = pixels[..., :3]
+    values = pixels[..., : 2 if role.bare else 3]
     if values.dtype.kind == "i":
         vector = (values / np.float32(np.iinfo(values.dtype).max)).astype(np.float32)
     elif values.dtype.kind == "f":
         vector = values.astype(np.float32) if signed else values.astype(np.float32) * np.float32(2) - ONE
     else:
         vector = to_unit(values) * np.float32(2) - ONE
-    if role is Role.NORMAL_DX:
+    if role.bare:
+        z = np.sqrt(np.maximum(ONE - (vector * vector).sum(axis=-1, keepdims=True), 0))
+        vector = np.concatenate([vector, z], axis=-1)
+    if role.down:
         vector = vector * np.array([1, -1, 1], np.float32)
     length = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     flat = np.array([0, 0, 1], np.float32)

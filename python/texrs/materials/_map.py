@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from texrs._colours import Space
 from texrs._typing import Array
-from texrs.materials._roles import Role
+from texrs.materials._roles import CODED, Role
 
-__all__ = ["Map", "Space", "find_space"]
+__all__ = ["Map", "Space", "find_space", "split_channels", "take_channels"]
 
 
 def find_space(role: Role, dtype: np.dtype[Any]) -> Space:
@@ -31,6 +31,9 @@ class Map:
         What it is for.
     space : {"srgb", "linear"}
         How its values encode light: integers of colours are sRGB, all else is linear, unless something else is said.
+    file : str
+        Name of the file that the map was read from, without the suffix; empty for a map made from an array. It is written to
+        a file of this name again.
 
     Examples
     --------
@@ -45,6 +48,7 @@ class Map:
     pixels: Array
     role: Role
     space: Space
+    file: str = ""
 
     @property
     def depth(self) -> int:
@@ -60,3 +64,30 @@ class Map:
         """Return the role, the size and the dtype."""
         sides = " x ".join(map(str, self.pixels.shape))
         return f"<{self.role.value} map of {sides}, {self.pixels.dtype}, {self.space}>"
+
+
+def take_channels(each: Map, first: int, last: int, role: Role) -> Map:
+    """Return some channels of a map as a map of another role."""
+    return replace(each, pixels=np.ascontiguousarray(each.pixels[..., first:last]), role=role)
+
+
+def split_channels(each: Map, axes: int) -> list[Map]:
+    """Return the channels of a map in groups that are looked up, blended and averaged alike: normals, codes, other values.
+
+    Most maps are one group. Packed data has no transparency, so the last of four channels is a group of its own.
+    """
+    count = each.pixels.shape[-1] if each.pixels.ndim > axes else 1
+    if not (each.role.packed or each.role.bare):
+        return [each]
+    coded = [channel < len(each.role.layout) and each.role.layout[channel] in CODED for channel in range(count)]
+    first = 0
+    parts = []
+    if each.role.normal:
+        first = 2
+        parts.append(take_channels(each, 0, 2, Role.NORMAL_DX_XY if each.role.down else Role.NORMAL_XY))
+    elif count > 2 and not any(coded):
+        first = 3
+        parts.append(take_channels(each, 0, 3, each.role))
+    for channel in range(first, count):
+        parts.append(take_channels(each, channel, channel + 1, Role.LABELS if coded[channel] else Role.OTHER))
+    return parts if len(parts) > 1 else [each]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 
@@ -17,20 +18,27 @@ from texrs._progress import listen
 from texrs._show import as_png
 from texrs._threads import SideBySide
 from texrs._typing import Array, Floats, Path, Progress
-from texrs.blending import apply
 from texrs.errors import InvalidInput
 from texrs.io._files import as_path
+from texrs.materials._applying import look_up
+from texrs.materials._conventions import guess_roles, report_guesses
 from texrs.materials._exports import Exports
 from texrs.materials._guide import WEIGHTS, make_guides, take_features
 from texrs.materials._labels import REASON, holds_labels
-from texrs.materials._map import Map, Space, find_space
-from texrs.materials._roles import Role, as_role, guess_role
+from texrs.materials._map import Map, Space, find_space, split_channels
+from texrs.materials._normals import settle_normals
+from texrs.materials._roles import Role, as_role
 from texrs.source_map import SourceMap
 
 __all__ = ["Material"]
 
-CHANNELS = {Role.NORMAL: (3, 4), Role.NORMAL_DX: (3, 4), Role.ORM: (3, 4), Role.VECTOR: (2, 3), Role.LABELS: (1,)}
-"""How many channels maps of a role may have; of others any."""
+CHANNELS: dict[Role, tuple[int, ...]] = {
+    **{role: (2, 3, 4) if role.normal else (3, 4) for role in Role if role.layout},
+    Role.METALLIC_SMOOTHNESS: (2, 4),
+    Role.VECTOR: (2, 3),
+    Role.LABELS: (1,),
+}
+"""Number of channels that maps of a role may have; others have any."""
 AT_ONCE = 2
 """Maps that are made at once: each takes up to 0.4 GB beside what it becomes."""
 SHOWN = 512
@@ -96,8 +104,13 @@ class Material(Exports):
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
                 raise InvalidInput(f"{option}: there is no map {sorted(unknown)[0]!r}; there are {', '.join(maps)}")
+        new = [name for name, each in maps.items() if not isinstance(each, Map)]
+        guessed, why = guess_roles([str(name) for name in new])
         with collect() as self._notices:
-            self._maps = {name: self._check(name, each, said.get(name), how.get(name)) for name, each in maps.items()}
+            self._maps = {
+                name: self._check(name, each, guessed.get(name), said.get(name), how.get(name))
+                for name, each in maps.items()
+            }
         sizes = {name: each.pixels.shape[: self._axes] for name, each in self._maps.items()}
         self._shape = next(iter(sizes.values()))
         for name, size in sizes.items():
@@ -105,14 +118,21 @@ class Material(Exports):
                 raise InvalidInput(
                     f"maps: all must have one size; {name} has {size}, {next(iter(sizes))} has {self._shape}"
                 )
+        with collect() as settled:
+            report_guesses(why, guessed, said)
+            # The name of an array is chosen by its caller, so it states that y is up.
+            self._settle(new, new)
+        self._notices.assumed.extend(settled.assumed)
         self._weights = {name: as_float(w, f"weights[{name!r}]", 0, 100) for name, w in share.items()}
         if len(self) > 1 and not any(self._weights.get(name, WEIGHTS[each.role]) for name, each in self.items()):
             raise InvalidInput("weights: all are 0, so there is nothing to decide on")
 
-    def _check(self, name: str, value: Array | Map, role: Role | str | None, space: Space | None) -> Map:
+    def _check(
+        self, name: str, value: Array | Map, guessed: Role | None, role: Role | str | None, space: Space | None
+    ) -> Map:
         pixels = value.pixels if isinstance(value, Map) else value
         image = as_image(pixels, name, axes=self._axes)
-        known = value.role if isinstance(value, Map) else guess_role(name)
+        known = value.role if isinstance(value, Map) else guessed
         chosen = known if role is None else as_role(role, f"roles[{name!r}]")
         if chosen is None and holds_labels(image, self._axes):
             chosen = Role.LABELS
@@ -123,15 +143,26 @@ class Material(Exports):
             )
         allowed = CHANNELS.get(chosen)
         if allowed is not None and image.shape[-1] not in allowed:
-            counts = " or ".join(map(str, allowed))
-            raise InvalidInput(f"{name}: a map of role {chosen.value} has {counts} channels, got {image.shape[-1]}")
+            counts = re.sub(", (?=.$)", " or ", ", ".join(map(str, allowed)))
+            raise InvalidInput(
+                f"{name}: a map of role {chosen.value} must have {counts} channels, got {image.shape[-1]}"
+            )
+        if self._axes == 3 and chosen.normal and (chosen.bare or image.shape[-1] < 3):
+            raise InvalidInput(f"{name}: normals of a volume must have x, y and z, got {image.shape[-1]} channels")
+        if chosen.normal and image.shape[-1] == 2:
+            chosen = Role.NORMAL_DX_XY if chosen.down else Role.NORMAL_XY
         usual = find_space(chosen, image.dtype)
         if isinstance(value, Map) and chosen == value.role:
             usual = value.space
         if space is not None:
             as_choice(space, f"spaces[{name!r}]", ("srgb", "linear"))
         kept = image if np.ndim(pixels) > self._axes else image[..., 0]
-        return Map(kept, chosen, space or usual)
+        return Map(kept, chosen, space or usual, value.file if isinstance(value, Map) else "")
+
+    def _settle(self, names: Collection[str], said: Collection[str]) -> None:
+        """Give normals the role that their values show."""
+        if self._axes == 2:
+            self._maps |= settle_normals(self._maps, names, said)
 
     @classmethod
     def read(
@@ -193,8 +224,9 @@ class Material(Exports):
                 layers, found, weights = read_exr(place, dict(roles or {}))
                 made = cls(layers, roles=found, weights=weights)
             else:
-                maps, found = read_maps(path, dict(roles or {}), axes)
-                made = cls(maps, roles=found, axes=axes)
+                maps, stated = read_maps(path, dict(roles or {}), axes)
+                made = cls(maps, axes=axes)
+                made._settle(maps, stated)
         made._notices = notices
         return made
 
@@ -381,7 +413,7 @@ class Material(Exports):
         --------
         >>> import numpy as np
         >>> import texrs
-        >>> flat = np.full((8, 8, 3), 128, np.uint8)
+        >>> flat = np.full((8, 8, 3), (128, 128, 255), np.uint8)
         >>> [f.shape for f in texrs.Material({"albedo": flat, "normal": flat}).features()]
         [(8, 8, 3), (8, 8, 2)]
 
@@ -390,7 +422,9 @@ class Material(Exports):
         for name, each in self.items():
             weight = self._weights.get(name, WEIGHTS[each.role])
             if weight > 0:
-                found.append(np.float32(weight) * take_features(each.pixels, each.role, each.space, self._axes))
+                parts = [p for p in split_channels(each, self._axes) if p.role is not Role.LABELS or p is each]
+                taken = [take_features(p.pixels, p.role, p.space, self._axes) for p in parts]
+                found.append(np.float32(weight) * (taken[0] if len(taken) == 1 else np.concatenate(taken, axis=-1)))
         return found
 
     def apply(self, source: SourceMap, *, progress: Progress | bool | None = None) -> Material:
@@ -450,16 +484,7 @@ def apply_materials(materials: Sequence[Material], source: SourceMap, progress: 
     names = list(first)
 
     def make(name: str, watch: Callable[[float], object]) -> Array:
-        role, images = first[name].role, [m[name].pixels for m in materials]
-        kind: Literal["colour", "normal", "vector", "label"] = "colour"
-        if role.labelled:
-            kind = "label"
-        elif role.normal:
-            kind = "normal"
-        elif role is Role.VECTOR:
-            kind = "vector"
-        green: Literal["up", "down"] = "down" if role is Role.NORMAL_DX else "up"
-        return apply(source, images, kind=kind, green=green, finish=finish, progress=lambda _, share: watch(share))
+        return look_up(source, [m[name] for m in materials], finish, watch)
 
     def tell(number: int, share: float) -> None:
         if progress is not None:

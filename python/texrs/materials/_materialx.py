@@ -20,6 +20,7 @@ from texrs.materials._converting import convert
 from texrs.materials._files import choose_suffix, write_maps
 from texrs.materials._light import find_map
 from texrs.materials._map import Map
+from texrs.materials._packing import make_plain
 from texrs.materials._roles import Role, guess_role
 from texrs.materials._surface import GREY, METAL, ROUGH, list_signed, measure_relief, measure_slopes, take_normals
 
@@ -49,6 +50,7 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
     target = as_path(path)
     if target.suffix.lower() != ".mtlx":
         raise FileError(f"{path}: the suffix {target.suffix!r} is not that of MaterialX: .mtlx")
+    maps = make_plain(maps)
     chosen = {role: name for role in USED for name, each in maps.items() if each is find_map(maps, role)}
     if Role.NORMAL in chosen:
         chosen.pop(Role.NORMAL_DX, None)

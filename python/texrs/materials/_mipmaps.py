@@ -7,13 +7,14 @@ unit length; labels and masks keep values that they have.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from texrs._arrays import to_unit
 from texrs._colours import encode_srgb, shrink, to_light, to_pixels
 from texrs._typing import Array
-from texrs.materials._map import Map
+from texrs.materials._map import Map, split_channels
 
 __all__ = ["halve"]
 
@@ -22,28 +23,34 @@ ONE, HALF, LEAST = np.float32(1), np.float32(0.5), np.float32(1e-6)
 
 def halve(each: Map, axes: int) -> Iterator[Map]:
     """Yield a map in half, a quarter, ... of its size, rounded down, until each side is 1."""
+    parts = split_channels(each, axes)
+    if len(parts) > 1:
+        for levels in zip(*(halve(part, axes) for part in parts), strict=True):
+            yield replace(each, pixels=np.concatenate([level.pixels for level in levels], axis=-1))
+        return
     shape = each.pixels.shape[:axes]
     if each.role.labelled:
         while max(shape) > 1:
             shape = tuple(max(1, side // 2) for side in shape)
-            yield Map(pick(each.pixels, shape), each.role, each.space)
+            yield replace(each, pixels=pick(each.pixels, shape))
         return
     pixels = each.pixels if each.pixels.ndim > axes else each.pixels[..., np.newaxis]
     dtype, clear = pixels.dtype, each.role.coloured and pixels.shape[-1] in (2, 4)
     # Floats that are never negative are shares, as integers are.
     shares = dtype.kind in "bu" or (dtype.kind == "f" and bool(pixels.min() >= 0))
-    values = take_vectors(pixels, shares) if each.role.normal else take_light(pixels, each, clear)
+    values = take_vectors(pixels, shares, each.role.bare) if each.role.normal else take_light(pixels, each, clear)
     while max(shape) > 1:
         shape = tuple(max(1, side // 2) for side in shape)
         values = shrink(values, shape)
         if each.role.normal:
             vector = values[..., :3]
             values[..., :3] = vector / np.maximum(np.sqrt((vector * vector).sum(axis=-1, keepdims=True)), LEAST)
-            shown = values if dtype.kind == "f" and not shares else (values + ONE) * HALF
+            kept = values[..., :2] if each.role.bare else values
+            shown = kept if dtype.kind == "f" and not shares else (kept + ONE) * HALF
         else:
             shown = show_light(values, each, clear)
         small = to_pixels(shown, dtype)
-        yield Map(small if each.pixels.ndim > axes else small[..., 0], each.role, each.space)
+        yield replace(each, pixels=small if each.pixels.ndim > axes else small[..., 0])
 
 
 def pick(pixels: Array, shape: tuple[int, ...]) -> Array:
@@ -54,10 +61,14 @@ def pick(pixels: Array, shape: tuple[int, ...]) -> Array:
     return pixels
 
 
-def take_vectors(pixels: Array, shares: bool) -> Array:
-    """Return normals within [-1, 1]; of integers and shares 2 v - 1 is meant."""
+def take_vectors(pixels: Array, shares: bool, bare: bool) -> Array:
+    """Return normals within [-1, 1]; integers and shares mean 2 v - 1. If they are ``bare``, z is added."""
     values = to_unit(pixels) if pixels.dtype.kind != "f" else pixels.astype(np.float32)
-    return values * np.float32(2) - ONE if shares or pixels.dtype.kind != "f" else values
+    vectors = values * np.float32(2) - ONE if shares or pixels.dtype.kind != "f" else values
+    if not bare:
+        return vectors
+    z = np.sqrt(np.maximum(ONE - (vectors * vectors).sum(axis=-1, keepdims=True), 0))
+    return np.concatenate([vectors, z], axis=-1)
 
 
 def take_light(pixels: Array, each: Map, clear: bool) -> Array:

@@ -8,6 +8,7 @@ Schlick's form, with Schlick's Fresnel term; of the surroundings they reflect wh
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import ceil, cos, pi, radians, sin
 
 import numpy as np
@@ -19,6 +20,7 @@ from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.materials._light import find_map
 from texrs.materials._map import Map
+from texrs.materials._packing import make_plain
 from texrs.materials._roles import Role
 from texrs.materials._surface import find_opacity, list_signed, measure_slopes, take_colour, take_normals, take_surface
 
@@ -44,6 +46,7 @@ def render_preview(
     given = as_tuple(light, "light", 2, "(azimuth, elevation) in degrees")
     azimuth, elevation = as_float(given[0], "light[0]", -360, 360), as_float(given[1], "light[1]", 1, 90)
     most = as_int(side, "side", 1, 1 << 16)
+    maps = make_plain(maps)
     first = next(iter(maps.values())).pixels
     rows, columns = first.shape[:2]
     if most < max(down, right):
@@ -57,7 +60,7 @@ def render_preview(
     signed = list_signed(maps)
     for start in range(0, rows, step):
         part = slice(start, min(start + step, rows))
-        cut = {name: Map(each.pixels[part], each.role, each.space) for name, each in maps.items()}
+        cut = {name: replace(each, pixels=each.pixels[part]) for name, each in maps.items()}
         bent = None if slopes is None else slopes[part]
         lit = shade(cut, signed, bent, toward)
         back = find_opacity(cut)

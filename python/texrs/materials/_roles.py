@@ -1,26 +1,35 @@
-"""What a map of a material is for, and how its name says so.
+"""The role of a map in a material: what it is for, what its channels hold, and how its name says so.
 
-===================== ========================================================================================
-Role                  Words of a name, or of its end
-===================== ========================================================================================
-``colour``            albedo, alb, basecolor, base_color, base_colour, color, colour, col, diffuse, diff, bc
-``normal``            normal, normals, nor, nrm, norm, normal_gl, nor_gl, nrm_gl, normal_opengl (y grows up)
-``normal-dx``         normal_dx, nor_dx, nrm_dx, normal_directx (y grows down)
-``height``            height, displacement, disp, bump
-``roughness``         roughness, rough, rgh
-``metallic``          metallic, metalness, metal, met
-``occlusion``         ao, occlusion, occ, ambient_occlusion
-``opacity``           opacity, alpha, transparency
-``emission``          emission, emissive, emit, glow
-``orm``               orm, arm: occlusion, roughness and metallic as red, green and blue
-``mask``              mask
-``labels``            labels, label, ids, id, segmentation
-``vector``            vector, flow, flowmap, tangent, direction
-``other``             gloss, glossiness, smoothness, specular, spec, translucency, other
-===================== ========================================================================================
+====================== =======================================================================================
+Role                   Words at the end of a name
+====================== =======================================================================================
+``colour``             albedo, alb, basecolor, base_color, base_colour, basemap, color, colour, col, diffuse, diff, bc,
+                       albedo_transparency, albedo_opacity
+``normal``             normal, normals, nor, nrm, norm, normal_gl, nor_gl, nrm_gl, normal_opengl (y up)
+``normal-dx``          normal_dx, nor_dx, nrm_dx, normal_directx (y down)
+``normal-xy``          normal_xy, normal_rg (y up; z is not stored)
+``normal-dx-xy``       normal_dx_xy, normal_dx_rg (y down; z is not stored)
+``height``             height, displacement, disp, bump
+``roughness``          roughness, rough, rgh
+``smoothness``         smoothness, smooth, gloss, glossiness (1 - roughness)
+``metallic``           metallic, metalness, metal, met
+``occlusion``          ao, occlusion, occ, ambient_occlusion
+``opacity``            opacity, alpha, transparency
+``emission``           emission, emissive, emit, glow
+``orm``                orm, arm, occlusion_roughness_metallic, ao_roughness_metallic
+``metallic-roughness`` metallic_roughness, roughness_metallic
+``metallic-smoothness`` metallic_smoothness, metallic_gloss
+``mask-map``           mask_map
+``labpbr-normal``      labpbr_n
+``labpbr-specular``    labpbr_s
+``mask``               mask
+``labels``             labels, label, ids, id, segmentation
+``vector``             vector, flow, flowmap, tangent, direction
+``other``              specular, spec, reflectance, porosity, emissiveness, detail, translucency, translucent, other
+====================== =======================================================================================
 
-Words are parted by ``_``, ``-``, ``.``, spaces and capitals, and numbers and sizes (``2k``, ``4096``) do not count:
-``Rock035_2K_NormalDX.png`` and ``rock-nor_dx.png`` are both ``normal-dx``.
+A name has the role of its last word: ``metallic_paint_color`` is a colour map. Words end at ``_``, ``-``, ``.``, spaces and
+capitals. Numbers, sizes (``2k``, ``4096``), versions (``v2``) and words such as ``map``, ``png`` or ``tileable`` do not count.
 """
 
 from __future__ import annotations
@@ -35,35 +44,50 @@ __all__ = ["Role", "as_role", "guess_role"]
 
 
 class Role(Enum):
-    """What a map is for; how it is looked up, blended, turned and written follows from it.
+    """The role of a map, which decides how it is looked up, blended, turned and written.
 
     Parameters
     ----------
     value : str
-        As "colour", "normal" (y up), "normal-dx" (y down), "height" and so on.
+        Name of the role, such as "colour", "normal" (y up), "normal-dx" (y down) or "height".
 
     Examples
     --------
     >>> from texrs.materials import Role
     >>> Role("normal-dx").normal, Role.LABELS.labelled
     (True, True)
+    >>> Role("mask-map").layout
+    ('metallic', 'occlusion', 'detail', 'smoothness')
 
     """
 
     COLOUR = "colour"
     NORMAL = "normal"
     NORMAL_DX = "normal-dx"
+    NORMAL_XY = "normal-xy"
+    NORMAL_DX_XY = "normal-dx-xy"
     HEIGHT = "height"
     ROUGHNESS = "roughness"
+    SMOOTHNESS = "smoothness"
     METALLIC = "metallic"
     OCCLUSION = "occlusion"
     OPACITY = "opacity"
     EMISSION = "emission"
     ORM = "orm"
+    METALLIC_ROUGHNESS = "metallic-roughness"
+    METALLIC_SMOOTHNESS = "metallic-smoothness"
+    MASK_MAP = "mask-map"
+    LABPBR_NORMAL = "labpbr-normal"
+    LABPBR_SPECULAR = "labpbr-specular"
     MASK = "mask"
     LABELS = "labels"
     VECTOR = "vector"
     OTHER = "other"
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Quantity in each channel as single maps have it, such as ("normal", "normal", "occlusion", "height")."""
+        return tuple("normal" if word in ("x", "y", "-y", "z") else word for word in self.layout) or (self.value,)
 
     @property
     def coloured(self) -> bool:
@@ -71,9 +95,29 @@ class Role(Enum):
         return self in (Role.COLOUR, Role.EMISSION)
 
     @property
+    def layout(self) -> tuple[str, ...]:
+        """Quantity in each channel, such as ("occlusion", "roughness", "metallic"); empty if all channels are one quantity."""
+        return LAYOUTS.get(self, ())
+
+    @property
     def normal(self) -> bool:
-        """Whether its values are normals of the surface."""
-        return self in (Role.NORMAL, Role.NORMAL_DX)
+        """Whether its first channels are normals of the surface."""
+        return "x" in self.layout
+
+    @property
+    def down(self) -> bool:
+        """Whether its normals have y down, as in DirectX."""
+        return "-y" in self.layout
+
+    @property
+    def bare(self) -> bool:
+        """Whether its normals are stored without z."""
+        return self.normal and "z" not in self.layout
+
+    @property
+    def packed(self) -> bool:
+        """Whether its channels are different quantities."""
+        return bool(self.layout) and (self is Role.LABPBR_NORMAL or not self.normal)
 
     @property
     def labelled(self) -> bool:
@@ -81,36 +125,108 @@ class Role(Enum):
         return self in (Role.MASK, Role.LABELS)
 
 
+LAYOUTS: dict[Role, tuple[str, ...]] = {
+    Role.NORMAL: ("x", "y", "z"),
+    Role.NORMAL_DX: ("x", "-y", "z"),
+    Role.NORMAL_XY: ("x", "y"),
+    Role.NORMAL_DX_XY: ("x", "-y"),
+    Role.ORM: ("occlusion", "roughness", "metallic"),
+    Role.METALLIC_ROUGHNESS: ("", "roughness", "metallic"),
+    Role.METALLIC_SMOOTHNESS: ("metallic", "metallic", "metallic", "smoothness"),
+    Role.MASK_MAP: ("metallic", "occlusion", "detail", "smoothness"),
+    Role.LABPBR_NORMAL: ("x", "-y", "occlusion", "height"),
+    Role.LABPBR_SPECULAR: ("smoothness", "reflectance", "porosity", "emissiveness"),
+}
+"""Quantity in each channel of a map; "" is a channel without a meaning."""
+CODED = ("reflectance", "porosity", "emissiveness")
+"""Quantities of labPBR whose values are codes from a certain number on, so that nothing may be mixed."""
 WORDS: dict[Role, str] = {
-    Role.COLOUR: "albedo alb basecolor basecolour color colour col diffuse diff bc",
+    Role.COLOUR: "albedo alb basecolor basecolour basemap color colour col diffuse diff bc albedotransparency albedoopacity",
     Role.NORMAL: "normal normals nor nrm norm normalgl norgl nrmgl normalopengl",
     Role.NORMAL_DX: "normaldx nordx nrmdx normaldirectx",
+    Role.NORMAL_XY: "normalxy normalrg",
+    Role.NORMAL_DX_XY: "normaldxxy normaldxrg",
     Role.HEIGHT: "height displacement disp bump",
     Role.ROUGHNESS: "roughness rough rgh",
+    Role.SMOOTHNESS: "smoothness smooth gloss glossiness",
     Role.METALLIC: "metallic metalness metal met",
     Role.OCCLUSION: "ao occlusion occ ambientocclusion",
     Role.OPACITY: "opacity alpha transparency",
     Role.EMISSION: "emission emissive emit glow",
-    Role.ORM: "orm arm",
+    Role.ORM: "orm arm occlusionroughnessmetallic aoroughnessmetallic",
+    Role.METALLIC_ROUGHNESS: "metallicroughness roughnessmetallic",
+    Role.METALLIC_SMOOTHNESS: "metallicsmoothness metallicgloss",
+    Role.MASK_MAP: "maskmap",
+    Role.LABPBR_NORMAL: "labpbrn",
+    Role.LABPBR_SPECULAR: "labpbrs",
     Role.MASK: "mask",
     Role.LABELS: "labels label ids id segmentation",
     Role.VECTOR: "vector flow flowmap tangent direction",
-    Role.OTHER: "gloss glossiness smoothness specular spec translucency other",
+    Role.OTHER: "specular spec reflectance porosity emissiveness detail translucency translucent other",
 }
 ROLES = {word: role for role, words in WORDS.items() for word in words.split()}
-SIZE = re.compile(r"\d+k?")
+NEUTRAL = re.compile(
+    r"v?\d+(k|px|bit)?|k|v|map|tex|texture|png|jpe?g|tiff?|exr|tga|webp|bmp|srgb|raw|linear|lin|tiled|tileable|seamless|final|copy"
+)
+"""Words that may follow the word of the role."""
 AMERICAN = {"color": "colour", "normal-gl": "normal"}
 
 
-def guess_role(name: str) -> Role | None:
-    """Return the role that a name says a map has; None where it says none.
+def split_name(name: str) -> list[tuple[int, str]]:
+    """Return the words of a name in small letters, each with its place; a run of capitals is a word.
 
-    The last words count, longer ones first: ``ambient_occlusion`` is one, ``wood_diff`` is by its end.
+    Examples
+    --------
+    >>> split_name("Rock035_2K_NormalDX")
+    [(0, 'rock035'), (8, '2'), (9, 'k'), (11, 'normal'), (17, 'dx')]
+
+    """
+    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "\0", name)
+    found, place = [], 0
+    for part in re.split(r"([^A-Za-z0-9]+)", parted):
+        if part and part[0].isascii() and part[0].isalnum():
+            found.append((place, part.lower()))
+        place += len(part) - part.count("\0")
+    return found
+
+
+def find_role(name: str) -> tuple[Role, int, int] | None:
+    """Return the role that a name says, and where its words begin and end; None if it says none."""
+    words = split_name(name)
+    while words and NEUTRAL.fullmatch(words[-1][1]) and not _match(words):
+        words.pop()
+    count = _match(words)
+    if not count:
+        return None
+    role = ROLES["".join(word for _, word in words[-count:])]
+    return role, words[-count][0], words[-1][0] + len(words[-1][1])
+
+
+def states_y(name: str) -> bool:
+    """Return whether the name of a normal map says if y is up or down."""
+    found = find_role(name)
+    words = split_name(name)
+    if found is None:
+        # T_Rock_N of Unreal.
+        return name.startswith("T_") and words[-1][1] == "n"
+    return re.search("gl|dx|directx", name[found[1] : found[2]].lower().replace("_", "")) is not None
+
+
+def _match(words: list[tuple[int, str]]) -> int:
+    """Return how many words at the end are those of a role."""
+    counts = range(min(3, len(words)), 0, -1)
+    return next((c for c in counts if "".join(word for _, word in words[-c:]) in ROLES), 0)
+
+
+def guess_role(name: str) -> Role | None:
+    """Return the role that a name says, or None if it says none.
+
+    The last words count, as many as have a role: ``ambient_occlusion`` is one role, ``metallic_paint_color`` is a colour map.
 
     Parameters
     ----------
     name : str
-        Of a map or of its file, without the suffix.
+        Name of a map or of its file, without the suffix.
 
     Returns
     -------
@@ -119,23 +235,18 @@ def guess_role(name: str) -> Role | None:
     Raises
     ------
     TypeError
-        Not a text.
+        The name is not a text.
 
     Examples
     --------
     >>> guess_role("Rock035_2K_NormalDX"), guess_role("fabric-ao-4096"), guess_role("preview")
     (<Role.NORMAL_DX: 'normal-dx'>, <Role.OCCLUSION: 'occlusion'>, None)
+    >>> guess_role("car_occlusionRoughnessMetallic"), guess_role("metallic_paint_color"), guess_role("metallic_paint")
+    (<Role.ORM: 'orm'>, <Role.COLOUR: 'colour'>, None)
 
     """
-    as_instance(name, "name", str)
-    # A run of capitals is a word: NormalDX, fabricAO.
-    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
-    words = [w for w in re.split(r"[^a-z0-9]+", parted.lower()) if w and not SIZE.fullmatch(w)]
-    for end in range(len(words), 0, -1):
-        for count in (3, 2, 1):
-            if count <= end and (role := ROLES.get("".join(words[end - count : end]))) is not None:
-                return role
-    return None
+    found = find_role(as_instance(name, "name", str))
+    return None if found is None else found[0]
 
 
 def as_role(value: object, name: str) -> Role:
@@ -144,7 +255,7 @@ def as_role(value: object, name: str) -> Role:
     Raises
     ------
     InvalidInput
-        No such role.
+        There is no such role.
 
     """
     if isinstance(value, Role):

@@ -73,7 +73,7 @@ def write_mesh(
     pictures: dict[str, Array] = {}
     looks: list[tuple[dict[str, Array], dict[str, Any]]] = []
     for name, several, relief in zip(names, maps, reliefs, strict=True):
-        seen = {key: each for key, each in several.items() if each.role not in (Role.NORMAL, Role.NORMAL_DX)}
+        seen = {key: each for key, each in several.items() if not each.role.normal}
         if relief is not None:
             # As shares, for of numbers that happen to be positive nobody could tell.
             seen["normal"] = Map((relief + np.float32(1)) / np.float32(2), Role.NORMAL, "linear")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Floats
-from texrs.materials import Map, Role
+from texrs.materials import Map
 from texrs.painting._baking import bake_values
 from texrs.painting._surface import Floats64
 
@@ -32,7 +32,7 @@ def read_slopes(normals: Map) -> Floats:
         values = 2 * values - 1
     up = np.maximum(values[..., 2], FLATTEST)
     # Rows go down, and y up unless it is said to be otherwise.
-    side = -1.0 if normals.role is Role.NORMAL_DX else 1.0
+    side = -1.0 if normals.role.down else 1.0
     slopes = np.stack([-values[..., 0] / up, side * values[..., 1] / up, np.zeros(up.shape)], axis=-1)
     return np.asarray(slopes, np.float32)
 

@@ -26,7 +26,7 @@ from texrs.source_map._finish import Finish
 from texrs.source_map._parts import Parted
 from texrs.source_map._pixels import Pixels, divide_bands
 from texrs.source_map._reuse import Reuse, find_continued, measure_reuse
-from texrs.source_map._vectors import turn_all
+from texrs.source_map._vectors import stores_z, turn_all
 
 __all__ = ["Finish", "Reuse", "SourceMap"]
 
@@ -237,9 +237,11 @@ class SourceMap(Parted):
             Whether the exemplar is smoothed where the frames say that it is shrunk. Not for labels, nor with "nearest".
         kind : {"colour", "normal", "vector", "slope"}
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
-            with the local frame. "vector": directions on the surface (channels x, y, and what does not turn), such as those
-            of flow or of brushed metal; they turn and keep their length. "slope": how much heights grow to the right and
-            along y. In a volume all are directions in space, whose z, along the planes, turns too.
+            with the local frame. If z is not stored (two channels, or a third that is constant or holds something else), only
+            x and y turn, and the other channels are looked up as they are. "vector": directions on the surface (channels x, y,
+            and others that do not turn), such as those of flow or of brushed metal; they turn and keep their length. "slope":
+            how much heights grow to the right and along y. In a volume all are directions in space, whose z, along the planes,
+            turns too.
         green : {"up", "down"}
             Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
 
@@ -284,8 +286,9 @@ class SourceMap(Parted):
                 f"kind, green: allowed are colour, normal, vector or slope, up or down; got {kind!r}, {green!r}"
             )
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
-        channels = 3 if kind == "normal" or self.axes == 3 else 2
-        return turn_all(self, out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images))
+        bare = kind == "normal" and self.axes == 2 and not stores_z(images)
+        channels = 3 if (kind == "normal" and not bare) or self.axes == 3 else 2
+        return turn_all(self, out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images), bare)
 
     def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:
         """Return the map of a picture made from pictures that were made from exemplars.

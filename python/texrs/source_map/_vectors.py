@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,12 +13,53 @@ from texrs.errors import InvalidInput
 from texrs.source_map._parts import Parted
 from texrs.source_map._pixels import divide_bands
 
-__all__ = ["turn_all", "turn_vectors"]
+__all__ = ["find_scale", "stores_z", "turn_all", "turn_vectors"]
+
+SAMPLES = 1 << 14
+"""Maximum number of pixels of an exemplar that show whether z is stored."""
+EXPLAINED = 0.75
+"""Error of the stored z, as a share of the error of the mean z, up to which the channel is z. For values that are independent
+of x and y the share is at least 1, for 8-bit normals of ordinary relief it is 0.1."""
+ROUNDING = 1e-3
+"""Rounding that floats may have: that of half precision."""
 
 
-def turn_all(source: Parted, vectors: Array, kind: str, green: str, signed: bool) -> Array:
-    """Turn what was looked up through a map with its frames; ``signed`` as for `turn_vectors`."""
-    count = 3 if kind == "normal" or source.axes == 3 else 2
+def find_scale(dtype: np.dtype[Any], signed: bool) -> tuple[float, float]:
+    """Return the factor and the offset of stored vectors: v = value * factor - offset."""
+    offset = 0.0 if signed else 1.0
+    top = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0
+    return (2.0 if offset else 1.0) / top, offset
+
+
+def stores_z(exemplars: Sequence[Array]) -> bool:
+    """Return whether the third channel of normals is their z, so that vectors have unit length.
+
+    It is not if there are two channels, or if the channel is constant or shows something else. The z of unit vectors follows
+    from x and y, so the channel must be nearer to it than a constant is.
+    """
+    if any(e.shape[-1] < 3 or e.dtype == np.bool_ for e in exemplars):
+        return False
+    dtype = exemplars[0].dtype
+    scale, offset = find_scale(dtype, any(float(e[..., :3].min()) < 0 for e in exemplars))
+    flat = [e.reshape(-1, e.shape[-1])[:, :3] for e in exemplars]
+    # A stride that is no multiple of the width meets all columns.
+    some = [f[np.arange(min(len(f), SAMPLES)) * 7919 % len(f)] for f in flat]
+    with np.errstate(all="ignore"):
+        x, y, z = np.moveaxis(np.concatenate(some).astype(np.float64) * scale - offset, -1, 0)
+        square = x * x + y * y
+        vectors = square <= 1.05
+        if not vectors.any():
+            # Nothing here is a vector, so nothing tells.
+            return True
+        z, wanted = z[vectors], np.sqrt(np.maximum(1 - square[vectors], 0))
+        error, usual = np.abs(z - wanted).mean(), np.abs(z - wanted.mean()).mean()
+    rounding = 2 / float(np.iinfo(dtype).max) if dtype.kind in "ui" else ROUNDING
+    return bool(error <= max(EXPLAINED * usual, rounding))
+
+
+def turn_all(source: Parted, vectors: Array, kind: str, green: str, signed: bool, bare: bool = False) -> Array:
+    """Turn what was looked up through a map with its frames; ``signed`` and ``bare`` as for `turn_vectors`."""
+    count = source.axes if bare or kind != "normal" else 3
     what = "a normal map" if kind == "normal" else "a map of vectors"
     if vectors.ndim != source.axes + 1 or vectors.shape[-1] < count:
         sides = ("rows, columns", "planes, rows, columns")[source.axes - 2]
@@ -29,11 +73,14 @@ def turn_all(source: Parted, vectors: Array, kind: str, green: str, signed: bool
     # A band at a time, for what is computed of a pixel takes many times its size.
     for band in divide_bands(source.shape):
         frames = frame[source.label[band]] if frame.ndim == 3 else frame[band]
-        out[band] = turn_vectors(vectors[band], frames.astype(np.float64), kind, down=green == "down", signed=signed)
+        how = {"down": green == "down", "signed": signed, "bare": bare}
+        out[band] = turn_vectors(vectors[band], frames.astype(np.float64), kind, **how)
     return out
 
 
-def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down: bool, signed: bool) -> Array:
+def turn_vectors(
+    vectors: Array, frames: NDArray[np.float64], kind: str, *, down: bool, signed: bool, bare: bool = False
+) -> Array:
     """Return vectors (..., C) as they are seen through frames (..., A, A), in their own dtype.
 
     A surface h(S(p)) has the slope J^T grad h, so slopes turn with the transposed frame, and so do normals, which are brought
@@ -52,18 +99,24 @@ def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down
         Whether y grows down.
     signed : bool
         Whether the values are the numbers, rather than (1 + v) / 2.
+    bare : bool
+        If True, only x and y of normals are stored, in a picture. Their z is computed; other channels stay as they are.
     """
     axes = frames.shape[-1]
-    count = 3 if kind == "normal" or axes == 3 else 2
+    count = axes if bare or kind != "normal" else 3
     integers = vectors.dtype.kind in "ui"
-    top = float(np.iinfo(vectors.dtype).max) if integers else 1.0
-    offset = 0.0 if signed else 1.0
-    scale = (2.0 if offset else 1.0) / top
+    scale, offset = find_scale(vectors.dtype, signed)
     v = vectors[..., :count].astype(np.float64) * scale - offset
+    length = np.float64(1.0)
+    if bare:
+        square = (v * v).sum(axis=-1, keepdims=True)
+        v = np.concatenate([v, np.sqrt(np.maximum(1 - square, 0))], axis=-1)
+        # Compression makes some x and y longer than 1, which stays.
+        length = np.sqrt(np.maximum(square, 1))
     side = 1.0 if down else -1.0
     flat = np.stack([*((v[..., 2],) if axes == 3 else ()), v[..., 1] * side, v[..., 0]], axis=-1)
     if kind != "vector":
-        turned, length = np.einsum("...ji,...j->...i", frames, flat), np.float64(1.0)
+        turned = np.einsum("...ji,...j->...i", frames, flat)
     else:
         turned = (_turn_step if axes == 2 else _turn_step_of_space)(frames, flat)
         length = np.linalg.norm(flat, axis=-1, keepdims=True)
@@ -71,7 +124,7 @@ def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down
     v = np.concatenate([turned[..., -1:], turned[..., -2:-1] * side, rest], axis=-1)
     if kind != "slope":
         v *= length / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
-    value = (v + offset) / scale
+    value = (v[..., :count] + offset) / scale
     out = vectors.copy()
     out[..., :count] = np.rint(value) if integers else value
     return out

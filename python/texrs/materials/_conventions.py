@@ -1,0 +1,268 @@
+"""The conventions of tools and libraries: the names of their files, and what each channel of a file holds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+from texrs._notices import assume
+from texrs.errors import InvalidInput
+from texrs.materials._roles import Role, find_role, split_name
+
+__all__ = ["CONVENTIONS", "File", "as_convention", "cut_name", "guess_roles", "list_conventions"]
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """One file of a convention: the end of its name, its role, and whether its alpha is the opacity."""
+
+    end: str
+    role: Role
+    opacity: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Convention:
+    """Names and packings that belong together. Of several files with one quantity, the first is written."""
+
+    title: str
+    files: tuple[File, ...]
+    start: str = ""
+
+    @property
+    def down(self) -> bool:
+        """Whether normals have y down."""
+        return next(file.role.down for file in self.files if file.role.normal)
+
+
+def _list(text: str) -> tuple[File, ...]:
+    """Return the files of a line for each: the end of the name, the role, and "+ opacity" if the alpha holds it."""
+    files = []
+    for line in text.strip().splitlines():
+        end, role, *more = line.split()
+        files.append(File(end.strip("."), Role(role), bool(more)))
+    return tuple(files)
+
+
+UNITY = """
+_AlbedoTransparency colour + opacity
+_MetallicSmoothness metallic-smoothness
+_Normal normal
+_Height height
+_Occlusion occlusion
+_Emission emission
+"""
+CONVENTIONS = {
+    "ambientcg": Convention(
+        "ambientCG",
+        _list("""
+_Color colour
+_NormalGL normal
+_NormalDX normal-dx
+_Displacement height
+_Roughness roughness
+_Metalness metallic
+_AmbientOcclusion occlusion
+_Opacity opacity
+_Emission emission
+"""),
+    ),
+    "polyhaven": Convention(
+        "Poly Haven",
+        _list("""
+_diff colour
+_nor_gl normal
+_nor_dx normal-dx
+_disp height
+_rough roughness
+_metal metallic
+_ao occlusion
+_arm orm
+_opacity opacity
+_emission emission
+"""),
+    ),
+    "gltf": Convention(
+        "glTF",
+        _list("""
+_baseColor colour + opacity
+_normal normal
+_occlusionRoughnessMetallic orm
+_metallicRoughness metallic-roughness
+_occlusion occlusion
+_emissive emission
+"""),
+    ),
+    "unreal": Convention(
+        "Unreal",
+        _list("""
+_D colour + opacity
+_N normal-dx
+_ORM orm
+_R roughness
+_M metallic
+_AO occlusion
+_H height
+_E emission
+"""),
+        "T_",
+    ),
+    "unity": Convention("Unity built-in", _list(UNITY)),
+    "urp": Convention("Unity URP", _list(UNITY)),
+    "hdrp": Convention(
+        "Unity HDRP",
+        _list("""
+_BaseMap colour + opacity
+_MaskMap mask-map
+_Normal normal
+_Height height
+_Emissive emission
+"""),
+    ),
+    "labpbr": Convention(
+        "labPBR",
+        _list("""
+. colour + opacity
+_n labpbr-normal
+_s labpbr-specular
+"""),
+    ),
+    "substance": Convention(
+        "Substance, metallic and roughness",
+        _list("""
+_Base_Color colour
+_Normal_OpenGL normal
+_Normal_DirectX normal-dx
+_Height height
+_Roughness roughness
+_Metallic metallic
+_Mixed_AO occlusion
+_Opacity opacity
+_Emissive emission
+"""),
+    ),
+    "substance-unreal": Convention(
+        "Substance, Unreal packed",
+        _list("""
+_BaseColor colour + opacity
+_Normal normal-dx
+_OcclusionRoughnessMetallic orm
+_Height height
+_Emissive emission
+"""),
+    ),
+}
+"""By the words of ``--convention``."""
+LETTERS = {file.end[1:].lower(): file.role for file in CONVENTIONS["unreal"].files} | {
+    "bc": Role.COLOUR,
+    "s": Role.OTHER,
+}
+MEANINGS = {
+    "x": "normal x",
+    "y": "normal y, up",
+    "-y": "normal y, down",
+    "z": "normal z",
+    "": "not used",
+    "reflectance": "reflectance at 0 degrees, 230 to 255: metal",
+    "porosity": "porosity, 65 to 255: scattering",
+    "emissiveness": "emission, 255: none",
+}
+
+
+def as_convention(value: object, name: str) -> str:
+    """Check the word for a convention.
+
+    Raises
+    ------
+    InvalidInput
+        There is no such convention.
+
+    """
+    if not isinstance(value, str) or value not in CONVENTIONS:
+        raise InvalidInput(f"{name}: must be one of {', '.join(CONVENTIONS)}, got {value!r}")
+    return value
+
+
+def list_conventions() -> str:
+    """Return the table of conventions, in Markdown."""
+    lines = ["| `--convention` | For | File | Role | Channels |", "|---|---|---|---|---|"]
+    for key, convention in CONVENTIONS.items():
+        for number, file in enumerate(convention.files):
+            first = f"`{key}` | {convention.title}" if number == 0 else " | "
+            held = ", ".join(MEANINGS.get(word, word) for word in file.role.layout) or file.role.value
+            more = ", alpha: opacity if there is any" if file.opacity else ""
+            lines.append(f"| {first} | `{convention.start}NAME{file.end}` | `{file.role.value}` | {held}{more} |")
+    return "\n".join(lines)
+
+
+def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
+    """Return the roles of the files of a folder by their names, and how those were found that no name says alone.
+
+    Words at the end of a name count first (see `guess_role`). Then short ends count if the other files of the folder make
+    them clear: those of Unreal (``T_Rock_N``) and of labPBR (``stone``, ``stone_n``, ``stone_s``), and a name that all others
+    go on from (``rock`` beside ``rock_normal``).
+    """
+    found = {stem: each[0] for stem in stems if (each := find_role(stem)) is not None}
+    why: dict[str, str] = {}
+    bases = {stem: _cut(stem) for stem in stems}
+    shared = Counter(base for base in bases.values() if base)
+    # Letters that follow each other, as in shot_a, shot_b and shot_d, are numbers.
+    ends = {stem: words[-1][1] for stem in stems if (words := split_name(stem))}
+    doubtful = {bases[s] for s, end in ends.items() if len(end) == 1 and end not in LETTERS and s not in found}
+    for stem in stems:
+        words, base = split_name(stem), bases[stem]
+        letter = words[-1][1] if words else ""
+        if stem in found or letter not in LETTERS or not base:
+            continue
+        if {base + stem[len(base)] + end for end in "ns"} <= set(stems) and base in stems:
+            found[stem], why[stem] = (
+                Role.LABPBR_NORMAL if letter == "n" else Role.LABPBR_SPECULAR if letter == "s" else LETTERS[letter],
+                "a name of labPBR",
+            )
+        elif stem.startswith("T_"):
+            found[stem], why[stem] = LETTERS[letter], "a name of Unreal"
+        elif (shared[base] > 1 or base in stems) and base not in doubtful:
+            role = LETTERS[letter]
+            found[stem] = Role.NORMAL if role is Role.NORMAL_DX else role
+            why[stem] = f"the folder has other maps of {base}"
+    plain = [stem for stem in stems if stem not in found and shared[stem] and Role.COLOUR not in found.values()]
+    for stem in plain[:1]:
+        found[stem], why[stem] = Role.COLOUR, "the other maps go on from its name"
+    # A word in the middle counts if no other file has its role: rock_albedo_wet, but not rock_color_chart beside rock_color.
+    pairs = zip(min(stems, default=""), max(stems, default=""), strict=False)
+    common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+    common = common[: max(common.rfind(sign) for sign in "_-. ") + 1]
+    for stem in stems:
+        if stem in found or len(stems) < 2:
+            continue
+        rest = [word for _, word in split_name(stem[len(common) :])]
+        for end in range(len(rest) - 1, 0, -1):
+            said = find_role("_".join(rest[:end]))
+            if said is not None and said[0] not in found.values():
+                found[stem], why[stem] = said[0], f"the word {rest[end - 1]!r}"
+                break
+    return found, why
+
+
+def report_guesses(why: Mapping[str, str], roles: Mapping[str, Role], said: Collection[str]) -> None:
+    """Report the roles that no name says alone, except those that the caller states."""
+    for name, reason in why.items():
+        if name not in said:
+            assume(f"{name}: read as {roles[name].value} ({reason})")
+
+
+def cut_name(file: str) -> str:
+    """Return the name of a file without the word for its map, so that all files of a material have the same."""
+    found, words = find_role(file), split_name(file)
+    if found is not None:
+        return (file[: found[1]].rstrip("_-. ") + file[found[2] :]).lstrip("_-. ")
+    return _cut(file) if words and words[-1][1] in LETTERS else file
+
+
+def _cut(stem: str) -> str:
+    """Return a name without the word for its map, or ""."""
+    found, words = find_role(stem), split_name(stem)
+    place = found[1] if found else words[-1][0] if len(words) > 1 else 0
+    return stem[:place].rstrip("_-. ")
