@@ -187,6 +187,13 @@ def test_what_is_refused(files: Path, words: list[str], message: str, capsys: py
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--convention gltf", "--depth 16", "--format tif", "--pack orm"])
+def test_how_maps_are_written_is_not_ignored(option: str, files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["synthesize", f"{files}/weave.png", "-o", f"{files}/p.zarr", "--size", "70", "--chunks", "32"]
+    assert main([*words, *option.split()]) == 2
+    assert f"{option.split()[0]}: is for results that are made at once" in capsys.readouterr().err
+
+
 def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     weave, heights = f"{files}/weave.png", f"{files}/heights.npy"
     np.save(heights, WEAVE[..., 1].astype(np.float32))

@@ -17,6 +17,7 @@ from texrs._notices import collect
 from texrs._typing import Array
 from texrs.cli import main
 from texrs.errors import InputWarning, InvalidInput
+from texrs.io._layers import read_layers
 from texrs.materials import Role, guess_role
 from texrs.materials._conventions import CONVENTIONS, File, guess_roles, list_conventions
 from texrs.materials._roles import CODED
@@ -580,6 +581,8 @@ def test_layers_keep_packed_maps(tmp_path: Path) -> None:
     for name, each in material.items():
         assert again[name].role is each.role
         assert (again[name].pixels == each.pixels).all()
+    # No other program takes the occlusion for a z.
+    assert {c for c in read_layers(tmp_path / "stack.exr")[0] if "_n." in c} == {f"1K_n.{k}" for k in range(4)}
 
 
 def test_the_labpbr_example_of_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

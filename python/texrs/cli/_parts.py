@@ -82,11 +82,14 @@ class InParts(Verb):
         for name, path in paths.items():
             if path is not None and name != "out":
                 raise InvalidInput(f"--{name}: is for results that are made at once, without {_list(said)}")
-        roles = Stack.take(given).roles
+        stack = Stack.take(given)
+        for flag, value in stack.list_writing().items():
+            if value is not None:
+                raise InvalidInput(f"{flag}: is for results that are made at once")
         text = given["size"]
         size = None if text is None else parse_size(text, axes=axes, limit=1 << 50)
         asked = Asked.read(said, axes)
-        call = options.call(options.read(given | {"size": None}, About(axes=axes, roles=roles)))
+        call = options.call(options.read(given | {"size": None}, About(axes=axes, roles=stack.roles)))
         usual = {p.name: p.default for p in inspect.signature(options.function).parameters.values()}
         for name, value in call.items():
             if name not in (*TAKEN, "size", "progress") and value is not usual[name] and value != usual[name]:

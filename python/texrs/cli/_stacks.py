@@ -104,10 +104,18 @@ class Stack:
                 raise InvalidInput("--pack: cannot be combined with --convention, which has its own packings")
         return cls(said, depth, None if suffix is None else f".{suffix}", pack, convention)
 
+    def list_writing(self) -> dict[str, object]:
+        """Return the values of all options that change how a material is written."""
+        return {
+            "--depth": self.depth,
+            "--format": self.suffix,
+            "--pack": self.pack,
+            "--convention": self.convention,
+        }
+
     def refuse(self, paths: Mapping[str, str | None]) -> None:
-        """Refuse what only a material can have."""
-        given: dict[str, object] = {"--role": self.roles, "--depth": self.depth, "--format": self.suffix}
-        given |= {"--pack": self.pack, "--convention": self.convention}
+        """Refuse options that only a material can have."""
+        given = {"--role": self.roles, **self.list_writing()}
         given |= {f"--{name}": paths.get(name) for name in SHOWN}
         for flag, value in given.items():
             if value:

@@ -25,7 +25,7 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """Names and packings that belong together. Of several files with one quantity, the first is written."""
+    """Names and packings that belong together. If several files have one quantity, the first is written."""
 
     title: str
     files: tuple[File, ...]
@@ -161,13 +161,13 @@ LETTERS = {file.end[1:].lower(): file.role for file in CONVENTIONS["unreal"].fil
 }
 MEANINGS = {
     "x": "normal x",
-    "y": "normal y, up",
-    "-y": "normal y, down",
+    "y": "normal y (up)",
+    "-y": "normal y (down)",
     "z": "normal z",
     "": "not used",
-    "reflectance": "reflectance at 0 degrees, 230 to 255: metal",
-    "porosity": "porosity, 65 to 255: scattering",
-    "emissiveness": "emission, 255: none",
+    "reflectance": "reflectance at 0 degrees (230 to 255: metal)",
+    "porosity": "porosity (65 to 255: scattering)",
+    "emissiveness": "emission (255: none)",
 }
 
 
@@ -177,7 +177,7 @@ def as_convention(value: object, name: str) -> str:
     Raises
     ------
     InvalidInput
-        There is no such convention.
+        The convention is not known.
 
     """
     if not isinstance(value, str) or value not in CONVENTIONS:
@@ -192,7 +192,7 @@ def list_conventions() -> str:
         for number, file in enumerate(convention.files):
             first = f"`{key}` | {convention.title}" if number == 0 else " | "
             held = ", ".join(MEANINGS.get(word, word) for word in file.role.layout) or file.role.value
-            more = ", alpha: opacity if there is any" if file.opacity else ""
+            more = "; alpha: opacity, if there is any" if file.opacity else ""
             lines.append(f"| {first} | `{convention.start}NAME{file.end}` | `{file.role.value}` | {held}{more} |")
     return "\n".join(lines)
 
@@ -200,9 +200,9 @@ def list_conventions() -> str:
 def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
     """Return the roles of the files of a folder by their names, and how those were found that no name says alone.
 
-    Words at the end of a name count first (see `guess_role`). Then short ends count if the other files of the folder make
-    them clear: those of Unreal (``T_Rock_N``) and of labPBR (``stone``, ``stone_n``, ``stone_s``), and a name that all others
-    go on from (``rock`` beside ``rock_normal``).
+    Words at the end of a name count first (see `guess_role`). Then short ends count if other files make them clear, as in
+    Unreal (``T_Rock_N``) and labPBR (``stone``, ``stone_n``, ``stone_s``). Last, a name with which others begin is that of the
+    colours (``rock`` next to ``rock_normal``).
     """
     found = {stem: each[0] for stem in stems if (each := find_role(stem)) is not None}
     why: dict[str, str] = {}
@@ -230,7 +230,7 @@ def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
     plain = [stem for stem in stems if stem not in found and shared[stem] and Role.COLOUR not in found.values()]
     for stem in plain[:1]:
         found[stem], why[stem] = Role.COLOUR, "the other maps go on from its name"
-    # A word in the middle counts if no other file has its role: rock_albedo_wet, but not rock_color_chart beside rock_color.
+    # A word in the middle counts if no other file has its role: rock_albedo_wet, not rock_color_chart next to rock_color.
     pairs = zip(min(stems, default=""), max(stems, default=""), strict=False)
     common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     common = common[: max(common.rfind(sign) for sign in "_-. ") + 1]

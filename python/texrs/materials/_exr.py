@@ -1,13 +1,13 @@
 """A material in one EXR file, a layer a map.
 
-================ ================================ =========================================================
+================ ================================ ===========================================================
 Role             Channels of the layer            Values
-================ ================================ =========================================================
+================ ================================ ===========================================================
 colours, others  R G B, R G B A, Y, Y A           linear light; integers as shares of their range
 normals, vectors X Y, X Y Z, X Y Z A              integers as -1 to 1, y as the role says
 labels           Y                                whole numbers of 32 bit
-more than 4      0, 1, 2, ...                     as above
-================ ================================ =========================================================
+more than 4      0, 1, 2, ...                     as above, also normals without z that have 3 or 4 channels
+================ ================================ ===========================================================
 
 Linear floats are kept as they are. Roles, spaces, dtypes and weights stand in the header, so that integers come back to the
 bit: those of 8 bit are half floats in the file, those of 16 bit floats. Files of other programs are read by the names of
@@ -82,7 +82,8 @@ def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: M
 
 def name_channels(role: Role, count: int) -> list[str]:
     """Return what the channels of a map are called."""
-    if count > 4:
+    if count > 4 or (role.bare and count > 2):
+        # The third channel of normals without z is not their z.
         return [str(k) for k in range(count)]
     letters = VECTORS if count > 1 and (role.normal or role is Role.VECTOR) else NAMES
     return list(letters[count - 1])

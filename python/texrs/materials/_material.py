@@ -40,7 +40,7 @@ CHANNELS: dict[Role, tuple[int, ...]] = {
 }
 """Number of channels that maps of a role may have; others have any."""
 AT_ONCE = 2
-"""Maps that are made at once: each takes up to 0.4 GB beside what it becomes."""
+"""Maps that are made at once: each takes up to 0.4 GB besides its result."""
 SHOWN = 512
 """Pixels of the longer side in a notebook."""
 
@@ -182,8 +182,9 @@ class Material(Exports):
         Returns
         -------
         Material
-            Its maps have the names of the files or layers, without what all of them begin with (``rock_albedo``,
-            ``rock_normal``).
+            Its maps have the names of the files or layers without their common start (``albedo`` of ``rock_albedo``). `save`
+            writes the whole names. Normals have the role that their values show: without z, or with y down, if no name or
+            role states the contrary. `notices` lists these facts.
 
         Raises
         ------

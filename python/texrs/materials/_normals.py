@@ -22,7 +22,8 @@ __all__ = ["settle_normals"]
 CUT = 512
 """Pixels along each side of the part that is looked at."""
 ENOUGH, STRONG = 0.1, 0.3
-"""Correlations from which on evidence decides about what is not stated, and contradicts what is."""
+"""Least correlations of evidence that decides, and of evidence that contradicts a stated role. On photographs and scans the
+slopes of the right direction correlate by 0.11 to 0.55, those of the wrong one by as much below 0."""
 STEEP = 0.2
 """Least z that slopes are taken with."""
 OTHER = {Role.NORMAL: Role.NORMAL_DX, Role.NORMAL_XY: Role.NORMAL_DX_XY}

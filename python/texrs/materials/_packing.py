@@ -25,11 +25,11 @@ ROLES = {role.value: role for role in Role}
 USUAL = {"occlusion": 1.0, "roughness": ROUGH, "smoothness": 1 - ROUGH, "metallic": METAL, "emissiveness": 1.0}
 """Values of quantities that no map has; of others 0."""
 METALS = 230
-"""Reflectance of labPBR, of 255, from which on a surface is metal; the last one has the colour of its albedo."""
+"""Least reflectance of metal in labPBR, of 255. A metal of 255 has the colour of its albedo."""
 
 
 def unpack_maps(maps: Mapping[str, Map]) -> dict[str, Map]:
-    """Return maps of which packed ones are one map a quantity; a quantity with a map of its own keeps that."""
+    """Return one map for each quantity of packed maps, and all other maps; a quantity with a map of its own keeps it."""
     kept: dict[str, Map] = {}
     for name, each in maps.items():
         if not each.role.packed:
@@ -160,7 +160,7 @@ def list_quantities(maps: Mapping[str, Map], axes: int) -> dict[str, tuple[str, 
 
 
 def join(found: Mapping[str, Map], role: Role, shape: tuple[int, ...], file: str) -> Map:
-    """Return a packed map of quantities, in the depth of the deepest; what is not there is usual."""
+    """Return a packed map of quantities, in the depth of the deepest; a quantity without a map is usual."""
     layout = role.layout
     several = [found[word].pixels.dtype for word in layout if word in found]
     dtype = choose_dtype(several)

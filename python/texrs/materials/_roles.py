@@ -1,4 +1,4 @@
-"""The role of a map in a material: what it is for, what its channels hold, and how its name says so.
+"""Roles of the maps of a material, the layout of their channels, and the names that give them.
 
 ====================== =======================================================================================
 Role                   Words at the end of a name
@@ -255,7 +255,7 @@ def as_role(value: object, name: str) -> Role:
     Raises
     ------
     InvalidInput
-        There is no such role.
+        The role is not known.
 
     """
     if isinstance(value, Role):

@@ -237,9 +237,9 @@ class SourceMap(Parted):
             Whether the exemplar is smoothed where the frames say that it is shrunk. Not for labels, nor with "nearest".
         kind : {"colour", "normal", "vector", "slope"}
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
-            with the local frame. If z is not stored (two channels, or a third that is constant or holds something else), only
-            x and y turn, and the other channels are looked up as they are. "vector": directions on the surface (channels x, y,
-            and others that do not turn), such as those of flow or of brushed metal; they turn and keep their length. "slope":
+            with the local frame. If z is not stored, only x and y turn, and the other channels are looked up as they are: the
+            third channel is constant, holds other values, or is missing. "vector": directions on the surface, such as
+            those of flow or of brushed metal. Channels x and y turn and keep their length, other channels do not turn. "slope":
             how much heights grow to the right and along y. In a volume all are directions in space, whose z, along the planes,
             turns too.
         green : {"up", "down"}

@@ -42,7 +42,7 @@ def stores_z(exemplars: Sequence[Array]) -> bool:
     dtype = exemplars[0].dtype
     scale, offset = find_scale(dtype, any(float(e[..., :3].min()) < 0 for e in exemplars))
     flat = [e.reshape(-1, e.shape[-1])[:, :3] for e in exemplars]
-    # A stride that is no multiple of the width meets all columns.
+    # A stride with another factor than the width meets all columns.
     some = [f[np.arange(min(len(f), SAMPLES)) * 7919 % len(f)] for f in flat]
     with np.errstate(all="ignore"):
         x, y, z = np.moveaxis(np.concatenate(some).astype(np.float64) * scale - offset, -1, 0)
