@@ -28,14 +28,20 @@ def draw(dtype: str, *channels: int) -> Array:
     return RANDOM.integers(info.min, info.max, (*SHAPE, *channels), kind, endpoint=True)
 
 
+def draw_normals(dtype: str) -> Array:
+    vectors = RANDOM.normal(0, 1, (*SHAPE, 3)) * [0.3, 0.3, 0] + [0, 0, 1]
+    vectors /= np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.rint((vectors + 1) / 2 * np.iinfo(dtype).max).astype(dtype)
+
+
 EVERY = Material(
     {
         "albedo": draw("uint8", 4),
         "basecolor": draw("uint16", 3),
         "diffuse": draw("float32", 3),
         "grey": draw("uint8", 2),
-        "normal": draw("uint8", 3),
-        "normal_dx": draw("uint16", 3),
+        "normal": draw_normals("uint8"),
+        "normal_dx": draw_normals("uint16"),
         "nor": draw("float16", 4),
         "height": draw("uint16"),
         "disp": draw("float32", 1),
