@@ -563,6 +563,21 @@ def test_what_no_map_holds_is_written_as_usual_and_said(tmp_path: Path) -> None:
     assert (io.read(tmp_path / "MetallicSmoothness.png")[..., 3] == 102).all()
 
 
+def test_packed_maps_are_taken_apart(tmp_path: Path) -> None:
+    write_stack(tmp_path / "in", "labpbr")
+    material = Material.read(tmp_path / "in")
+    files = {f.stem.removeprefix("Stone02_1K"): io.read(f) for f in material.save(tmp_path / "out", pack="none")}
+    assert (files["_ao"] == draw_channel("occlusion")).all()
+    assert (files["_height"] == draw_channel("height")).all()
+    assert (files["_smoothness"] == draw_channel("smoothness")).all()
+    assert (files["_metallic"] == np.where(draw_channel("reflectance") >= 230, 255, 0)).all()
+    assert np.abs(files["_n"].astype(int) - encode(draw_normals(down=True))).max() <= 2
+    packed = {f.stem.removeprefix("Stone02_1K"): io.read(f) for f in material.save(tmp_path / "orm", pack="orm")}
+    assert (packed["_orm"][..., 0] == draw_channel("occlusion")).all()
+    assert (packed["_orm"][..., 1] == 255 - draw_channel("smoothness")).all()
+    assert (packed["_orm"][..., 2] == files["_metallic"]).all()
+
+
 def test_a_packed_map_is_applied_as_the_material_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     write_stack(tmp_path / "in", "hdrp")

@@ -37,7 +37,7 @@ from texrs.cli._places import check_corners
 from texrs.cli._texts import PLANE
 from texrs.cli._verb import Verb
 from texrs.errors import InvalidInput
-from texrs.materials import Material, Role, guess_role
+from texrs.materials import Material, guess_role
 from texrs.synthesis import Synthesis
 
 # --- the verbs -------------------------------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ def read_cameras(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
     """Return the angle of view that an exemplar states, and where the y of a target's normals grows, by its name."""
     found = read_exemplar_camera(given)
     target = given["target"] or ""
-    if not target.startswith(PLANE) and guess_role(Path(target).stem) is Role.NORMAL_DX:
+    if not target.startswith(PLANE) and (role := guess_role(Path(target).stem)) is not None and role.down:
         found["target_green",] = "down"
         if given["target_green"] is None:
             assume(f"{target}: read with y down, because of its name")

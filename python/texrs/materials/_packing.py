@@ -37,7 +37,7 @@ def unpack_maps(maps: Mapping[str, Map]) -> dict[str, Map]:
             continue
         words = lay_out(each)
         if each.role.normal:
-            kept[name] = take_channels(each, 0, 2, Role.NORMAL_DX_XY)
+            kept[name] = add_z(take_channels(each, 0, 2, Role.NORMAL_DX_XY))
         for channel, word in enumerate(words):
             role, title = ROLES.get(word, Role.OTHER), SHORT.get(word, word)
             there = title in maps or (role is not Role.OTHER and find_map(maps, role) is not None)
