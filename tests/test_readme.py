@@ -51,6 +51,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ground = np.full((128, 128), 255, np.uint8)
     for name, mask in (("hole", hole), ("thing", hole), ("ground", ground)):
         io.write(folder / f"{name}.png", mask)
+    samples.particles((32, 36, 40)).image[..., 0].astype("<u2").tofile(folder / "scan.raw")
     pebbles = samples.pebbles((96, 96)).image
     for name in ("photos", "masks", "textures/walls", "textures/floors"):
         (folder / name).mkdir(parents=True)

@@ -351,7 +351,8 @@ def test_pictures_are_not_volumes(tmp_path, suffix):
 @pytest.mark.parametrize(
     ("make_it", "says"),
     [
-        (lambda p: tio.write_volume(p / "a.tif", np.zeros((2, 2, 2)), spacing=(1, 1, 1)), r"\.tif cannot keep it"),
+        (lambda p: tio.write_volume(p / "a.npy", np.zeros((2, 2, 2)), spacing=(1, 1, 1)), r"\.npy cannot keep it"),
+        (lambda p: tio.write_volume(p / "a.tif", np.zeros((2, 2, 2)), spacing=(1, 1, 1)), r"\.tif keeps it for uint8"),
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing=(1, 1)), "three numbers"),
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing=3), "three numbers"),
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing=(1, 0, 1)), "spacing: needs a number"),

@@ -57,19 +57,35 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from math import atan, degrees, prod
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from texrs import _notices
 from texrs._checks import as_instance, as_items, as_limit, try_array
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _descriptions, _files, _image_io, _npy, _origins, _pillow, _slabs, _stores, _tiff, _volumes
+from texrs.io import (
+    _descriptions,
+    _files,
+    _image_io,
+    _npy,
+    _origins,
+    _pillow,
+    _raw,
+    _series,
+    _slabs,
+    _stores,
+    _tiff,
+    _volumes,
+)
 from texrs.io._annotation import annotate, read_notes
 from texrs.io._files import atomic, find_suffix
-from texrs.io._formats import FORMATS, STORE, VOLUMES, as_spacing, check, detect_kind
-from texrs.io._grids import READERS, read_numpy, read_spacing
+from texrs.io._formats import FORMATS, READ_IMAGES, STORE, VOLUMES, as_spacing, check, detect_kind, holds_spacing
+from texrs.io._grids import READERS, read_numpy, read_spacing, read_unit
 from texrs.io._notes import Notes
 from texrs.io._npy import Header, read_arrays, read_headers
 from texrs.io._stores import is_store
@@ -232,8 +248,10 @@ def read_description(path: PathLike) -> str | None:
     return _descriptions.read(_files.as_path(path))
 
 
-def read_volume(path: PathLike, *, limit: int | None = None) -> Array:
-    """Return the volume of a file.
+def read_volume(
+    path: PathLike, *, shape: Sequence[int] | None = None, dtype: DTypeLike | None = None, limit: int | None = None
+) -> Array:
+    """Return the volume of a file, or of a folder of slices.
 
     Parameters
     ----------
@@ -241,6 +259,12 @@ def read_volume(path: PathLike, *, limit: int | None = None) -> Array:
         A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, .vtk, NRRD or NIfTI (these with the extra
         ``vol``), or the folder of a Zarr store (extra ``dask``), whichever its content says it is. A NIfTI file that
         scales its samples gives float32. Of OME-Zarr the finest level is read; a path inside the store names another.
+        Or a folder of numbered slices (``scan_1.tif`` to ``scan_48.tif``), in the order of their numbers. Or samples without
+        a header: ``scan.raw:96x96x48:uint16`` states the width, height, depth, type and, with ``:big``, the byte order.
+    shape : sequence of int, optional
+        (D, H, W) or (D, H, W, C) of a file without a header, if its name does not state it. Default: None.
+    dtype : dtype, optional
+        Type of the samples of a file without a header, such as "uint16" or ">i2". Default: None.
     limit : int, optional
         Voxels that the volume may have, and a sixteenth of the bytes; by default those that `texrs.limits` allows.
 
@@ -252,7 +276,7 @@ def read_volume(path: PathLike, *, limit: int | None = None) -> Array:
     Raises
     ------
     FileError
-        Missing, not readable, empty, cut off, corrupt, or not a volume.
+        Missing, not readable, empty, cut off, corrupt, or not a volume; slices that are missing or differ in shape or type.
     LimitExceeded
         More voxels or more memory than the limit.
 
@@ -261,18 +285,22 @@ def read_volume(path: PathLike, *, limit: int | None = None) -> Array:
     >>> import pathlib, tempfile
     >>> import numpy as np
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = pathlib.Path(folder, "cube.tif")
-    ...     write_volume(path, np.zeros((5, 4, 3), np.float32))
-    ...     read_volume(path).shape
-    (5, 4, 3)
+    ...     path = pathlib.Path(folder, "cube.raw")
+    ...     np.zeros((5, 4, 3), np.uint16).tofile(path)
+    ...     read_volume(path, shape=(5, 4, 3), dtype="uint16").shape, read_volume(f"{path}:3x4x5:uint16").shape
+    ((5, 4, 3), (5, 4, 3))
 
     """
     name, limit = _files.as_path(path), as_limit(limit, axes=3)
+    if shape is not None or dtype is not None:
+        return _raw.make_raw(name, shape, dtype).read(limit)
     kind = detect_kind(name)
+    if kind == "slices":
+        return _series.read_series(name, READ_IMAGES, limit, lambda path, most: read(path, limit=most))
     if kind not in READERS:
         raise FileError(
             f"{name}: is a {kind} file, which holds one image; "
-            "volumes are read from TIFF, .npy, .npz, .vti, .vtk, NRRD, NIfTI and Zarr"
+            "volumes are .npy, .npz, .vti, .vtk, NRRD, NIfTI, Zarr, .raw, TIFF or folders of numbered slices"
         )
     return READERS[kind](name, limit)
 
@@ -325,7 +353,12 @@ def write(
 
 
 def write_volume(
-    path: PathLike, array: Array, *, overwrite: bool = True, spacing: Sequence[float] | None = None
+    path: PathLike,
+    array: Array,
+    *,
+    overwrite: bool = True,
+    spacing: Sequence[float] | None = None,
+    like: PathLike | None = None,
 ) -> None:
     """Write a volume, whole or not at all.
 
@@ -339,8 +372,11 @@ def write_volume(
     overwrite : bool
         Whether a file that exists may be replaced.
     spacing : sequence of 3 float, optional
-        From plane to plane, from row to row and from column to column, in whatever unit; by default 1. The last five
-        formats keep it, the others cannot; `read_spacing` reads it.
+        From plane to plane, from row to row and from column to column, in whatever unit. The last five formats keep it, and
+        .tif of uint8, uint16 or float32 as ImageJ does; `read_spacing` reads it. Default: that of ``like``, or 1.
+    like : path_like, optional
+        Volume whose spacing goes through. From NRRD to NRRD, NIfTI to NIfTI and ImageJ to ImageJ its orientation, origin and
+        units go through also. Default: None.
 
     Raises
     ------
@@ -360,7 +396,7 @@ def write_volume(
     (5, 4, 3, 3)
 
     """
-    _write(path, array, 3, overwrite, spacing)
+    _write(path, array, 3, overwrite, spacing, like=None if like is None else _files.as_path(like))
 
 
 def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *, overwrite: bool = True) -> None:
@@ -467,12 +503,16 @@ def _write(
     spacing: Sequence[float] | None,
     description: str | None = None,
     tags: Sequence[tuple[int, int, int, object]] = (),
+    like: Path | None = None,
 ) -> None:
     target = _files.as_path(path)
     suffix = find_suffix(target).lower()
     if suffix not in FORMATS and suffix != STORE:
         raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}, {STORE}")
-    array, steps = check(value, suffix, axes), as_spacing(spacing, suffix)
+    array = check(value, suffix, axes)
+    if spacing is None and like is not None and holds_spacing(array, suffix):
+        spacing = read_spacing(like)
+    steps = as_spacing(spacing, suffix)
     if suffix == STORE:
         _stores.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
         return
@@ -488,16 +528,25 @@ def _write(
         if suffix in (".tif", ".tiff"):
             planes = array if axes == 3 else array[np.newaxis]
             planes = planes if planes.ndim == 4 else planes[..., np.newaxis]
+            if spacing is not None:
+                if not _tiff.keeps_spacing(planes.dtype, planes.shape[3]):
+                    raise InvalidInput(
+                        f"spacing: .tif keeps it for uint8, uint16 and float32, and for uint8 with 3 channels; "
+                        f"got {array.dtype} with {planes.shape[3]} channels"
+                    )
+                _tiff.write_imagej(temporary, planes, steps, read_unit(like))
+                return
             _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes, description, tags)
             return
         if axes == 3:
             volume = array[..., 0] if array.ndim == 4 and array.shape[3] == 1 else array
             if suffix == ".nrrd":
-                _volumes.write_nrrd(temporary, volume, steps)
+                _volumes.write_nrrd(temporary, volume, steps, _find_header(like, "nrrd"))
             elif suffix == ".vti":
                 _volumes.write_vti(temporary, volume, steps)
             else:
-                _volumes.write_nifti(temporary, volume, steps, compressed=suffix == ".nii.gz")
+                header = _find_header(like, "nii", "nii.gz")
+                _volumes.write_nifti(temporary, volume, steps, header, compressed=suffix == ".nii.gz")
             return
         if array.ndim == 3 and array.shape[2] == 1:
             array = array[..., 0]
@@ -508,3 +557,8 @@ def _write(
             if suffix == ".png" and description is not None:
                 file = _descriptions.describe_png(file, description)
         temporary.write_bytes(file)
+
+
+def _find_header(like: Path | None, *kinds: str) -> Any:
+    """Return what the header of a volume states, if it is of one of the kinds."""
+    return _volumes.read_header(like) if like is not None and detect_kind(like) in kinds else None

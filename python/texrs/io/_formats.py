@@ -12,7 +12,7 @@ from texrs._checks import as_float, as_tuple, check_memory
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _files, _npy, _stores, _volumes, _vtk
+from texrs.io import _files, _npy, _raw, _series, _stores, _tiff, _volumes, _vtk
 
 MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "png"),
@@ -50,11 +50,10 @@ NAMES = (
 _NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
 _SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
 _MOST_CHANNELS = 64
-RAW = ".raw"
-"""The suffix of samples without a header, which lies beside them."""
+RAW = _raw.RAW
 STORE = ".zarr"
 """The suffix of a folder, which is a store of Zarr."""
-VOLUMES = ("nrrd", "nii", "nii.gz", "vti", "vtk")
+VOLUMES = ("nrrd", "nii", "nii.gz", "vti", "vtk", "raw", "slices")
 UNIT = (1.0, 1.0, 1.0)
 
 
@@ -113,6 +112,10 @@ def detect_kind(path: Path) -> str:
     """Return which format a file has, by its content."""
     if _stores.is_store(path):
         return "zarr"
+    if _series.is_series(path, READ_IMAGES):
+        return "slices"
+    if _raw.parse_raw(path) is not None:
+        return "raw"
     _files.check_file(path)
     with _files.translate_errors(path, "reading"), path.open("rb") as file:
         start = file.read(40)
@@ -126,19 +129,32 @@ def detect_kind(path: Path) -> str:
     # TGA has no signature.
     if path.suffix.lower() == ".tga":
         return "tga"
+    if path.suffix.lower() == RAW:
+        raise FileError(_raw.explain_raw(path))
     raise FileError(f"{path}: its content is none of {', '.join(NAMES)}")
 
 
 def keeps_spacing(suffix: str) -> bool:
-    """Return whether files of a suffix say how far their voxels lie apart."""
-    return suffix == STORE or (suffix in FORMATS and not FORMATS[suffix].images)
+    """Return whether volumes of a suffix can state how far their voxels lie apart."""
+    return suffix == STORE or FORMATS.get(suffix) is _TIFF or (suffix in FORMATS and not FORMATS[suffix].images)
+
+
+def holds_spacing(volume: Array, suffix: str) -> bool:
+    """Return whether files of a suffix can state how far the voxels of a volume lie apart."""
+    channels = volume.shape[3] if volume.ndim == 4 else 1
+    return keeps_spacing(suffix) and (FORMATS.get(suffix) is not _TIFF or _tiff.keeps_spacing(volume.dtype, channels))
 
 
 def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
     if spacing is None:
         return UNIT
     if not keeps_spacing(suffix):
-        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz, .vti and .zarr can")
+        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz, .vti, .tif and .zarr can")
+    return check_spacing(spacing)
+
+
+def check_spacing(spacing: Sequence[float]) -> tuple[float, ...]:
+    """Check how far voxels lie apart along planes, rows and columns."""
     steps = as_tuple(spacing, "spacing", 3, "three numbers, of planes, rows and columns")
     return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
-from texrs.io import _files, _npy, _stores, _tiff, _volumes, _vtk
-from texrs.io._formats import detect_kind
+from texrs.io import _files, _npy, _raw, _series, _stores, _tiff, _volumes, _vtk
+from texrs.io._formats import READ_IMAGES, VOLUMES, detect_kind
 
-__all__ = ["READERS", "VECTORS", "read_numpy", "read_spacing"]
+__all__ = ["READERS", "VECTORS", "holds_volume", "read_numpy", "read_spacing", "read_unit"]
 
 _MOST_CHANNELS = 4096
 
@@ -43,6 +43,12 @@ def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
     return (_npy.read_npy if kind == "npy" else _npy.read_npz)(name, limit, check)
 
 
+def _read_raw(name: Path, limit: int) -> Array:
+    raw = _raw.parse_raw(name)
+    assert raw is not None
+    return raw.read(limit)
+
+
 READERS: dict[str, Reader] = {
     "tiff": _read_tiff,
     "npy": lambda name, limit: read_numpy(name, "npy", limit, 3),
@@ -53,6 +59,7 @@ READERS: dict[str, Reader] = {
     "nii": partial(_volumes.read_nifti, compressed=False),
     "nii.gz": partial(_volumes.read_nifti, compressed=True),
     "zarr": lambda name, limit: _stores.read_store(name, limit, 3),
+    "raw": _read_raw,
 }
 """Of volumes."""
 VECTORS: dict[str, Reader] = READERS | {
@@ -70,8 +77,31 @@ SPACINGS: dict[str, Callable[[Path], Sequence[float] | None]] = {
     "nii": partial(_volumes.read_nifti_spacing, compressed=False),
     "nii.gz": partial(_volumes.read_nifti_spacing, compressed=True),
     "zarr": _stores.read_store_spacing,
+    "tiff": _tiff.read_spacing,
+    "slices": lambda name: (
+        _tiff.read_spacing(first) if detect_kind(first := _series.list_slices(name, READ_IMAGES)[0]) == "tiff" else None
+    ),
 }
 """Of distances between samples, x first."""
+
+
+def holds_volume(path: PathLike) -> bool:
+    """Return whether a file is a volume: of a kind that holds nothing else, or of several planes.
+
+    The last of three axes of an .npy file is that of channels if there are up to four.
+    """
+    name = _files.as_path(path)
+    kind = detect_kind(name)
+    if kind in VOLUMES:
+        return True
+    if kind == "tiff":
+        return _tiff.count_planes(name) > 1
+    if kind == "zarr":
+        return _stores.count_axes(name) > 2
+    if kind != "npy":
+        return False
+    shape = _npy.read_header(name).shape
+    return len(shape) == 4 or (len(shape) == 3 and shape[2] > 4)
 
 
 def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
@@ -85,8 +115,8 @@ def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
     Returns
     -------
     (float, float, float) or None
-        From plane to plane, from row to row and from column to column, as NRRD, NIfTI, .vti, .vtk and OME-Zarr state it;
-        None where nothing is stated.
+        From plane to plane, from row to row and from column to column, as the file states it. NRRD, NIfTI, .vti,
+        .vtk, OME-Zarr and stacks of ImageJ (.tif) can. None if nothing is stated.
 
     Raises
     ------
@@ -111,3 +141,11 @@ def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
     if steps is None or len(steps) != 3 or not all(math.isfinite(s) and s > 0 for s in steps):
         return None
     return float(steps[2]), float(steps[1]), float(steps[0])
+
+
+def read_unit(path: Path | None) -> str:
+    """Return the unit that a stack of ImageJ states; empty if there is none."""
+    if path is not None and detect_kind(path) == "slices":
+        path = _series.list_slices(path, READ_IMAGES)[0]
+    found = _tiff.read_imagej(path) if path is not None and detect_kind(path) == "tiff" else None
+    return "" if found is None else found[1]

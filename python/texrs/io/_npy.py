@@ -72,6 +72,13 @@ Choice = Callable[[Mapping[str, Header]], Iterable[str]]
 """Says which arrays are to be read, by what all are; or raises."""
 
 
+def read_header(path: Path) -> Header:
+    """Read the header of an .npy file."""
+    check_file(path)
+    with translate_errors(path, "reading the array"), path.open("rb") as file:
+        return _read_header(path, file)
+
+
 def read_npy(path: Path, limit: int, check: Callable[[Header], object] | None = None) -> Array:
     """Read an .npy file whose header passes a check."""
     length = check_file(path)

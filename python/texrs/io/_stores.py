@@ -70,6 +70,16 @@ def read_store(path: Path, limit: int, axes: int | None) -> Array:
         return _tidy(values.transpose([left.index(a) for a in order]))
 
 
+def count_axes(path: Path) -> int:
+    """Return how many axes of space the array of a store has; channels are named, or come last."""
+    with translate_errors(path, "reading the store"):
+        array, names = _find(path)
+    if names is None:
+        axes: int = array.ndim
+        return axes - int(axes == 3 and array.shape[2] <= 4)
+    return sum(name.lower() in _SPACE for name in names)
+
+
 def read_store_spacing(path: Path) -> Sequence[float] | None:
     """Return the distances that OME-Zarr states of the finest level, x first."""
     with translate_errors(path, "reading the store"):

@@ -129,6 +129,43 @@ def _report_others(path: Path, tif: Any, series: Any) -> None:
             ignore(f"{path}: {unused} of {len(tif.pages)} pages not used: their size or type is not that of the first")
 
 
+def count_planes(path: Path) -> int:
+    """Return how many planes a file contains."""
+    import tifffile
+
+    length = check_file(path)
+    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
+        _check_chain(path, tif, length)
+        if not tif.series:
+            return 0
+        return _read_sides(path, tif.series[0].axes, tif.series[0].shape)[0][0]
+
+
+def read_spacing(path: Path) -> Sequence[float] | None:
+    """Return the distances that ImageJ states, x first."""
+    found = read_imagej(path)
+    return None if found is None else found[0]
+
+
+def read_imagej(path: Path) -> tuple[tuple[float, float, float], str] | None:
+    """Return the distances between voxels that ImageJ states, x first, and their unit; None if it states none."""
+    import tifffile
+
+    length = check_file(path)
+    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
+        _check_chain(path, tif, length)
+        said = tif.imagej_metadata
+        if not said or not isinstance(said.get("spacing"), int | float) or not tif.pages:
+            return None
+        steps = []
+        for name in ("XResolution", "YResolution"):
+            tag = tif.pages.first.tags.get(name)
+            # ImageJ states pixels in a unit as a fraction.
+            over, under = tag.value if tag is not None and isinstance(tag.value, tuple) else (1, 1)
+            steps.append(under / over if over and under else 1.0)
+        return (steps[0], steps[1], abs(float(said["spacing"]))), str(said.get("unit", ""))
+
+
 def take_image(path: Path, planes: Array, orientation: int) -> Array:
     """Return the only plane of a file."""
     if planes.shape[0] != 1:
@@ -171,6 +208,24 @@ def write_tiff(
     with tifffile.TiffWriter(path, bigtiff=size > 2**32 - 2**25) as tif:
         for plane in planes:
             tif.write(plane if channels > 1 else plane[..., 0], **options)
+
+
+def keeps_spacing(dtype: np.dtype[Any], channels: int) -> bool:
+    """Return whether stacks of ImageJ can hold volumes of a dtype."""
+    return (dtype.name, channels) in {("uint8", 1), ("uint16", 1), ("float32", 1), ("uint8", 3)}
+
+
+def write_imagej(path: Path, volume: Array, spacing: Sequence[float], unit: str) -> None:
+    """Write a volume (D, H, W, C) with its spacing, z first, as ImageJ states it."""
+    import tifffile
+
+    coloured = volume.shape[3] == 3
+    said: dict[str, Any] = {"axes": "ZYXS" if coloured else "ZYX", "spacing": float(spacing[0])}
+    if unit:
+        said["unit"] = unit
+    shown = volume if coloured else volume[..., 0]
+    with tifffile.TiffWriter(path, imagej=True) as tif:
+        tif.write(shown, resolution=(1 / spacing[2], 1 / spacing[1]), metadata=said)
 
 
 def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, int, int], int]:

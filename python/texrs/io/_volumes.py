@@ -139,17 +139,50 @@ def _read_nrrd_header(path: Path, file: BinaryIO, length: int) -> tuple[dict[str
         return dict(nrrd.read_header(io.BytesIO(start[:end]))), end
 
 
-def write_nrrd(path: Path, volume: Array, spacing: Sequence[float]) -> None:
-    """Write an NRRD volume, raw."""
+def read_header(path: Path) -> Any:
+    """Return the header of an NRRD file as pynrrd reads it, or that of a NIfTI file as nibabel does."""
+    length = check_file(path)
+    with translate_errors(path, "reading"), path.open("rb") as raw:
+        start = raw.read(2)
+        raw.seek(0)
+        if start == NRRD_MAGIC[:2]:
+            return _read_nrrd_header(path, raw, length)[0]
+        file: BinaryIO = gzip.GzipFile(fileobj=raw) if start == GZIP_MAGIC else raw  # type: ignore[assignment]
+        return _read_nifti_header(path, file)[0]
+
+
+def _place_nrrd(known: dict[str, Any], steps: list[float], before: int) -> dict[str, Any]:
+    """Return the fields of a header that state where voxels lie, as another header has them, with steps of these lengths."""
+    placed: dict[str, Any] = {
+        key: known[key] for key in ("space", "space dimension", "space units", "measurement frame") if key in known
+    }
+    origin, rows = known.get("space origin"), known.get("space directions")
+    units = [u for u in known.get("units", []) if u][-3:]
+    if len(units) == 3:
+        placed["units"] = [""] * before + units
+    # Only three directions of space can be those of the axes.
+    if rows is None or not placed.keys() & {"space", "space dimension"}:
+        return placed | {"spacings": [float("nan")] * before + steps}
+    found = np.array([[np.nan] * 3 if row is None else row for row in rows], float)
+    found = found[np.isfinite(found).all(axis=1)]
+    lengths = np.linalg.norm(found, axis=1)
+    if found.shape != (3, 3) or not (lengths > 0).all():
+        return placed | {"spacings": [float("nan")] * before + steps}
+    turned = found * np.where(np.isclose(lengths, steps, rtol=1e-6), 1, steps / lengths)[:, np.newaxis]
+    placed["space directions"] = np.concatenate([np.full((before, 3), np.nan), turned])
+    return placed if origin is None else placed | {"space origin": origin}
+
+
+def write_nrrd(path: Path, volume: Array, spacing: Sequence[float], like: dict[str, Any] | None = None) -> None:
+    """Write an NRRD volume, raw; its voxels lie as the header ``like`` states."""
     nrrd: Any = _import_library("nrrd", "pynrrd", path)
-    axes = [repr(float(s)) for s in reversed(spacing)]
+    steps = [float(s) for s in reversed(spacing)]
     header: dict[str, Any] = {"encoding": "raw", "endian": "little"}
     if volume.ndim == 4:
         header["kinds"] = [_NRRD_CHANNELS.get(volume.shape[3], "vector"), "domain", "domain", "domain"]
-        header["spacings"] = [float("nan"), *map(float, axes)]
     else:
         header["kinds"] = ["domain"] * 3
-        header["spacings"] = [*map(float, axes)]
+    header |= _place_nrrd(like or {}, steps, volume.ndim - 3)
     little = volume.astype(volume.dtype.newbyteorder("<"), copy=False)
     with path.open("xb") as file:
         nrrd.write(file, little, header, index_order="C", compression_level=1)
@@ -244,8 +277,11 @@ def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], 
         return header, np.dtype(header.get_data_dtype()), need
 
 
-def write_nifti(path: Path, volume: Array, spacing: Sequence[float], *, compressed: bool) -> None:
-    """Write a NIfTI volume of version 1: bytes of three or four channels as colours, others as vectors."""
+def write_nifti(path: Path, volume: Array, spacing: Sequence[float], like: Any = None, *, compressed: bool) -> None:
+    """Write a NIfTI volume: bytes of three or four channels as colours, others as vectors.
+
+    Its voxels lie as the header ``like`` states; without one it is of version 1, and the first voxel is the origin.
+    """
     nibabel: Any = _import_library("nibabel", "nibabel", path)
     channels = volume.shape[3] if volume.ndim == 4 else 1
     vector = False
@@ -257,12 +293,33 @@ def write_nifti(path: Path, volume: Array, spacing: Sequence[float], *, compress
     else:
         vector = True
         data = np.moveaxis(volume, -1, 0)[:, np.newaxis]
-    affine = np.diag([*(float(s) for s in reversed(spacing)), 1.0])
-    image = nibabel.Nifti1Image(data.T, affine, dtype=data.dtype)
+    steps = np.array([float(s) for s in reversed(spacing)])
+    if like is None:
+        image = nibabel.Nifti1Image(data.T, np.diag([*steps, 1.0]), dtype=data.dtype)
+    else:
+        image = _place_nifti(nibabel, data.T, steps, like)
     if vector:
         image.header.set_intent("vector")
     content = image.to_bytes()
     path.write_bytes(gzip.compress(content, 1, mtime=0) if compressed else content)
+
+
+def _place_nifti(nibabel: Any, data: Array, steps: NDArray[np.float64], like: Any) -> Any:
+    """Return an image whose voxels lie as a header states, with steps of these lengths."""
+    second = isinstance(like, nibabel.Nifti2Header)
+    header = (nibabel.Nifti2Header if second else nibabel.Nifti1Header)()
+    for key in ("qform_code", "sform_code", "xyzt_units", "quatern_b", "quatern_c", "quatern_d"):
+        header[key] = like[key]
+    for key in ("qoffset_x", "qoffset_y", "qoffset_z"):
+        header[key] = like[key]
+    known = np.abs(np.asarray(like["pixdim"][1:4], np.float64))
+    times = np.where(np.isclose(known, steps, rtol=1e-6) | ~(known > 0), 1, steps / np.where(known > 0, known, 1))
+    for key in ("srow_x", "srow_y", "srow_z"):
+        header[key] = like[key] * [*times, 1]
+    header.set_data_dtype(data.dtype)
+    header.set_data_shape(data.shape)
+    header["pixdim"][:4] = [like["pixdim"][0], *(np.where(known > 0, known, 1) * times)]
+    return (nibabel.Nifti2Image if second else nibabel.Nifti1Image)(data, None, header)
 
 
 # --- ParaView and surfaces -------------------------------------------------------------------------------------------
