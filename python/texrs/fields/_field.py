@@ -62,6 +62,8 @@ class Field(ABC):
     axes: int
     _rigid = False
     """Whether every frame is a rotation: then J is the transposed F, and none is singular."""
+    _placed_in_voxels = False
+    """Whether points are voxels whatever the spacing, as of an array that spreads over the output."""
 
     @abstractmethod
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
@@ -251,8 +253,15 @@ class Field(ABC):
         'circular, x outwards, about (32, 16)'
 
         """
-        as_size(shape, "shape", axes=self.axes)
+        return self._over([n - 1 for n in as_size(shape, "shape", axes=self.axes)])
+
+    def _over(self, reach: Sequence[float]) -> Field:
+        """Return the field over an output whose last point lies so far from its first."""
         return self
+
+    def _check_steps(self, steps: Sequence[float]) -> None:
+        """Check whether voxels of a spacing are small enough for the field."""
+        return
 
     def inverse(self) -> Field:
         """Return the field whose frames are the inverses of these at each point.
@@ -361,8 +370,12 @@ class _Inverse(Field):
     def describe(self) -> str:
         return f"inverse of: {self.field.describe()}"
 
-    def over(self, shape: Sequence[int]) -> Field:
-        return _Inverse(self.field.over(shape))
+    def _over(self, reach: Sequence[float]) -> Field:
+        return _Inverse(self.field._over(reach))
+
+    @property
+    def _placed_in_voxels(self) -> bool:  # type: ignore[override]
+        return self.field._placed_in_voxels
 
     def inverse(self) -> Field:
         return self.field

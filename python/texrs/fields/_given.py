@@ -17,6 +17,7 @@ from texrs.fields._directions import from_directions
 from texrs.fields._field import Field
 from texrs.fields._parse import parse
 from texrs.fields._sampled import from_array
+from texrs.fields._spaced import space
 from texrs.io._formats import READ_VOLUMES, STORE
 
 __all__ = ["FieldLike", "as_field", "read"]
@@ -108,7 +109,9 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
     return field
 
 
-def as_field(value: object, axes: int, extent: Sequence[int] | None = None) -> Field | None:
+def as_field(
+    value: object, axes: int, extent: Sequence[int] | None = None, *, spacing: Sequence[float] | None = None
+) -> Field | None:
     """Return the field that was given: itself, in words, as an array, or as the file of one; None stays.
 
     Parameters
@@ -121,6 +124,10 @@ def as_field(value: object, axes: int, extent: Sequence[int] | None = None) -> F
         2 or 3.
     extent : sequence of int, optional
         Voxels that arrays spread over, and over which words are meant; by default one for each vector.
+    spacing : sequence of float, optional
+        Distances between voxels along planes, rows and columns: the field turns and scales in space, where voxels need not
+        be cubes. Places and lengths of the field are in the unit of the spacing. Arrays spread over voxels, and their
+        vectors or frames are those of space. A field that has a spacing keeps it. Default: voxels are cubes of side 1.
 
     Returns
     -------
@@ -142,15 +149,28 @@ def as_field(value: object, axes: int, extent: Sequence[int] | None = None) -> F
     >>> fields.as_field(np.ones((4, 4, 4, 3)), 3, (32, 32, 32)).axes
     3
 
+    A quarter turn in a volume whose planes lie 2 apart, and whose rows and columns 1:
+
+    >>> fields.as_field("slant:angle=90,plane=yz", 3, spacing=(2, 1, 1)).constant.round(3) + 0
+    array([[ 0. ,  0.5,  0. ],
+           [-2. ,  0. ,  0. ],
+           [ 0. ,  0. ,  1. ]], dtype=float32)
+
     """
     if value is None:
         return None
+    as_axes(axes)
+    if isinstance(value, str) and not is_file(value):
+        return parse(value, axes, extent, spacing=spacing)
+    return space(_make_field(value, axes, extent), spacing)
+
+
+def _make_field(value: object, axes: int, extent: Sequence[int] | None) -> Field:
+    """Return the field that was given, in units of voxels."""
     if isinstance(value, Field):
         if value.axes != axes:
             raise InvalidInput(f"field: needs a field of {axes} axes, got {value}")
         return value
-    if isinstance(value, str) and not is_file(value):
-        return parse(value, axes, extent)
     if isinstance(value, str | os.PathLike):
         name, words = _split(value) if isinstance(value, str) else (os.fspath(value), "")
         return read(FilePath(name), extent, axes=axes, **_parse_options(words))

@@ -9,7 +9,7 @@ from math import cos, log, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_size
+from texrs.errors import InvalidInput
 from texrs.fields._field import Field
 from texrs.fields._matrices import Matrices, multiply, repeat
 
@@ -62,10 +62,8 @@ class Wound(Field):
             return frames
         return multiply(frames, repeat(turn(self.angle, r, t, self.axes), len(points)))
 
-    def over(self, shape: Sequence[int]) -> Field:
-        super().over(shape)
-        shape = as_size(shape, "shape", axes=self.axes)
-        return self if self.centre is not None else replace(self, centre=tuple((n - 1) / 2 for n in shape))
+    def _over(self, reach: Sequence[float]) -> Field:
+        return self if self.centre is not None else replace(self, centre=tuple(r / 2 for r in reach))
 
     def describe(self) -> str:
         letters = LETTERS[self.axes - 2]
@@ -90,6 +88,11 @@ class Zigzag(Field):
         both = np.stack([turn(a, self.first, self.second, self.axes) for a in (self.angle, -self.angle)], axis=-1)
         return np.asarray(both[:, :, odd.astype(np.intp)])
 
+    def _check_steps(self, steps: Sequence[float]) -> None:
+        least = 2 * steps[self.across]
+        if self.period < least:
+            raise InvalidInput(f"period: must be at least 2 voxels, {least:g}, got {self.period:g}")
+
     def describe(self) -> str:
         letters = LETTERS[self.axes - 2]
         plane = letters[self.first] + letters[self.second]
@@ -112,9 +115,8 @@ class Ramp(Field):
         size = np.exp(np.ascontiguousarray(log(self.start) + way * log(self.stop / self.start)))
         return repeat(np.eye(self.axes), len(points)) * size
 
-    def over(self, shape: Sequence[int]) -> Field:
-        super().over(shape)
-        return self if self.length is not None else replace(self, length=float(max(shape[self.along] - 1, 1)))
+    def _over(self, reach: Sequence[float]) -> Field:
+        return self if self.length is not None else replace(self, length=float(reach[self.along]) or 1.0)
 
     def describe(self) -> str:
         reach = "" if self.length is None else f" over {self.length:g}"

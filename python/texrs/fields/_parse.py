@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from texrs.errors import InvalidInput
 from texrs.fields import _shapes
 from texrs.fields._field import Field
+from texrs.fields._spaced import as_distances, space
 
 _KNOWN: dict[str, Callable[..., Field]] = {
     f.__name__: f
@@ -49,7 +50,9 @@ def names() -> dict[str, str]:
     return out
 
 
-def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
+def parse(
+    text: str, axes: int = 3, size: Sequence[int] | None = None, *, spacing: Sequence[float] | None = None
+) -> Field:
     """Return the field that a text names, with what differs from the defaults.
 
     Parameters
@@ -60,6 +63,9 @@ def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
         2 or 3.
     size : sequence of int, optional
         Size of the output: sets what was left open, as `Field.over`.
+    spacing : sequence of float, optional
+        Distances between voxels along planes, rows and columns. Places and lengths in the text are in its unit; lengths
+        that are left out are multiples of the smallest voxel side. Default: voxels are cubes of side 1.
 
     Returns
     -------
@@ -103,8 +109,12 @@ def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
         options["axes"] = axes
     elif axes != 3:
         raise InvalidInput(f"field: {name} is for volumes, not for pictures")
+    if spacing is not None:
+        # Usual lengths are those of voxels.
+        unit, usual = min(as_distances(spacing, axes)), {"period": 32.0} | ({} if size else {"length": 128.0})
+        options = {key: unit * length for key, length in usual.items() if key in allowed} | options
     try:
-        field = make(**options)
+        field = space(make(**options), spacing)
     except InvalidInput as error:
         raise InvalidInput(f"field: {name}: {error}") from None
     return field if size is None else field.over(size)

@@ -194,6 +194,7 @@ class _Grid(Field):
     stretches: Floats | None
     opposed: bool = False
     """Whether the nearest frame counts where those around point in opposite ways, as around a vortex; else that is refused."""
+    _placed_in_voxels = True
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         low, share = [], []

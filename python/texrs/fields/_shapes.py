@@ -279,7 +279,7 @@ def zigzag(
     Parameters
     ----------
     period : float
-        Voxels of two bands, at least 2.
+        Width of two bands, at least 2 voxels; in the unit of the spacing if one is stated.
     angle : float
         Degrees, as in `slant`, within 360 either way.
     axis : str, optional
@@ -297,7 +297,7 @@ def zigzag(
     Raises
     ------
     InvalidInput
-        A period below 2, an angle beyond 360 degrees either way, not such an axis, or another plane.
+        A period that is not positive, an angle beyond 360 degrees either way, not such an axis, or another plane.
 
     Examples
     --------
@@ -309,7 +309,7 @@ def zigzag(
     """
     first, second = _as_plane(plane, check_axes(axes), "plane")
     across = first if axis is None else _as_index(axis, axes, "axis")
-    return Zigzag(axes, as_float(period, "period", 2, FAR), _as_angle(angle), across, first, second)
+    return Zigzag(axes, as_float(period, "period", 1e-9, FAR), _as_angle(angle), across, first, second)
 
 
 def scale_ramp(
@@ -327,8 +327,8 @@ def scale_ramp(
     axis : str
         "x", "y" or "z": along which they grow.
     length : float, optional
-        Voxels, at least 1. By default up to the last voxel of a bounded output (see `Field.over`), 128 of an
-        unbounded one.
+        Voxels, or the unit of the spacing if one is stated; more than 0. By default up to the last voxel of a bounded output
+        (see `Field.over`), 128 of an unbounded one.
     axes : int
         2 or 3.
 
@@ -352,7 +352,7 @@ def scale_ramp(
     """
     ends = tuple(as_float(v, name, 0.125, 8) for v, name in ((start, "start"), (stop, "stop")))
     along = _as_index(axis, check_axes(axes), "axis")
-    reach = None if length is None else as_float(length, "length", 1, FAR)
+    reach = None if length is None else as_float(length, "length", 1e-9, FAR)
     return Ramp(axes, ends[0], ends[1], along, reach)
 
 

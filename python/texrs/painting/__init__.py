@@ -162,7 +162,8 @@ def paint(
         Of an array, or of a material, of which all maps are sampled. Its normals say how its relief leans along columns and
         rows, (0, 0, 1) not at all, and the surface leans as much wherever it cuts the texture.
     scale : float, optional
-        Voxels of the texture in a unit of the mesh; by default the longest side shows the exemplar four times.
+        Voxels of the texture in a unit of the mesh; of a texture with a spacing, units of that. By default the longest side
+        shows the exemplar four times.
     atlas : int, optional
         Side of the atlas that is baked, 16 to 16384; None gives the corners colours instead.
     padding : int
@@ -276,24 +277,25 @@ def _spread(values: Array, there: NDArray[np.bool_]) -> Array:
 def choose_scale(vertices: NDArray[np.float64], texture: SolidTexture) -> float:
     """Return voxels in a unit of a mesh: the longest side shows the exemplar so many times."""
     longest = float(np.ptp(vertices, axis=0).max())
-    return FINEST * max(texture.exemplar.shape) / max(longest, 1e-12)
+    sides = [n * step for n, step in zip(texture.exemplar.shape, texture.spacing, strict=True)]
+    return FINEST * max(sides) / max(longest, 1e-12)
 
 
 def _sample_slopes(texture: SolidTexture, points: NDArray[np.float64], slopes: Floats) -> NDArray[np.float64]:
     """Return how much a relief rises along x, y and z of space at points."""
     parts = []
     for start in range(0, len(points), _BAND):
-        source = texture.trace(points[start : start + _BAND, ::-1])
+        source = texture.trace(points[start : start + _BAND, ::-1] / texture.spacing)
         how = source.finish.interpolation if source.finish else "cubic"
         parts.append(source.render(slopes, kind="slope", green="down", interpolation=how).reshape(-1, 3))
     return np.concatenate(parts).astype(np.float64)
 
 
 def _sample(texture: SolidTexture, points: NDArray[np.float64], watch: Progress | None) -> dict[str, Array]:
-    """Return the maps of a texture at points (x, y, z) in voxels."""
+    """Return the maps of a texture at points (x, y, z) in units of its spacing."""
     # Neighbours together: what is made for one band of points is used up there.
     order = np.lexsort((points // _BLOCK).T)
-    at = points[order, ::-1]
+    at = points[order, ::-1] / texture.spacing
     parts = []
     for start in range(0, max(len(at), 1), _BAND):
         some = at[start : start + _BAND]

@@ -1,7 +1,7 @@
 """Pictures of volumes, and statistics of how like its exemplar a synthesised one is.
 
 Pictures: `slices`, `oblique`, `cube`, `transparent` (seen through), `turntable`, `Viewer` (a page with sliders); `paint` gives
-labels colours, `surface` the triangles around one.
+labels colours, `surface` the triangles around one. `cubes` makes cubes of other voxels.
 
 Statistics, each of which can be used alone, most of them for pictures too; `compare` makes a report of them all:
 
@@ -19,6 +19,7 @@ Statistics, each of which can be used alone, most of them for pictures too; `com
 ===========================  ===============================================================
 """
 
+from texrs.volume._stretch import cubes
 from texrs.volume.compare import Comparison, compare
 from texrs.volume.integrity import Integrity, integrity
 from texrs.volume.labels import paint, surface
@@ -50,6 +51,7 @@ __all__ = [
     "coherence",
     "compare",
     "cube",
+    "cubes",
     "frequency",
     "integrity",
     "lightness",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -11,6 +12,7 @@ from texrs._arrays import as_array, as_axes, as_image, as_ndarray, check_finite,
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
+from texrs.fields._spaced import as_distances
 
 
 def drop_last(array: Array, axis: int, step: int) -> Array:
@@ -31,6 +33,20 @@ def correlate(values: Array, reach: int, product: np.ufunc) -> NDArray[np.float6
             both = product(drop_last(values, axis, step), drop_first(values, axis, step))
             out[axis, step] = both.mean(dtype=np.float64)
     return out
+
+
+def by_distance(curves: NDArray[np.float64], spacing: Sequence[float] | None) -> NDArray[np.float64]:
+    """Return curves over steps along each axis (A, N) as curves over distances of 0, 1, 2 ... times the smallest spacing."""
+    steps, lags = np.array(as_distances(spacing, len(curves))), np.arange(curves.shape[1])
+    if (steps == steps[0]).all():
+        return curves
+    return np.stack([np.interp(lags * steps.min() / s, lags, c) for s, c in zip(steps, curves, strict=True)])
+
+
+def turn_in_space(field: Field, points: ArrayLike, spacing: Sequence[float] | None) -> NDArray[np.float64]:
+    """Return the Jacobians in space of a field of voxels at points."""
+    steps = np.array(as_distances(spacing, field.axes))
+    return np.asarray(field.jacobians(points).astype(np.float64) * (steps[:, np.newaxis] / steps))
 
 
 def check_field(field: object, axes: int) -> Field | None:

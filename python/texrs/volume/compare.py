@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +14,10 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.fields import Field
+from texrs.fields._spaced import space
 from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
-from texrs.volume._values import check_field, guess_axes
+from texrs.volume._values import check_field, guess_axes, turn_in_space
 from texrs.volume.integrity import Integrity, integrity
 from texrs.volume.reuse import CellReuse, cell_reuse
 
@@ -151,6 +153,7 @@ def compare(
     classes: int | None = 4,
     chosen: int | tuple[int, ...] | None = None,
     axes: int | None = None,
+    spacing: Sequence[float] | None = None,
 ) -> Comparison:
     """Return how a synthesised picture or volume compares with its exemplar.
 
@@ -171,6 +174,9 @@ def compare(
         all but 0.
     axes : int, optional
         2 or 3; by default by the shape, up to 4 along the last of three axes are channels.
+    spacing : sequence of float, optional
+        Distances between samples along each axis, of both: correlations, paths, sizes and orientations are then those of
+        space, and the field is one of space. Frequencies stay in samples. Default: 1.
 
     Returns
     -------
@@ -221,21 +227,21 @@ def compare(
     orientation, turned = None, None
     if field is not None:
         check_field(field, count)
-        field = field.over(second.shape[:count])
-        normal = structure.texture_normal(grey[0])
+        field = space(field, spacing).over(second.shape[:count])
+        normal = structure.texture_normal(grey[0], spacing=spacing)
         errors = (
-            structure.orientation_errors(grey[0], None, normal),
-            structure.orientation_errors(grey[1], field, normal),
+            structure.orientation_errors(grey[0], None, normal, spacing=spacing),
+            structure.orientation_errors(grey[1], field, normal, spacing=spacing),
         )
         orientation = np.array([[np.median(e), np.quantile(e, 0.9)] for e in errors])
-        turned = _turn_normal(field, second.shape[:count], normal)
+        turned = _turn_normal(field, second.shape[:count], normal, spacing)
     return Comparison(
         np.stack([np.bincount(a.ravel(), minlength=kinds) / a.size for a in labels]),
-        (statistics.particles(masks[0]), statistics.particles(masks[1])),
+        (statistics.particles(masks[0], spacing=spacing), statistics.particles(masks[1], spacing=spacing)),
         (structure.frequency(grey[0], window=window), structure.frequency(grey[1], window=window)),
-        np.stack([statistics.two_point(m, _REACH) for m in masks]),
-        np.stack([statistics.lineal_path(m, _REACH) for m in masks]),
-        np.stack([structure.autocorrelation(g, _REACH) for g in grey]),
+        np.stack([statistics.two_point(m, _REACH, spacing=spacing) for m in masks]),
+        np.stack([statistics.lineal_path(m, _REACH, spacing=spacing) for m in masks]),
+        np.stack([structure.autocorrelation(g, _REACH, spacing=spacing) for g in grey]),
         (structure.speckle(grey[0]), structure.speckle(grey[1])),
         float(structure.slice_distances(*grey).mean()),
         np.array([seams.min(), seams.max()]),
@@ -246,10 +252,12 @@ def compare(
     )
 
 
-def _turn_normal(field: Field, shape: tuple[int, ...], normal: NDArray[np.float64]) -> float:
+def _turn_normal(
+    field: Field, shape: tuple[int, ...], normal: NDArray[np.float64], spacing: Sequence[float] | None
+) -> float:
     """Return the mean angle between the exemplar's normal and where the field takes it."""
     lines = [np.linspace(0, n - 1, min(n, 16)) for n in shape]
-    frames = field.jacobians(np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)).astype(np.float64)
+    frames = turn_in_space(field, np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1), spacing)
     there = np.einsum("...ji,j->...i", frames, normal)
     cosine = np.abs(there @ normal) / np.linalg.norm(there, axis=-1)
     return float(np.degrees(np.arccos(np.minimum(cosine, 1))).mean())

@@ -6,7 +6,9 @@ both of what it compares).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +17,8 @@ from texrs._arrays import as_int
 from texrs._show import brief
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.volume._values import as_colours, as_region, correlate, drop_first, drop_last
+from texrs.fields._spaced import as_distances
+from texrs.volume._values import as_colours, as_region, by_distance, correlate, drop_first, drop_last
 
 __all__ = ["Classes", "Particles", "classes", "lightness", "lineal_path", "particles", "two_point"]
 
@@ -132,9 +135,9 @@ class Particles:
     count : int
         Number of pieces of at least the least size.
     density : float
-        Pieces for each 100 000 pixels or voxels.
+        Pieces for each 100 000 pixels or voxels, or units of area or volume if a spacing was given.
     mean, median : float
-        Size, in pixels or voxels; NaN where there are none.
+        Size, in pixels or voxels, or units of area or volume; NaN if there are none.
     deciles : tuple of float
         The nine sizes that 10 %, 20 % ... of the pieces are not above.
 
@@ -238,7 +241,7 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
     return Classes(np.ascontiguousarray(best[np.argsort(best.mean(axis=1), kind="stable")], np.float32))
 
 
-def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
+def two_point(mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
     """Return the two-point correlation S2 along each axis: how often both ends of a step are in a material.
 
     Parameters
@@ -247,6 +250,9 @@ def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
         Bool, (H, W) or (D, H, W): where the material is.
     reach : int
         Longest step in pixels, at least 1; one that is longer than a side is NaN there.
+    spacing : sequence of float, optional
+        Distances between samples along each axis. Column k is then a distance of k times the smallest of them, interpolated
+        between steps. Default: 1.
 
     Returns
     -------
@@ -267,10 +273,10 @@ def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
     array([0.5 , 0.26, 0.  , 0.24, 0.5 ])
 
     """
-    return correlate(as_region(mask), as_int(reach, "reach", 1, 2**20), np.logical_and)
+    return by_distance(correlate(as_region(mask), as_int(reach, "reach", 1, 2**20), np.logical_and), spacing)
 
 
-def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
+def lineal_path(mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
     """Return the lineal path along each axis: how often all of a step, with its ends, is in a material.
 
     Parameters
@@ -279,6 +285,9 @@ def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
         Bool, (H, W) or (D, H, W).
     reach : int
         Longest step in pixels, at least 1; one that is longer than a side is NaN there.
+    spacing : sequence of float, optional
+        Distances between samples along each axis. Column k is then a distance of k times the smallest of them, interpolated
+        between steps. Default: 1.
 
     Returns
     -------
@@ -306,10 +315,10 @@ def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
             if step:
                 path = drop_last(path, axis, 1) & drop_first(phase, axis, step)
             out[axis, step] = path.mean()
-    return out
+    return by_distance(out, spacing)
 
 
-def particles(mask: ArrayLike, *, least: int = 8) -> Particles:
+def particles(mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | None = None) -> Particles:
     """Return how many connected pieces a material has, of neighbours that share a side, and how large they are.
 
     Parameters
@@ -318,6 +327,8 @@ def particles(mask: ArrayLike, *, least: int = 8) -> Particles:
         Bool, (H, W) or (D, H, W).
     least : int
         Pixels or voxels, at least 1; smaller pieces are grain and are not counted.
+    spacing : sequence of float, optional
+        Distances between samples along each axis. Sizes and the density are then in its unit. Default: 1.
 
     Returns
     -------
@@ -341,14 +352,15 @@ def particles(mask: ArrayLike, *, least: int = 8) -> Particles:
 
     phase, low = as_region(mask), as_int(least, "least", 1, 2**40)
     pieces, count = label(phase)
-    sizes = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
-    sizes = sizes[sizes >= low]
+    sizes: NDArray[Any] = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
+    cell = float(np.prod(as_distances(spacing, phase.ndim)))
+    sizes = sizes[sizes >= low] * cell
     if not len(sizes):
         return Particles(0, 0.0, np.nan, np.nan, (np.nan,) * 9)
     deciles = np.quantile(sizes, np.arange(1, 10) / 10, method="inverted_cdf")
     return Particles(
         len(sizes),
-        1e5 * len(sizes) / phase.size,
+        1e5 * len(sizes) / (phase.size * cell),
         float(sizes.mean()),
         float(np.median(sizes)),
         tuple(deciles.astype(float).tolist()),

@@ -15,7 +15,8 @@ from texrs._arrays import as_bool, as_float, as_int, as_wrap, try_array
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
-from texrs.volume._values import as_values, check_field, correlate, drop_first, drop_last
+from texrs.fields._spaced import as_distances, space
+from texrs.volume._values import as_values, by_distance, check_field, correlate, drop_first, drop_last, turn_in_space
 
 __all__ = [
     "autocorrelation",
@@ -31,7 +32,9 @@ _BAND = (1 / 30, 0.45)
 """Cycles a voxel: longer waves are the trend of a slice, shorter ones its grain."""
 
 
-def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
+def autocorrelation(
+    values: ArrayLike, reach: int = 12, *, spacing: Sequence[float] | None = None
+) -> NDArray[np.float64]:
     """Return the correlation of values with those some steps further, along each axis.
 
     Parameters
@@ -40,6 +43,9 @@ def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
         (H, W) or (D, H, W), such as a `lightness`.
     reach : int
         Longest step in pixels, at least 1; one that is longer than a side is NaN there.
+    spacing : sequence of float, optional
+        Distances between samples along each axis. Column k is then a distance of k times the smallest of them, interpolated
+        between steps. Default: 1.
 
     Returns
     -------
@@ -63,7 +69,7 @@ def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
     v, far = as_values(values), as_int(reach, "reach", 1, 2**20)
     v = v - v.mean(dtype=np.float64)
     variance = max(float((v * v).mean(dtype=np.float64)), 1e-30)
-    return correlate(v, far, np.multiply) / variance
+    return by_distance(correlate(v, far, np.multiply) / variance, spacing)
 
 
 def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = False) -> float:
@@ -233,13 +239,15 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
     return np.asarray(np.abs(np.array(found) - wanted).mean(axis=1))
 
 
-def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
+def texture_normal(values: ArrayLike, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
     """Return the direction in which an exemplar changes most, the normal of its layers.
 
     Parameters
     ----------
     values : array_like
         (H, W) or (D, H, W), such as a `lightness`.
+    spacing : sequence of float, optional
+        Distances between samples along each axis. The direction is one of space. Default: 1.
 
     Returns
     -------
@@ -259,7 +267,7 @@ def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
     True
 
     """
-    tensor = _measure_structure(as_values(values), 0.0)
+    tensor = _measure_structure(as_values(values), 0.0, spacing)
     if not np.isfinite(tensor).all():
         raise InvalidInput("values: are so large that their products are infinite")
     vectors = np.linalg.eigh(tensor.reshape(-1, *tensor.shape[-2:]).mean(axis=0))[1]
@@ -268,7 +276,13 @@ def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def orientation_errors(
-    values: ArrayLike, field: Field | None = None, normal: ArrayLike | None = None, *, margin: int = 6, step: int = 1
+    values: ArrayLike,
+    field: Field | None = None,
+    normal: ArrayLike | None = None,
+    *,
+    margin: int = 6,
+    step: int = 1,
+    spacing: Sequence[float] | None = None,
 ) -> Floats:
     """Return the angle between the layers of a texture and where a field turns those of its exemplar.
 
@@ -287,6 +301,8 @@ def orientation_errors(
         Pixels at the border that are left out: there the structure tensor sees too little.
     step : int
         Every so many pixels along each axis are looked at.
+    spacing : sequence of float, optional
+        Distances between samples along each axis. The field, the normal and the angles are those of space. Default: 1.
 
     Returns
     -------
@@ -311,30 +327,34 @@ def orientation_errors(
     each = as_int(step, "step", 1, 2**20)
     if min(v.shape) <= 2 * edge:
         raise InvalidInput(f"margin: {edge} on both sides leaves nothing of {v.shape}")
-    check_field(field, v.ndim)
-    n = texture_normal(v) if normal is None else try_array(normal, np.float64)
+    turned = check_field(field, v.ndim)
+    turned = None if turned is None else space(turned, spacing)
+    n = texture_normal(v, spacing=spacing) if normal is None else try_array(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
         raise InvalidInput(f"normal: needs {v.ndim} numbers, not all zero, got shape {n.shape}")
     inner = (slice(edge, -edge or None, each),) * v.ndim
-    tensor = _measure_structure(v, 4.0)[inner]
+    tensor = _measure_structure(v, 4.0, spacing)[inner]
     out = np.empty(tensor.shape[: v.ndim], np.float32)
     for i, plane in enumerate(tensor):  # A plane at once: a dense field of a large volume is many times its size.
         found = np.linalg.eigh(plane)[1][..., -1]
         wanted = n
-        if field is not None:
+        if turned is not None:
             index = np.stack(np.meshgrid(*map(np.arange, (1, *plane.shape[: v.ndim - 1])), indexing="ij"), axis=-1)[0]
             points = (index + np.eye(v.ndim, dtype=int)[0] * i) * each + edge
-            wanted = np.einsum("...ji,j->...i", field.jacobians(points).astype(np.float64), n)
+            wanted = np.einsum("...ji,j->...i", turn_in_space(turned, points, spacing), n)
         length = np.linalg.norm(wanted, axis=-1)
         cosine = np.abs((found * wanted).sum(axis=-1)) / np.maximum(length, 1e-30)
         out[i] = np.degrees(np.arccos(np.minimum(cosine, 1)))
     return out
 
 
-def _measure_structure(v: Floats, sigma: float) -> NDArray[np.float64]:
+def _measure_structure(v: Floats, sigma: float, spacing: Sequence[float] | None) -> NDArray[np.float64]:
     from scipy.ndimage import gaussian_filter
 
-    gradients = [gaussian_filter(v, 1.0, order=[int(a == b) for b in range(v.ndim)]) for a in range(v.ndim)]
+    gradients = [
+        gaussian_filter(v, 1.0, order=[int(a == b) for b in range(v.ndim)]) / np.float32(step)
+        for a, step in enumerate(as_distances(spacing, v.ndim))
+    ]
     tensor = np.empty((*v.shape, v.ndim, v.ndim), np.float64)
     for i in range(v.ndim):
         for j in range(i, v.ndim):

@@ -89,6 +89,7 @@ def solid(
     constraints: Constraints | None = None,
     guide: Guide | None = None,
     interpolation: Interpolation | None = None,
+    spacing: Sequence[float] | None = None,
     memory_limit: int | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -126,6 +127,10 @@ def solid(
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
         sample whatever it says.
+    spacing : sequence of 3 float, optional
+        Distances between planes, rows and columns, of the exemplar and of the result, in any unit. The field turns and
+        scales the texture in space, not in voxels; its places and lengths are in that unit. Default: voxels are cubes of
+        side 1.
     memory_limit : int, optional
         Bytes that the work may take. None: all that the limits in force allow (`texrs.limits`).
     progress : callable or True, optional
@@ -183,6 +188,7 @@ def solid(
         guide=guide,
         interpolation=interpolation,
         memory_limit=memory_limit,
+        spacing=spacing,
     )
     return grow_texture(request, progress)
 
@@ -401,6 +407,7 @@ def describe(asked: Request, grown: Grown) -> dict[str, Any]:
         "elements": _count_elements(asked),
         "stitched": None if grown.patches is None else grown.patches.report(),
         "levels": levels,
+        **({} if asked.spacing is None else {"spacing": list(asked.spacing)}),
     }
 
 

@@ -16,6 +16,7 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field, FieldLike
 from texrs.fields import as_field as make_field
+from texrs.fields._spaced import as_distances
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.materials import Material
 from texrs.papers.solid.limits import LARGER, check_region
@@ -53,6 +54,8 @@ class Request:
         What is asked beside the texture.
     interpolation : {"nearest", "linear", "cubic"}
         Between the exemplar's samples, in the last look-up.
+    spacing : sequence of float, optional
+        Distances between voxels.
 
     """
 
@@ -66,6 +69,7 @@ class Request:
     method: Method
     conditions: Conditions
     interpolation: Interpolation
+    spacing: tuple[float, ...] | None = None
 
     @classmethod
     def check(
@@ -85,6 +89,7 @@ class Request:
         interpolation: Interpolation | None,
         memory_limit: int | None,
         plan: Choice = "usual",
+        spacing: Sequence[float] | None = None,
     ) -> Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
@@ -97,17 +102,23 @@ class Request:
             raise InvalidInput(f"bend: needs True, False or None, got {bend!r}")
         chosen = check_plan(plan, method, as_quality(quality))
         how = as_interpolation(interpolation, known, "cubic" if method is None else "nearest")
-        turned = as_field(field, axes, region.shape)
+        turned = as_field(field, axes, region.shape, spacing)
         if turned is not None:
             turned = turned.over(region.shape)
         check_region(known.pixels, region, turned, as_quality(quality), memory_limit)
         conditions = Conditions.of(known.pixels, region.shape, constraints, guide)
-        return cls(known, region, turned, as_seed(seed), as_quality(quality), bend, chosen, method, conditions, how)
+        steps = None if spacing is None else as_distances(spacing, axes)
+        return cls(
+            known, region, turned, as_seed(seed), as_quality(quality), bend, chosen, method, conditions, how, steps
+        )
 
 
-def as_field(field: object, axes: int, extent: Sequence[int] | None = None) -> Field | None:
-    """Check a field, or make it of what was given; the identity is none."""
-    known = make_field(field, axes, extent)
+def as_field(
+    field: object, axes: int, extent: Sequence[int] | None = None, spacing: Sequence[float] | None = None
+) -> Field | None:
+    """Check a field, or make it of what was given, for voxels of a spacing; the identity is none."""
+    as_distances(spacing, axes)
+    known = make_field(field, axes, extent, spacing=spacing)
     still = known is None or (
         known.constant is not None and np.array_equal(known.constant, np.eye(axes, dtype=np.float32))
     )

@@ -20,6 +20,7 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field, FieldLike
 from texrs.fields._field import as_points
+from texrs.fields._spaced import as_distances
 from texrs.growth import Windows
 from texrs.growth.engine import Places
 from texrs.kernels.gather import gather
@@ -54,6 +55,7 @@ class Texture(Endless):
         seed: int = 0,
         quality: Quality = "preserve",
         interpolation: Interpolation | None = None,
+        spacing: Sequence[float] | None = None,
         cache_bytes: int = 256 << 20,
         memory_limit: int | None = None,
     ) -> None:
@@ -61,7 +63,9 @@ class Texture(Endless):
         shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
         known = as_exemplar(shown, axes=self.axes, minimum=COARSEST)
         self._exemplar, self._how = known, as_interpolation(interpolation, known, "cubic")
-        self._field, self._seed, self._quality = as_field(field, self.axes), as_seed(seed), as_quality(quality)
+        self._spacing = as_distances(spacing, self.axes)
+        self._field = as_field(field, self.axes, spacing=spacing)
+        self._seed, self._quality = as_seed(seed), as_quality(quality)
         limit = as_int(cache_bytes, "cache_bytes", 0, 1 << 48)
         self._memory_limit, self._cache_bytes = memory_limit, limit
         self._check(Region.whole((1,) * self.axes))
@@ -87,6 +91,11 @@ class Texture(Endless):
     def field(self) -> Field | None:
         """The field; none where it leaves everything in place."""
         return self._field
+
+    @property
+    def spacing(self) -> tuple[float, ...]:
+        """Distances between samples along each axis; 1 if none are stated."""
+        return self._spacing
 
     @property
     def cached(self) -> int:
@@ -126,7 +135,8 @@ class Texture(Endless):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel as the exemplar's pixels and the options; see `Exemplar` for what is worked out where it arrives."""
-        options = (self._field, self._seed, self._quality, self._how, self._cache_bytes, self._memory_limit)
+        spacing, limits = self._spacing, (self._cache_bytes, self._memory_limit)
+        options = (self._field, self._seed, self._quality, self._how, spacing, *limits)
         return _restore, (type(self), self._material or self._exemplar, options, self.key)
 
     def __getitem__(self, index: Any) -> Array:
@@ -443,13 +453,13 @@ class Texture(Endless):
 
 def _restore(kind: type[Texture], exemplar: Exemplar | Material, options: tuple[Any, ...], key: str | None) -> Texture:
     """Return a texture that has travelled: the one that came here before, with what it keeps, where there is one."""
-    names = ("field", "seed", "quality", "interpolation", "cache_bytes", "memory_limit")
+    names = ("field", "seed", "quality", "interpolation", "spacing", "cache_bytes", "memory_limit")
     given = dict(zip(names, options, strict=True))
 
     def make() -> Texture:
         return kind(exemplar, **given)
 
-    return make() if key is None else _ARRIVED.get_or_make((key, *options[-2:]), make)
+    return make() if key is None else _ARRIVED.get_or_make((key, *options[-3:]), make)
 
 
 _ARRIVED: Cache[tuple[Any, ...], Texture] = Cache(ARRIVED)

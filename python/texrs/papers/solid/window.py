@@ -43,7 +43,10 @@ class PlaneTexture(Texture):
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
         They are different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
+        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample, whatever it says.
+    spacing : sequence of 2 float, optional
+        Distances between rows and columns, in any unit. The field turns in space, where pixels need not be squares. Its places
+        and lengths are in the same unit. Windows and points stay in pixels. Default: 1.
     cache_bytes : int
         Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
     memory_limit : int, optional
@@ -91,7 +94,10 @@ class SolidTexture(Texture):
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
         They are different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
+        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample, whatever it says.
+    spacing : sequence of 3 float, optional
+        Distances between planes, rows and columns, in any unit. The field turns in space, where voxels need not be cubes.
+        Its places and lengths are in the same unit. Windows and points stay in voxels. Default: 1.
     cache_bytes : int
         Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
     memory_limit : int, optional

@@ -1,0 +1,69 @@
+"""Fields in physical units: voxels need not be cubes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_tuple
+from texrs.fields._field import Field
+from texrs.fields._matrices import Matrices
+
+__all__ = ["Spaced", "as_distances", "space"]
+
+_AXES = "(row, column)", "(plane, row, column)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Spaced(Field):
+    """A field in physical units, seen in voxels: with D = diag(spacing), its frames are D^-1 F D."""
+
+    field: Field
+    spacing: tuple[float, ...]
+
+    @property
+    def axes(self) -> int:  # type: ignore[override]
+        return self.field.axes
+
+    @property
+    def constant(self) -> NDArray[np.float32] | None:
+        still = self.field.constant
+        if still is None:
+            return None
+        return np.asarray(self._frames(np.zeros((1, self.axes)))[..., 0], np.float32)
+
+    def _frames(self, points: NDArray[np.float64]) -> Matrices:
+        step = np.array(self.spacing)
+        # An array of frames spreads over voxels, whatever these are.
+        at = points if self.field._placed_in_voxels else points * step
+        return np.asarray(self.field._frames(at) * (step / step[:, np.newaxis])[..., np.newaxis])
+
+    def _content(self) -> tuple[Any, ...] | None:
+        return None if self.field.key is None else (self.field.key, self.spacing)
+
+    def describe(self) -> str:
+        return f"{self.field.describe()}, in voxels of {' x '.join(f'{s:g}' for s in self.spacing[::-1])}"
+
+    def _over(self, reach: Sequence[float]) -> Field:
+        return Spaced(self.field._over([r * s for r, s in zip(reach, self.spacing, strict=True)]), self.spacing)
+
+
+def space(field: Field, spacing: Sequence[float] | None) -> Field:
+    """Return a field for voxels of a spacing; the field itself for cubes of side 1, or if it has a spacing already."""
+    if isinstance(field, Spaced):
+        return field
+    steps = as_distances(spacing, field.axes)
+    field._check_steps(steps)
+    return field if all(s == 1 for s in steps) else Spaced(field, steps)
+
+
+def as_distances(spacing: Sequence[float] | None, axes: int) -> tuple[float, ...]:
+    """Check the distances between voxels along each axis; None is 1."""
+    if spacing is None:
+        return (1.0,) * axes
+    given = as_tuple(spacing, "spacing", axes, f"{axes} numbers, {_AXES[axes - 2]}")
+    return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in given)
