@@ -35,6 +35,7 @@ from texrs.completion._fill import Filling, fill
 from texrs.completion._holes import check_material, find_hole
 from texrs.completion._optimise import optimise, recover_scale
 from texrs.completion._patches import LEAST, choose_mirrors
+from texrs.completion._volumes import complete_volume, is_volume
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.symmetry import NONE
@@ -65,17 +66,18 @@ def complete(
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Fill a hole in an image by example.
+    """Fill a hole in an image or a volume by example.
 
     Parameters
     ----------
-    image : (H, W) or (H, W, C) array, or Exemplar
-        The picture, any real dtype, at least 4 pixels a side. What it holds in the hole does not matter; it may be NaN.
+    image : (H, W[, C]) or (D, H, W[, C]) array, or Exemplar
+        The picture or the volume, any real dtype, at least 4 pixels or 16 voxels a side. Values in the hole are ignored and
+        may be NaN. A volume takes ``patch``, ``boundary``, ``blend`` and ``seed``; the other options are for pictures.
     hole : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
         Mask of the pixels to fill, white where it marks. "alpha": all pixels that are not fully opaque. "nan": all pixels
         that are NaN or infinite. "nodata": the value that the file of the image states for pixels without data. A number:
         all pixels of this value. Default: all pixels that are masked, NaN or infinite. See `texrs.Mask` for how a mask is
-        read, inverted, grown and feathered.
+        read, inverted, grown and feathered. A mask of three axes means a volume.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
     allowed : (H, W) array, path or Mask, optional
@@ -101,7 +103,7 @@ def complete(
         Side of a patch in pixels, at least 4: about the size of what repeats. By default several are tried, from three
         quarters to four times a sixth of the shorter side (12 to 32), of large holes in a small copy, and those are kept
         whose seams show least; with a scale map a sixth, of a plane up to a quarter. "optimise" has no patches, and
-        refuses one.
+        refuses one. Volumes: at least 6; by default 12 to 32, by the size of the hole.
     boundary : int
         Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
         least. 0 leaves all that is known as it is.
@@ -112,7 +114,8 @@ def complete(
     blend : float, optional
         Weight of the values, 0 to 1e6, when colours of what is filled are corrected so that seams disappear: the smaller,
         the wider the correction; 0.003 is good for the picture's own colours, less where an ``exemplar`` has other light.
-        None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the hole.
+        None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the hole. Volumes:
+        None is 0.1, and 0 for labels (integers with at most 16 values), which are never mixed.
     wrap : bool or (rows, columns), optional
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across; None: neither.
     seed : int
@@ -162,6 +165,21 @@ def complete(
     """
     progress = listen(progress)
     as_method(method, "patch", "optimise")
+    if is_volume(image, hole):
+        flat = {
+            "exemplar": exemplar is not None,
+            "allowed": allowed is not None,
+            "scale_map": scale_map is not None,
+            "exemplar_scale_map": exemplar_scale_map is not None,
+            "kind": kind is not None,
+            "method": method != "patch",
+            "mirror": mirror is not None,
+            "wrap": wrap is not None,
+        }
+        for name in (name for name, given in flat.items() if given):
+            raise InvalidInput(f"{name}: is for pictures; leave it out for a volume")
+        volume: Any = image
+        return complete_volume(volume, hole, patch=patch, boundary=boundary, blend=blend, seed=seed, progress=progress)
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
     if kind is not None and scale_map is None:

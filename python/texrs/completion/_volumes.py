@@ -1,0 +1,293 @@
+"""Holes in volumes: patches of the known voxels, cut into the hole along minimum cuts, and seams made to disappear.
+
+The stitcher of `texrs._engine.stitcher` fills the hole: known voxels are held, and samples in the hole cost so much that no
+patch shows them. Then the differences that the patches have inside are kept, and the values move to where those fit together.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from math import prod, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_image, as_int, as_seed, check_memory, try_array
+from texrs._engine.appearance import Demand
+from texrs._engine.pyramid import ONE, Region
+from texrs._masks import as_marks, widen
+from texrs._progress import answering, stage
+from texrs._typing import Array, Bools, Progress
+from texrs.completion._holes import find_hole
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar
+from texrs.growth.start import OVERLAP, weights_of
+from texrs.io._grids import holds_volume
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+
+__all__ = ["complete_volume", "is_volume"]
+
+LEAST = 16
+"""Least side of a volume, in voxels."""
+MOST_CHANNELS = 4
+"""A third axis of a hole that is not longer is that of the channels of a picture."""
+SIDES = (12, 32)
+"""Smallest and largest side of the patches, in voxels. Smaller patches lose features. Larger patches do not fit all around."""
+MARGIN = 48
+"""Voxels around the hole that patches are copied from. The search of one patch takes as long as there are voxels."""
+PLENTY = 8
+"""Voxels that patches are copied from, in voxels of the hole, at least if the volume has them."""
+CANDIDATES, RECOVER = {False: 16, True: 48}, 2.0
+"""Places that are tried for a patch: more for labels, because their seams cannot be corrected. Patches that cover the worst
+seams again, as a share of all."""
+FORBIDDEN = 5.0
+"""Cost of a sample in the hole, in that of a point that does not follow a guide."""
+BLEND = 0.1
+"""Usual weight of the values, if seams are corrected: the correction is lost within about three voxels."""
+SWEEPS, RELAXED = (40, 400), 1.6
+"""Sweeps of the correction, and how far each overshoots."""
+CODE = 2047
+"""Largest value of a demand."""
+
+
+def is_volume(image: object, hole: object) -> bool:
+    """Return whether an image is a volume: an exemplar of three axes, or one whose hole has three, not channels."""
+    if isinstance(image, Exemplar):
+        return image.axes == 3
+    marks = as_marks(hole).marks
+    if isinstance(marks, str | os.PathLike):
+        return os.path.exists(marks) and holds_volume(marks)
+    shape = () if marks is None else try_array(marks).shape
+    sides: tuple[int, ...] = getattr(image, "shape", ())
+    # A picture of few channels stays a picture, whatever its hole.
+    flat = len(sides) == 3 and sides[2] <= MOST_CHANNELS
+    return len(shape) == 3 and shape[2] > MOST_CHANNELS and not flat
+
+
+def complete_volume(
+    image: Array | Exemplar,
+    hole: object,
+    *,
+    patch: int | None,
+    boundary: int,
+    blend: float | None,
+    seed: int,
+    progress: Progress | None,
+) -> Synthesis:
+    """Fill a hole in a volume; see `texrs.complete`."""
+    volume, hole_ = check_volume(image.image if isinstance(image, Exemplar) else image, hole)
+    shape, labels = hole_.shape, image._labels if isinstance(image, Exemplar) else None
+    width, number = as_int(boundary, "boundary", 0, 1024), as_seed(seed)
+    weight = None if blend is None else as_float(blend, "blend", 0, 1e6)
+    side = None if patch is None else as_int(patch, "patch", 6, min(shape))
+    watch = progress or (lambda stage, share: None)
+    watch("complete", 0.0)
+    source, count, seams, side = SourceMap.identity(shape), 0, 0.0, side or 0
+    labelled = False
+    composite = result = volume.copy()
+    if hole_.any():
+        painted = paint_over(volume, hole_)
+        part = choose_part(hole_)
+        with answering(progress, "exemplar", 0.0):
+            known = Exemplar(painted[part], axes=3, repeat=False, labels=labels)
+            labelled = known.labels
+        wide = widen(hole_, width)
+        side = side or choose_side(wide, known.shape)
+        places, label, frames, seams = stitch(known, hole_[part], wide[part], side, number, progress)
+        count = len(frames)
+        corner = np.array([s.start for s in part], np.float32)
+        new = label > 0
+        source.coordinates[part][new] = places[new] + corner
+        source.label[part][new] = label[new]
+        composite = volume.copy()
+        composite[part][new] = volume[part][tuple(places[new].T)]
+        result = composite
+        weight = (0.0 if labelled else BLEND) if weight is None else weight
+        if weight and labelled:
+            raise InvalidInput("blend: labels cannot be mixed; leave it out, or pass 0")
+        if weight:
+            result = composite.copy()
+            result[part] = correct_seams(composite[part], hole_[part], new, places, weight, watch)
+    watch("done", 1.0)
+    shades = np.zeros(shape, np.uint8)
+    new_ = source.label > 0
+    shades[new_] = 55 + source.label[new_] * 67 % 200
+    bare = volume.copy()
+    bare[hole_] = bare.min() if not hole_.all() else 0
+    report: dict[str, object] = {
+        "method": "patch",
+        "seed": number,
+        "filled": float(hole_.mean()),
+        "replaced_outside": int(np.count_nonzero(new_ & ~hole_)),
+        "patch": side,
+        "patches": count,
+        "seams": round(seams, 6),
+        "labels": labelled,
+        "blend": weight or 0.0,
+    }
+    stages = {"known": bare, "patches": shades, "composite": composite}
+    finished = source.finished((False,) * 3, interpolation="nearest")
+    return Synthesis(result, finished, stages, report)
+
+
+def check_volume(image: object, hole: object) -> tuple[Array, Bools]:
+    """Return the volume with a known value in its hole, and the hole."""
+    asked = as_marks(hole)
+    if asked.feather:
+        raise InvalidInput("feather: is for pictures; leave it out for a volume")
+    pixels, mask = find_hole(image, asked, (False,) * 3, axes=3)
+    volume = pixels.copy()
+    if mask.all():
+        raise InvalidInput("hole: covers the whole volume, so there is nothing to copy from")
+    volume[mask] = volume[np.unravel_index(mask.argmin(), mask.shape)]
+    as_image(volume, "image", axes=3, minimum=LEAST)
+    check_memory(24 * mask.size, "image")
+    return volume, mask
+
+
+def paint_over(volume: Array, hole: Bools) -> Array:
+    """Return a volume whose hole has the nearest known values, which patches at its border are compared with."""
+    from scipy.ndimage import distance_transform_edt
+
+    part = find_box(hole, 1)
+    nearest = distance_transform_edt(hole[part], return_distances=False, return_indices=True)
+    painted = volume.copy()
+    painted[part] = volume[part][tuple(nearest)]
+    return painted
+
+
+def find_box(mask: Bools, margin: int) -> tuple[slice, ...]:
+    """Return the smallest box that contains all marked points, widened by a margin within the array.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> find_box(np.eye(5, dtype=bool)[1:3], 1)
+    (slice(0, 2, None), slice(0, 4, None))
+
+    """
+    box = []
+    for axis, length in enumerate(mask.shape):
+        marked = np.flatnonzero(mask.any(axis=tuple(a for a in range(mask.ndim) if a != axis)))
+        box.append(slice(max(0, int(marked[0]) - margin), min(length, int(marked[-1]) + margin + 1)))
+    return tuple(box)
+
+
+def choose_part(hole: Bools) -> tuple[slice, slice, slice]:
+    """Return the part of a volume that is looked at: the hole, and enough known voxels around it."""
+    margin = MARGIN
+    while True:
+        part = find_box(hole, margin)
+        inside = hole[part]
+        if inside.size - np.count_nonzero(inside) >= PLENTY * np.count_nonzero(inside) or inside.shape == hole.shape:
+            return part[0], part[1], part[2]
+        margin *= 2
+
+
+def choose_side(hole: Bools, shape: tuple[int, ...]) -> int:
+    """Return the side of the patches, by how far the hole extends."""
+    box = find_box(hole, 0)
+    across: int = min(s.stop - s.start for s in box)
+    return min(*shape, max(SIDES[0], min(SIDES[1], round(10 + across / 4))))
+
+
+def stitch(
+    exemplar: Exemplar, hole: Bools, wide: Bools, side: int, seed: int, progress: Progress | None
+) -> tuple[NDArray[np.intp], NDArray[np.uint32], NDArray[np.int16], float]:
+    """Return where each voxel looks (D, H, W, 3), its patch (0: itself), the frames of the patches and what seams cost."""
+    # Patches that are laid reach beyond the hole by their side.
+    part = find_box(wide, side)
+    here = hole[part]
+    region = Region.whole(here.shape, (False,) * 3)
+    own = np.stack(np.meshgrid(*(np.arange(s.start, s.stop) for s in part), indexing="ij"), axis=-1)
+    forbidden = np.zeros((hole.size, 4), np.int16)
+    forbidden[hole.reshape(-1), 0] = CODE
+    asked = np.zeros(4 * region.points, np.int16)
+    with answering(progress, "exemplar", 0.5):
+        stitcher = exemplar.stitcher
+    made = stitcher.stitch(
+        region,
+        np.eye(3, dtype=np.int16)[np.newaxis] * np.int16(ONE),
+        patch=side,
+        overlap=OVERLAP[3],
+        candidates=CANDIDATES[exemplar.labels],
+        weights=replace(weights_of(exemplar), guide=FORBIDDEN),
+        recover=RECOVER,
+        repetition=0.0,
+        continuation=0.0,
+        balance=0.0,
+        seed=seed,
+        held=~here.reshape(-1),
+        loose=(wide[part] & ~here).reshape(-1),
+        given=np.ascontiguousarray(own.reshape(-1), np.int32) * np.int32(ONE),
+        demand=Demand(forbidden.reshape(-1), asked, np.full(region.points, 2**16 - 1, np.uint16)),
+        progress=stage(progress, "patches"),
+    )
+    places = np.stack(np.meshgrid(*(np.arange(n) for n in hole.shape), indexing="ij"), axis=-1)
+    label = np.zeros(hole.shape, np.uint32)
+    found = np.rint(made.places.reshape(*region.shape, 3) / ONE).astype(np.intp)
+    shown = made.patches.reshape(region.shape)
+    laid = shown < len(made.frames)
+    if hole[tuple(np.moveaxis(found, -1, 0))].any():
+        raise InvalidInput(
+            f"hole: leaves too few known voxels around it for patches of {side}; choose a smaller patch, at least 6"
+        )
+    places[part], label[part] = found, np.where(laid, shown + 1, 0)
+    return places, label, made.frames, made.seams
+
+
+def correct_seams(
+    composite: Array, hole: Bools, new: Bools, places: NDArray[np.intp], weight: float, watch: Progress
+) -> Array:
+    """Return a volume whose replaced voxels differ from their neighbours as the samples do that they come from.
+
+    The values x minimise ``sum((x[q] - x[p] - g[p, q]) ** 2) + weight * sum((x - composite) ** 2)`` over pairs of neighbours.
+    The difference g is that of the pair in the exemplar.
+    """
+    box = find_box(new, 1)
+    first = np.array([s.start for s in box])
+    shape, ends = new[box].shape, hole.shape
+    colours = composite.reshape(*ends, -1).astype(np.float64)
+    free, at = new[box], places[box]
+    pairs = []
+    total = np.full((*shape, 1), weight)
+    wanted = weight * colours[box]
+    for axis in range(3):
+        low, high = (tuple(s if a == axis else slice(None) for a in range(3)) for s in (slice(-1), slice(1, None)))
+        slopes = np.zeros((*at[low].shape[:3], colours.shape[-1]))
+        seen = np.zeros((*at[low].shape[:3], 1))
+        # The pair as it is where the one voxel comes from, and as it is where the other one does.
+        for start, step in ((at[low], 1), (at[high], -1)):
+            beside = start.copy()
+            beside[..., axis] = np.clip(beside[..., axis] + step, 0, ends[axis] - 1)
+            there = (beside[..., axis] != start[..., axis]) & ~hole[tuple(np.moveaxis(beside, -1, 0))]
+            change = colours[tuple(np.moveaxis(beside, -1, 0))] - colours[tuple(np.moveaxis(start, -1, 0))]
+            slopes += step * change * there[..., np.newaxis]
+            seen += there[..., np.newaxis]
+        counts = ((seen > 0) & (free[low] | free[high])[..., np.newaxis]).astype(np.float64)
+        slopes *= counts / np.maximum(seen, 1)
+        total[low] += counts
+        total[high] += counts
+        wanted[low] -= slopes
+        wanted[high] += slopes
+        pairs.append((low, high, counts))
+    x = colours[box].copy()
+    # Voxels of one colour of a chess board have no neighbour of the same colour.
+    odd = np.indices(shape).sum(axis=0) % 2 == 1
+    sweeps = round(min(SWEEPS[1], max(SWEEPS[0], 12 / sqrt(weight))))
+    for sweep in range(sweeps):
+        watch("blend", sweep / sweeps)
+        for chosen in (free & odd, free & ~odd):
+            sums = wanted.copy()
+            for low, high, counts in pairs:
+                sums[low] += counts * x[high]
+                sums[high] += counts * x[low]
+            x[chosen] += RELAXED * (sums / total - x)[chosen]
+    known = colours.reshape(prod(ends), -1)[~hole.reshape(-1)]
+    x = np.clip(x, known.min(axis=0), known.max(axis=0))
+    out = composite.reshape(*ends, -1).copy()
+    filled = np.rint(x[free]) if composite.dtype.kind in "bui" else x[free]
+    out[tuple(slice(f, f + n) for f, n in zip(first, shape, strict=True))][free] = filled.astype(composite.dtype)
+    return out.reshape(composite.shape)
