@@ -10,6 +10,7 @@ import numpy as np
 
 from texrs.cli._places import parse_box, parse_corners, parse_places, read_points
 from texrs.cli._readers import (
+    fit_volume,
     match_alpha,
     name_file,
     read_array,
@@ -40,6 +41,7 @@ from texrs.cli._texts import (
     parse_range,
     parse_size,
     parse_sizes,
+    parse_spacing,
     read_corrections,
     read_steps,
     show_axes,
@@ -80,6 +82,8 @@ SOURCE = replace(EXAMPLE, read=lambda text, about: match_alpha(read_example(text
 UNKNOWN = replace(EXAMPLE, read=lambda text, about: read_example(text, about, finite=False))
 """A picture in which some is not known, and may be anything."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
+UNKNOWN_VOLUME = replace(VOLUME, read=lambda text, about: read_volume(text, finite=False))
+"""A volume in which some is not known, and may be anything."""
 ENTRY = Kind(
     "FILE|FOLDER",
     read_entry,
@@ -100,7 +104,7 @@ ENTRIES = replace(
 )
 WHITE = "White is marked; of a layer, its opaque pixels."
 """What masks mark."""
-MASK = Kind("FILE", lambda path, about: read_mask(path, about.axes), WHITE, file=True)
+MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WHITE, file=True)
 GROUNDS = replace(
     MASK,
     metavar=f"FILE|{FOUND}",
@@ -184,6 +188,11 @@ KINDS = {
         read_field,
         "As in circular:axis=z,centre=16x24x0 (x first) or zigzag:period=64, or a file of frames or directions.",
         file=True,
+    ),
+    "spacing": Kind(
+        ("WIDTHxHEIGHT", "WIDTHxHEIGHTxDEPTH"),
+        parse_spacing,
+        ("Of a pixel, as in 0.7x1.6.", "Of a voxel, as in 0.7x0.7x1.6."),
     ),
     "scale_map": MAP,
     "target": MAP,

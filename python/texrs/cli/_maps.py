@@ -82,8 +82,7 @@ def apply_command(
             if places.axes == 2:
                 io.write(temporary, image)
             else:
-                spacing = _outputs.read_kept_spacing(paths[0], target, 3)
-                io.write_volume(temporary, image, spacing=spacing)
+                _outputs.write_like(temporary, image, _outputs.find_volume(paths[0], 3))
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
 
 

@@ -18,6 +18,7 @@ from typer.core import TyperCommand
 
 from texrs import io
 from texrs._arrays import as_list
+from texrs._notices import ignore
 from texrs._typing import Array
 from texrs.cli import _provenance
 from texrs.cli._places import PLACED, say_places
@@ -25,8 +26,9 @@ from texrs.cli._provenance import RUNNING, check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
 from texrs.io._files import find_suffix
-from texrs.io._formats import RAW, STORE, check, keeps_spacing
+from texrs.io._formats import RAW, STORE, check, holds_spacing, keeps_spacing
 from texrs.io._pillow import write_indexed
+from texrs.io._raw import strip_raw
 from texrs.io._temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
 
@@ -155,7 +157,7 @@ def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> No
 
 def list_files(texts: Iterable[str]) -> list[str]:
     """Return what names may stand for: of folders the files in them."""
-    return [file for text in texts for file in (_provenance.list_folder(text) or [text])]
+    return [file for text in texts for file in (_provenance.list_folder(text) or [strip_raw(text)])]
 
 
 def find_texts(value: object) -> list[str]:
@@ -351,12 +353,17 @@ def name_arguments(**names: str) -> Iterator[None]:
         raise type(error)(f"{', '.join(called)}:{said}") from None
 
 
+def find_volume(source: Any, axes: int) -> str | None:
+    """Return the file of the volume whose spacing, orientation, origin and units the result has; None if there is none."""
+    there = axes == 3 and isinstance(source, str) and not source.startswith(SAMPLE)
+    return source if there else None
+
+
 def read_kept_spacing(source: Any, out: str, axes: int) -> Sequence[float] | None:
     """Return how far voxels of a file lie apart, as those of a result do, if the result can say so."""
     suffix = find_suffix(Path(out)).lower()
-    keeps = axes == 3 and (suffix == RAW or keeps_spacing(suffix))
-    there = isinstance(source, str) and (os.path.isfile(source) or io.is_store(source))
-    return io.read_spacing(source) if keeps and there else None
+    volume = find_volume(source, axes)
+    return io.read_spacing(volume) if volume is not None and (suffix == RAW or keeps_spacing(suffix)) else None
 
 
 def deliver(
@@ -364,11 +371,15 @@ def deliver(
     paths: Mapping[str, str | None],
     *,
     like: io.Notes | None = None,
+    volume: str | None = None,
     spacing: Sequence[float] | None = None,
     made: _provenance.Record | None = None,
     option: str = "out",
 ) -> None:
-    """Write a result and what was asked for beside it; its colours are those of a picture that says ``like`` of them."""
+    """Write a result and what was asked for beside it; its colours are those of a picture that says ``like`` of them.
+
+    Voxels lie as those of the file ``volume``, with another spacing if that is given.
+    """
     out = paths["out"] or ""
     image, axes = np.asarray(result.image), result.source.axes
     suffix = find_suffix(Path(out))
@@ -380,8 +391,22 @@ def deliver(
             if palette is None or not write_indexed(temporary, image, palette):
                 io.write(temporary, result.image, notes=like)
         else:
-            io.write_volume(temporary, result.image, spacing=spacing)
+            write_like(temporary, image, volume, spacing)
         deliver_beside(result, paths, suffix, made)
+
+
+def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[float] | None = None) -> None:
+    """Write a volume whose voxels lie as those of a file, as far as the format can state that."""
+    stated = spacing or (None if volume is None else io.read_spacing(volume))
+    suffix = find_suffix(path).lower()
+    if stated is None or not holds_spacing(image, suffix):
+        if stated is not None and any(step != 1 for step in stated):
+            ignore(
+                f"{volume or '--spacing'}: the spacing is not kept, because {suffix} of {image.dtype} cannot state it"
+            )
+        io.write_volume(path, image)
+        return
+    io.write_volume(path, image, spacing=stated, like=volume)
 
 
 def deliver_beside(

@@ -18,7 +18,7 @@ from texrs.cli._kinds import Kind
 from texrs.cli._options import Options, take_options
 from texrs.cli._outputs import Quiet, Threads, make_option, name_arguments, to_write
 from texrs.cli._provenance import check_free
-from texrs.cli._readers import read_volume
+from texrs.cli._readers import read_stated_spacing, read_volume
 from texrs.cli._stacks import Roles, read_roles
 from texrs.cli._texts import About
 from texrs.errors import InvalidInput
@@ -77,7 +77,11 @@ def paint_command(
         raise InvalidInput("--directions, --field: one of them can be asked for")
     if ("along",) in values and ("directions",) not in values:
         raise InvalidInput("--along: needs --directions")
-    values |= TEXTURE.read(given, About(axes=3, roles=read_roles(role)), which=lambda o: o.file)
+    # The volume of a folder of maps states no spacing.
+    whole = given["exemplar"] if not os.path.isdir(given["exemplar"]) else None
+    spacing = values.get(("spacing",)) or read_stated_spacing(whole)
+    values |= {("spacing",): spacing} if spacing else {}
+    values |= TEXTURE.read(given, About(axes=3, roles=read_roles(role), spacing=spacing), which=lambda o: o.file)
     call, painted, followed = (
         o.call({p: v for p, v in values.items() if p in {i.path for i in o}}) for o in (TEXTURE, PAINTED, FOLLOWED)
     )

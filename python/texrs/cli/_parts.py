@@ -39,7 +39,7 @@ OPTIONS: dict[str, tuple[Any, str, str]] = {
     "scheduler": (str, "ADDRESS", "The workers of a cluster of Dask make the chunks."),
 }
 """Options that ask for a part of a texture without borders."""
-TAKEN = ("exemplar", "field", "seed", "quality", "interpolation", "memory_limit")
+TAKEN = ("exemplar", "field", "seed", "quality", "interpolation", "spacing", "memory_limit")
 """Parameters that textures without borders have too."""
 BEYOND = "to OUT.zarr, or with --chunks, it is made in parts"
 """What an error says of results that are too large to be made at once."""
@@ -89,7 +89,10 @@ class InParts(Verb):
         text = given["size"]
         size = None if text is None else parse_size(text, axes=axes, limit=1 << 50)
         asked = Asked.read(said, axes)
-        call = options.call(options.read(given | {"size": None}, About(axes=axes, roles=stack.roles)))
+        values = options.read(given | {"size": None, "field": None}, About(axes=axes, roles=stack.roles))
+        values = {**self.knows(given), **values}
+        about = About(axes=axes, roles=stack.roles, spacing=values.get(("spacing",)))
+        call = options.call(values | options.read(given, about, which=lambda option: option.name == "field"))
         usual = {p.name: p.default for p in inspect.signature(options.function).parameters.values()}
         for name, value in call.items():
             if name not in (*TAKEN, "size", "progress") and value is not usual[name] and value != usual[name]:
@@ -100,7 +103,8 @@ class InParts(Verb):
         sides = size or tuple(self.times * n for n in texture.exemplar.shape)
         memory = texture.estimate_memory(Grid.of(sides, asked.chunks, axes).chunks)
         note(f"each worker takes up to {memory / 2**30:.1f} GiB", quiet=quiet)
-        spacing = read_kept_spacing(given[next(o.name for o in options if o.argument)], str(paths["out"]), axes)
+        first = given[next(o.name for o in options if o.argument)]
+        spacing = call.get("spacing") or read_kept_spacing(first, str(paths["out"]), axes)
         write_part(texture, str(paths["out"]), sides, asked, spacing, count=count, quiet=quiet)
 
 

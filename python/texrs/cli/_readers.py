@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -77,8 +78,8 @@ def find_image(path: str) -> tuple[int, ...] | None:
     return None
 
 
-def read_volume(text: str) -> Array:
-    """Read a volume, or make the built-in one that ``sample:NAME`` names; all of it must be finite."""
+def read_volume(text: str, *, finite: bool = True) -> Array:
+    """Read a volume, or make the built-in one that ``sample:NAME`` names."""
     if text.startswith(SAMPLE):
         volume: Array = samples.load(text.removeprefix(SAMPLE)).image
         if volume.ndim != 4:
@@ -92,7 +93,8 @@ def read_volume(text: str) -> Array:
                 raise
             message = f"{text}: is an image of {shape[1]} x {shape[0]}, but a volume is needed: {VOLUMES}"
             raise FileError(f"{message}. texrs synthesize grows images") from None
-    as_image(volume, text, axes=3)
+    if finite:
+        as_image(volume, text, axes=3)
     return volume
 
 
@@ -102,15 +104,42 @@ def read_array(path: str, axes: int) -> Array:
     return array
 
 
+def fit_volume(given: Array, path: str, about: About) -> Array:
+    """Return the values of a volume at the voxels of the result, if both state a spacing and the voxels differ.
+
+    Both begin at the same corner. The nearest voxel counts, so that no value is changed.
+    """
+    stated = read_stated_spacing(path) if about.axes == 3 and about.spacing is not None and about.size else None
+    if stated is None or about.spacing is None or given.shape[:3] == about.size or np.allclose(stated, about.spacing):
+        return given
+    for axis, (side, mine, theirs) in enumerate(zip(about.size, about.spacing, stated, strict=True)):
+        # Less than a voxel is lost by rounding.
+        if abs(side * mine - given.shape[axis] * theirs) > max(mine, theirs):
+            spans = [
+                show_extent(each)
+                for each in (zip(given.shape, stated, strict=False), zip(about.size, about.spacing, strict=True))
+            ]
+            raise InvalidInput(f"{path}: must span {spans[1]} as the result does, got {spans[0]}")
+        at = np.minimum(((np.arange(side) + 0.5) * mine / theirs).astype(np.intp), given.shape[axis] - 1)
+        given = given.take(at, axis=axis)
+    assume(f"{path}: placed by its spacing, because its voxels are not those of the result")
+    return given
+
+
+def show_extent(sides: Iterable[tuple[int, float]]) -> str:
+    """Return how far voxels extend along x, y and z."""
+    return " x ".join(f"{count * step:g}" for count, step in reversed(list(sides)))
+
+
 def read_values(path: str, about: About) -> Array:
     """Read values like those of the exemplar: of one channel a file may keep the axis or not."""
-    given = read_array(path, about.axes)
+    given = fit_volume(read_array(path, about.axes), path, about)
     return given[..., np.newaxis] if about.like is not None and given.ndim < about.like.ndim else given
 
 
 def read_numbers(path: str, about: About) -> Array:
     """Read a number for each point: of several channels the mean."""
-    given = read_array(path, about.axes)
+    given = fit_volume(read_array(path, about.axes), path, about)
     return given if given.ndim == about.axes else np.asarray(given.mean(axis=-1))
 
 
@@ -192,7 +221,13 @@ def read_field(text: str, about: About) -> Any:
     from texrs import fields
 
     with name_arguments(field=about.option or "--field"):
-        return fields.as_field(turn_centre(text), len(about.size), about.size)
+        axes, size = len(about.size) or about.axes, about.size or None
+        return fields.as_field(turn_centre(text), axes, size, spacing=about.spacing)
+
+
+def read_stated_spacing(text: str | None) -> tuple[float, float, float] | None:
+    """Return the distances between the voxels of a file, if it states them."""
+    return None if text is None or text.startswith(SAMPLE) else io.read_spacing(text)
 
 
 def read_direction(text: str, about: About) -> Any:

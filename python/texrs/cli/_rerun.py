@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import typer
 
 from texrs import io
+from texrs._typing import Array
 from texrs._version import __version__
 from texrs.cli._console import hush, note, say
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, show_sides, to_write
@@ -27,6 +28,7 @@ from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
 from texrs.io._formats import detect_kind
 from texrs.io._pillow import count_frames
+from texrs.io._raw import strip_raw
 from texrs.io._temporary import name_prefix
 from texrs.materials import Map, Material
 from texrs.source_map import SourceMap
@@ -233,8 +235,11 @@ def info_command(
         say(describe_store(file))
         return
     if os.path.isdir(file):
-        for line in describe_material(file, "map"):
+        for line in describe_folder(file):
             say(line)
+        return
+    if strip_raw(file) != file:
+        say(describe_volume(file, io.read_volume(file)))
         return
     recipe = Recipe.read(file)
     for line in describe_file(file, recipe):
@@ -286,11 +291,32 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
             image, axes = io.read_volume(file), 3
         except FileError:
             raise error from None
-    what = "scale map" if recipe is not None and recipe.verb == "scale-map" else ("image", "volume")[axes - 2]
+    if axes == 3:
+        return [describe_volume(file, image)]
+    what = "scale map" if recipe is not None and recipe.verb == "scale-map" else "image"
     frames, palette = count_frames(Path(file), detect_kind(Path(file))), io.read_notes(file).palette
     also = [f"animation: {frames} frames, the first is read"] * (frames > 1)
     also += [] if palette is None else [f"palette: {len(palette) // 4} colours"]
     return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}", *also]
+
+
+def describe_folder(folder: str) -> list[str]:
+    """Return lines about the maps of a folder, or about the volume whose slices it contains."""
+    try:
+        return describe_material(folder, "map")
+    except FileError as error:
+        try:
+            volume = io.read_volume(folder)
+        except FileError as second:
+            raise (second if "missing" in str(second) else error) from None
+        return [describe_volume(folder, volume)]
+
+
+def describe_volume(path: str, volume: Array) -> str:
+    """Return a line about a volume: its sides, its values and the spacing that the file states."""
+    spacing = io.read_spacing(path)
+    steps = "" if spacing is None else f", voxels of {' x '.join(f'{s:g}' for s in reversed(spacing))}"
+    return f"volume: {describe(volume, 3)}, {volume.min()} to {volume.max()}{steps}"
 
 
 def describe_store(path: str) -> str:

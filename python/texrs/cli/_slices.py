@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,10 +20,12 @@ from texrs.cli._kinds import Kind
 from texrs.cli._options import Options, check_needed, take_options
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
 from texrs.cli._places import turn
-from texrs.cli._readers import read_volume
+from texrs.cli._readers import read_stated_spacing, read_volume
 from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
-from texrs.volume import Viewer, cube, oblique, paint, slices, transparent, turntable
+from texrs.fields._spaced import as_distances
+from texrs.volume import Viewer, cube, cubes, oblique, paint, slices, transparent, turntable
+from texrs.volume._stretch import find_cube
 from texrs.volume._values import as_direction
 from texrs.volume.pictures import as_steps, check_cube, check_turntable
 from texrs.volume.transparent import check_transfer, parse_transfer
@@ -84,10 +87,11 @@ CLEAR = Options(
         )
     },
 )
+APART = Options(cubes, only=("spacing",), optional={"spacing": "as the file states"}, axes=3)
 TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "interpolation"))
 
 
-@take_options(ACROSS, CUT, BLOCK, CLEAR, TURNED)
+@take_options(ACROSS, CUT, BLOCK, CLEAR, TURNED, APART)
 def slice_command(
     volume: Annotated[str, make_argument("VOLUME", "The volume: a file, or sample:NAME.")],
     out: Annotated[str, to_write("out", text="Image file to write, or a page (.html) with sliders.")],
@@ -120,11 +124,20 @@ def slice_command(
         raise InvalidInput(f"--out: a page shows slices along all axes, without {chosen[0]}; got {out!r}")
     with name_arguments(point="--oblique", normal="--oblique", count="--threads"), threads(count):
         check_view(used, options)
+    with name_arguments():
+        spacing = as_distances(said, 3) if (said := APART.call(APART.read(given)).get("spacing")) else None
     moving = Path(out).suffix.lower() == ".gif"
     if moving != as_turntable:
         raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
     _outputs.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube or as_clear else None)
     voxels = read_volume(volume)
+    length = voxels.shape[:3]
+    if spacing is None:
+        spacing = read_stated_spacing(volume)
+    if spacing is not None:
+        with name_arguments(volume=volume):
+            voxels = cubes(voxels, spacing)
+        place_in_cubes(options, length, voxels.shape[:3])
     if labels:
         with name_arguments(labels=volume):
             voxels = paint(voxels)
@@ -164,6 +177,20 @@ def check_view(used: Options, options: dict[str, Any]) -> None:
         as_steps(normal, None)
         if point is not None:
             as_direction(point, "point")
+
+
+def place_in_cubes(options: dict[str, Any], length: Sequence[int], sides: Sequence[int]) -> None:
+    """Change places among voxels into places among cubes."""
+    place = options.get("at")
+    if isinstance(place, tuple):
+        axis, number = place
+        options["at"] = (axis, find_cube(number, length[axis], sides[axis]))
+    elif place is not None:
+        options["at"] = [find_cube(*each) for each in zip(place, length, sides, strict=True)]
+    if "normal" in options and options["normal"][0] is not None:
+        point, normal = options["normal"]
+        scaled = [(p + 0.5) * n / m - 0.5 for p, n, m in zip(point, sides, length, strict=True)]
+        options["normal"] = scaled, normal
 
 
 def draw(voxels: Array, used: Options, options: dict[str, Any]) -> Array:

@@ -32,6 +32,8 @@ class About:
     """Of the result, once it is known."""
     like: Array | None = None
     """The exemplar, once it is read."""
+    spacing: tuple[float, ...] | None = None
+    """Distances between the voxels of the exemplar, z first, if they are stated."""
     roles: Mapping[str, str] = field(default_factory=dict)
     """What maps of materials are for."""
 
@@ -81,6 +83,13 @@ def parse_numbers(
     if not numbers or (counts and len(numbers) not in counts):
         raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
     return numbers
+
+
+def parse_spacing(text: str, about: About) -> tuple[float, ...]:
+    """Return (z, y, x) of ``0.7x0.7x1.6``, the width, height and depth of a voxel; of one number, a cube."""
+    wanted = "WIDTHxHEIGHTxDEPTH of a voxel, as in 0.7x0.7x1.6, or one number"
+    numbers = parse_numbers(text.lower().replace("×", "x"), about.option, wanted, counts=(1, about.axes), between="x")
+    return tuple(numbers[::-1]) if len(numbers) > 1 else tuple(numbers) * about.axes
 
 
 def parse_range(text: str, about: About) -> tuple[float, float]:

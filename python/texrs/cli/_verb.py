@@ -129,8 +129,9 @@ class Verb:
         example, like = self.find_example(values), self.read_colours(given, out)
         size = self.find_size(values, example)
         material = self.find_material(values)
-        spacing = _outputs.read_kept_spacing(first, out, options.axes)
-        apart = {} if spacing is None else {"spacing": spacing}
+        spacing = {**self.knows(given), **values}.get(("spacing",))
+        volume = _outputs.find_volume(first, options.axes)
+        apart = {} if volume is None and spacing is None else {"volume": volume, "spacing": spacing}
         if material is None:
             stack.refuse(paths)
             _outputs.check_output(out, example, size, fills=self.fills)
@@ -139,7 +140,8 @@ class Verb:
             for each in places:
                 stack.check_outputs(material, each, read)
             deliver = stack.deliver
-        about = replace(about, size=size, like=example)
+        steps = spacing or (None if volume is None else io.read_spacing(volume))
+        about = replace(about, size=size, like=example, spacing=steps)
         small, made = [], None
         with (
             name_arguments(**options.name_values(given), count="--threads"),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -29,14 +30,17 @@ from texrs.cli._kinds import (
     TARGET,
     THING,
     UNKNOWN,
+    UNKNOWN_VOLUME,
     VOLUME,
     Kind,
 )
 from texrs.cli._options import Options
 from texrs.cli._places import check_corners
+from texrs.cli._readers import read_stated_spacing
 from texrs.cli._texts import PLANE
 from texrs.cli._verb import Verb
-from texrs.errors import InvalidInput
+from texrs.errors import FileError, InvalidInput
+from texrs.io._grids import holds_volume
 from texrs.materials import Material, guess_role
 from texrs.synthesis import Synthesis
 
@@ -56,7 +60,7 @@ NAMES = (
     "tile",
 )
 TILES = "texrs tiles makes an endless design, and writes windows of any size"
-TWICE = {"size": "twice the exemplar"}
+TWICE = {"size": "twice the exemplar", "spacing": "as the file states"}
 GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemplar"}
 
 
@@ -68,18 +72,22 @@ def make_verb(name: str) -> Verb:
 
             kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
             names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map", "kind": "scale-kind"}
-            options = Options(
+            arguments, marked = {"image": UNKNOWN, "hole.marks": HOLE}, names | {"hole.marks": "hole"}
+            flat = Options(complete, arguments=arguments, kinds=kinds, names=marked, optional={"marks": ""})
+            deep = Options(
                 complete,
-                arguments={"image": UNKNOWN, "hole.marks": HOLE},
+                arguments={**arguments, "image": UNKNOWN_VOLUME},
                 kinds=kinds,
-                names=names | {"hole.marks": "hole"},
+                names=marked,
                 optional={"marks": ""},
+                axes=3,
             )
-            return Verb(
-                options,
+            return Filling(
+                flat,
                 says=lambda made: tell_filled(made) + tell_sizes(made),
                 fills=True,
                 placed=True,
+                deep=Verb(deep, says=tell_filled, fills=True),
             )
         case "design":
             from texrs.cli._check import tell_tiling
@@ -134,6 +142,23 @@ def make_verb(name: str) -> Verb:
             return Verb(Options(tile, arguments={"image": EXAMPLE}), says=tell_tiling, beyond=TILES)
 
 
+@dataclass(frozen=True, slots=True)
+class Filling(Verb):
+    """A verb for pictures that takes volumes too."""
+
+    deep: Verb | None = None
+
+    def run(self, **given: Any) -> None:
+        """Fill a volume if the hole is one, else a picture."""
+        texts = [given["hole_marks"], given["image"]]
+        named = next(text for text in texts if text is not None and text not in HOLE.words)
+        deep = None
+        # A file that cannot be read is refused later, by its reader.
+        with suppress(FileError):
+            deep = self.deep if not named.startswith(_outputs.SAMPLE) and holds_volume(named) else None
+        Verb.run(deep or self, **given)
+
+
 def count_moved(result: Synthesis) -> str:
     """Return how many elements moved."""
     return f", {len(result.report['matches'])} elements moved"
@@ -179,6 +204,12 @@ def read_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
     """Return the angle of view that the photograph states."""
     fov = None if given["image"].startswith(_outputs.SAMPLE) else io.read_fov(given["image"])
     return {} if fov is None else {("view", "fov"): fov}
+
+
+def read_voxels(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """Return the distances between voxels that the volume states."""
+    spacing = read_stated_spacing(given["exemplar_image"])
+    return {} if spacing is None else {("spacing",): spacing}
 
 
 def say_planes(result: Synthesis) -> str:
@@ -264,4 +295,4 @@ def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:
     )
     from texrs.cli._parts import BEYOND, InParts
 
-    return InParts(options, times=2, beyond=BEYOND)
+    return InParts(options, times=2, beyond=BEYOND, knows=read_voxels if axes == 3 else lambda given: {})

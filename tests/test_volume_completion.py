@@ -1,0 +1,149 @@
+"""Holes in volumes are filled by example, without a step at their border."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import io, samples
+from texrs.cli import main
+from texrs.errors import InvalidInput
+
+
+def make_ball(shape: tuple[int, ...], radius: float) -> np.ndarray:
+    away = np.indices(shape) - ((np.array(shape) - 1) / 2)[:, None, None, None]
+    return np.asarray((away**2).sum(axis=0) < radius**2)
+
+
+def measure_step(volume: np.ndarray, hole: np.ndarray) -> float:
+    """Return the mean difference across the border of a hole, in that of neighbours elsewhere."""
+    values = volume.astype(float).reshape(*hole.shape, -1)
+    across, elsewhere = [], []
+    for axis in range(3):
+        change = np.abs(np.diff(values, axis=axis)).mean(axis=-1)
+        first, second = (np.take(hole, range(s, hole.shape[axis] - 1 + s), axis) for s in (0, 1))
+        across.append(change[first != second])
+        elsewhere.append(change[~first & ~second])
+    return float(np.concatenate(across).mean() / np.concatenate(elsewhere).mean())
+
+
+def make_noise(seed: int = 0) -> np.ndarray:
+    from scipy.ndimage import gaussian_filter
+
+    noise = gaussian_filter(np.random.default_rng(seed).normal(size=(40, 40, 40)), 2.0, mode="wrap")
+    return np.asarray(np.clip(128 + 40 * noise / noise.std(), 0, 255).astype(np.uint8))
+
+
+VOLUMES = {
+    "noise": make_noise,
+    "stripes": lambda: samples.stripes((40, 40, 40)).image,
+    "floats": lambda: make_noise(1).astype(np.float32) / 255,
+}
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_a_hole_has_no_step_at_its_border(name: str) -> None:
+    volume = VOLUMES[name]()
+    hole = make_ball(volume.shape[:3], 9)
+    given = volume.copy()
+    given[hole] = 7
+    result = texrs.complete(given, hole, seed=3)
+    assert (result.image[~hole] == volume[~hole]).all()
+    assert measure_step(result.image, hole) <= 1.2
+    assert result.image.dtype == volume.dtype
+    # The map alone is exact, and looks nowhere into the hole.
+    np.testing.assert_array_equal(result.source.render([given]), result.stages["composite"])
+    places = np.rint(result.source.coordinates).astype(int)
+    assert not hole[tuple(np.moveaxis(places, -1, 0))].any()
+    # What was in the hole does not matter.
+    assert (texrs.complete(volume, hole, seed=3).image == result.image).all()
+
+
+def test_labels_are_not_mixed() -> None:
+    labels = (make_noise() // 52).astype(np.uint8) * 50
+    hole = make_ball(labels.shape, 8)
+    result = texrs.complete(labels, hole)
+    assert result.report["labels"]
+    assert result.report["blend"] == 0
+    assert set(np.unique(result.image)) <= set(np.unique(labels[~hole]))
+    with pytest.raises(InvalidInput, match="blend: labels cannot be mixed"):
+        texrs.complete(labels, hole, blend=0.1)
+
+
+def test_the_correction_can_be_left_out() -> None:
+    volume = make_noise()
+    hole = make_ball(volume.shape, 8)
+    plain = texrs.complete(volume, hole, blend=0)
+    assert (plain.image == plain.stages["composite"]).all()
+    assert (texrs.complete(volume, hole).stages["composite"] == plain.image).all()
+
+
+def test_known_voxels_change_within_the_boundary_alone() -> None:
+    from scipy.ndimage import distance_transform_edt
+
+    volume = make_noise()
+    hole = make_ball(volume.shape, 8)
+    result = texrs.complete(volume, hole, boundary=3)
+    far = distance_transform_edt(~hole) > 3
+    assert (result.image[far] == volume[far]).all()
+    assert result.report["replaced_outside"] > 0
+
+
+def test_threads_do_not_change_a_voxel() -> None:
+    volume = make_noise()
+    hole = make_ball(volume.shape, 7)
+    with texrs.threads(1):
+        one = texrs.complete(volume, hole, seed=5).image
+    with texrs.threads(3):
+        several = texrs.complete(volume, hole, seed=5).image
+    np.testing.assert_array_equal(one, several)
+
+
+def test_holes_of_any_shape() -> None:
+    volume = make_noise()
+    corner = np.zeros(volume.shape, bool)
+    corner[:10, :12, 30:] = True
+    specks = np.random.default_rng(2).random(volume.shape) < 0.002
+    for hole in (corner, specks, corner | specks):
+        result = texrs.complete(volume, hole, blend=0)
+        assert (result.image[~hole] == volume[~hole]).all()
+        assert ((result.source.label > 0) == hole).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"hole": np.ones((40, 40, 40), bool)}, "hole: "),
+        ({"hole": np.ones((40, 40, 4), bool)}, "hole: "),
+        ({"scale_map": "auto"}, "scale_map: is for pictures"),
+        ({"method": "optimise"}, "method: is for pictures"),
+        ({"wrap": True}, "wrap: is for pictures"),
+        ({"patch": 3}, "patch: "),
+        ({"patch": 41}, "patch: "),
+        ({"blend": -1}, "blend: "),
+        (
+            {"image": np.zeros((40, 40, 8), np.uint8), "hole": np.ones((40, 40, 8), bool)},
+            "hole: ",
+        ),
+    ],
+)
+def test_refusals(options: dict[str, object], says: str) -> None:
+    given = {"image": make_noise(), "hole": make_ball((40, 40, 40), 8)} | options
+    with pytest.raises(InvalidInput, match=says):
+        texrs.complete(**given)
+
+
+def test_the_command_fills_volumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    volume = make_noise()
+    hole = make_ball(volume.shape, 8)
+    io.write_volume(tmp_path / "scan.nrrd", np.where(hole, 0, volume).astype(np.uint8), spacing=(3, 1, 0.5))
+    io.write_volume(tmp_path / "hole.nrrd", hole.astype(np.uint8))
+    names = [str(tmp_path / name) for name in ("scan.nrrd", "hole.nrrd", "filled.nrrd")]
+    assert main(["complete", names[0], names[1], "-o", names[2], "-q"]) == 0, capsys.readouterr().err
+    np.testing.assert_array_equal(io.read_volume(names[2]), texrs.complete(volume, hole).image)
+    assert io.read_spacing(names[2]) == (3, 1, 0.5)
+    assert main(["complete", names[0], names[1], "-o", names[2], "--wrap", "x", "-q"]) == 2
+    assert "--wrap: is for pictures; leave it out for a volume" in capsys.readouterr().err
