@@ -24,6 +24,7 @@ CALLS = {
     "analyse": "in.png -o e.npz",
     "apply": "map.npz in.png -o out.tif",
     "batch": "tile in.png -o made",
+    "check": "in.png -o out.tif",
     "compare": "in.png --task tile --crop 48 --larger 48 --no-seconds -o out.html",
     "complete": "in.png hole.png -o out.tif",
     "database": "db splice dots dots -o out.png",

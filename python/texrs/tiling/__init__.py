@@ -31,6 +31,8 @@ from numpy.typing import NDArray
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_size, as_wrap, check_work
 from texrs._evening import flatten as even_light
 from texrs._notices import assume, collect
+from texrs._palettes import find as find_palette
+from texrs._palettes import has_few_colours
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Progress
 from texrs._verbs import takes_materials
@@ -147,21 +149,21 @@ def tile(
         free = [cyclic[a] and overlap is None and wanted == (rows, columns) for a in range(2)]
         already = [] if evened else find_tiled(given, free)
         if evened is None:
-            evened = len(already) < sum(cyclic) and is_uneven(given)
+            evened = len(already) < sum(cyclic) and not keeps_colours(image, weight) and is_uneven(given)
         if evened:
             even = given.flatten() if isinstance(given, Material) else as_exemplar(even_light(given.image))
             already = find_tiled(even, free)
-            given = given if isinstance(given, Material) else even
+            image = image if isinstance(image, Material) else even
         if already:
             along = " and ".join(AXES[a] for a in already)
             assume(f"image: tiles already along the {along}, which are not changed")
         made = join_edges(
-            given,
+            image,
             wrap=cyclic,
             size=wanted,
             choices=choices,
             already=already,
-            weight=weight,
+            blend=weight,
             flatten=evened,
             progress=listen(progress),
         )
@@ -179,7 +181,7 @@ def join_edges(
     size: tuple[int, int],
     choices: Sequence[Choice],
     already: Sequence[int],
-    weight: float,
+    blend: float,
     flatten: bool,
     progress: Progress | None,
 ) -> Synthesis:
@@ -198,7 +200,7 @@ def join_edges(
         source = extend(exemplar.guidance, size, wrap, watch)
     else:
         source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, watch)
-    weight = weight if found or larger else 0.0
+    weight = blend if found or larger else 0.0
     source = source.finished(wrap, screening=weight or None, flatten=flatten)
     composite = source.render(exemplar.image)
     # The picture is in even light already.
@@ -224,6 +226,13 @@ def join_edges(
         "tiling": report_tiling(result, wrap, regular=things is not None and things.regular),
     }
     return Synthesis(result, source, stages, report)
+
+
+def keeps_colours(image: Array | Exemplar | Material, blend: float) -> bool:
+    """Return whether a result has no other colours than the picture, which is then never in another light."""
+    if isinstance(image, Material):
+        return has_few_colours(np.asarray(image.base))
+    return find_palette({"image": image, "blend": blend}, ("image",), {}) is not None
 
 
 def measure_unchanged(source: SourceMap) -> float:
