@@ -27,9 +27,9 @@ __all__ = [
 ]
 
 HALF = 0.5
-"""Share of white from which a pixel is marked. JPEG at quality 20 moves black and white by up to 0.46 of their distance."""
+"""Least share of white that marks a pixel. JPEG at quality 20 moves black and white by up to 0.46 of their distance."""
 GREY, LEAST_GREY = 1 / 16, 0.01
-"""Share of white above which a pixel is grey, and share of all pixels from which unmarked grey is reported."""
+"""Least share of white of a grey pixel, and least share of unmarked grey pixels that is reported."""
 TWO = 0.1
 """Share of the pixels other than 0 that may lie between the two values of a mask: edges, and noise of JPEG."""
 PLAIN = 0.25
@@ -50,19 +50,21 @@ class Mask:
     ----------
     marks : (H, W) or (D, H, W) array, with or without channels, path_like, PIL.Image.Image, str, float or None
         The marks: an image of the same size, or what the function that takes the mask allows instead. A bool array is taken as
-        it is. Of an image, a pixel is marked if its largest channel is at least half of white. An image without any light
+        it is. In an image, a pixel is marked if its largest channel is at least half of white. An image without any
+        light
         pixel contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency
         varies is a layer of a paint program: each pixel is marked that is at least half opaque.
     invert : bool
         If True, the other pixels are marked.
     threshold : float, optional
-        Share of white, or of full opacity of a layer, from which a pixel is marked, 0 to 1. At 0, each pixel that is not black
-        is marked. Default: 0.5, which noise of JPEG does not reach. If the marks are "alpha", it is the share of transparency;
+        Least share of white, or of the full opacity of a layer, that marks a pixel, 0 to 1. 0 marks each pixel that is
+        not black. Default: 0.5, which noise of JPEG does not reach. If the marks are "alpha", it is the share of
+        transparency;
         default: any.
     grow : int
-        Number of pixels by which the marked area grows on all sides, -4096 to 4096. A negative number shrinks it.
+        Growth of the marked area on all sides in pixels, -4096 to 4096. A negative number shrinks it.
     feather : int
-        Width in pixels of the band around the marked area in which the filling fades into the image, 0 to 4096. The marked
+        Width in pixels of the band around the marked area where the filling fades into the image, 0 to 4096. The marked
         area is replaced completely. Only for a hole that is filled.
 
     Raises
@@ -306,7 +308,7 @@ def measure(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floa
     padded = np.pad(mask, [(n, n) for n in reach], mode="wrap")
     far = np.full(padded.shape, np.inf, np.float32)
     if mask.any():
-        # Distances are slow to measure: only measure them in the box in which they can be short.
+        # Distances are slow to measure, so measure them only in the box where they can be short.
         box = []
         for axis in range(mask.ndim):
             marked = np.flatnonzero(padded.any(axis=tuple(a for a in range(mask.ndim) if a != axis)))

@@ -36,7 +36,8 @@ STEP, SHARE = 8, 0.75
 ENOUGH = 2**18
 """Number of pixels, about, whose neighbours are compared: rows and columns that are spread over the picture."""
 CHUNK, MANY = 2**16, 2**12
-"""Pixels whose colours are listed at once, and number of colours from which one sort of all pixels is faster."""
+"""Number of pixels whose colours are listed at once, and least number of colours that one sort of all pixels lists
+faster."""
 _ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
 """If True, any picture keeps its colours; if False, none. If None, indexed pictures and those of few colours do."""
 

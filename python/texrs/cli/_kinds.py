@@ -80,10 +80,10 @@ EXAMPLE = Kind("FILE|FOLDER", read_example, "A file, a folder of the maps of a m
 SOURCE = replace(EXAMPLE, read=lambda text, about: match_alpha(read_example(text, about), about.like))
 """A picture of the same things as the first, which may have an alpha channel that this one lacks."""
 UNKNOWN = replace(EXAMPLE, read=lambda text, about: read_example(text, about, finite=False))
-"""A picture in which some is not known, and may be anything."""
+"""An image whose unknown pixels may have any value."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
 UNKNOWN_VOLUME = replace(VOLUME, read=lambda text, about: read_volume(text, finite=False))
-"""A volume in which some is not known, and may be anything."""
+"""A volume whose unknown voxels may have any value."""
 ENTRY = Kind(
     "FILE|FOLDER",
     read_entry,

@@ -326,7 +326,7 @@ def write(
     description : str, optional
         What the file is to say of itself, in letters of ASCII: PNG and TIFF keep it (`read_description`), the others do not.
     notes : Notes, optional
-        What the file is to say beside its values, as far as `annotate` cannot write it: TIFF keeps the georeference.
+        Metadata that `annotate` cannot write. TIFF files keep the georeference.
 
     Raises
     ------

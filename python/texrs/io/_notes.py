@@ -9,7 +9,7 @@ from typing import Any
 from texrs._checks import as_int
 
 NODATA = 42113
-"""Tag of TIFF in which GDAL states the value of pixels without data."""
+"""TIFF tag of GDAL that states the value of pixels without data."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +33,8 @@ class Notes:
     palette : bytes, optional
         Colours of an indexed image in the order of the file, four bytes each: red, green, blue, alpha.
     georeference : tuple of (int, int, int, object)
-        Tags of a TIFF file that say where on the earth its pixels lie, and which value stands for no data: code, type, number
-        of values, and value, as tifffile returns them. `write` writes them.
+        Tags of a TIFF file that state the position of its pixels on the earth, and the value that stands for no data.
+        Each has a code, a type, a number of values, and a value, as tifffile returns them. `write` writes them.
 
     Examples
     --------

@@ -58,8 +58,8 @@ LARGER = "texrs.TileSet makes an endless design, and gives it in parts"
 MOST = 7
 """Sixteenths of the side that it is at most."""
 REGULAR, DEAR = 1.0, 0.5
-"""How many times more a cut beside a cover may cost if elements are on a lattice, and if they are large or the length of the
-axis is not a multiple of their period."""
+"""Factor of the cost that a cut next to a cover may have if elements are on a lattice, and if they are large or the
+side is not a multiple of their period."""
 PERIODIC = 3.0
 """Share of the price of a cut that an overlap of the whole side would add, among multiples of a period."""
 ELEMENT = 0.22

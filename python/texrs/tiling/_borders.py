@@ -20,24 +20,25 @@ LINES = 64
 USUAL = 95
 """Percentile of the other lines that gives the figure 1: a border is as bold as one of the boldest lines elsewhere."""
 FLAT = 0.25
-"""What is added to both parts of a ratio, as a share of the mean step: noise in flat parts is no step."""
+"""Share of the mean step that is added to both parts of a ratio, so that noise in flat parts does not count as a
+step."""
 TINY = 1e-4
 """The same for a picture without steps, in units of the guide."""
 SEEN = 1.25
-"""Largest figure of a border that tiles. It was chosen on 404 borders that tile and 350 borders of crops, of which 3 % and
-5 % are judged wrongly. Of as many others 2 % and 9 % are."""
+"""Largest figure of a border that tiles. It was chosen on 404 borders that tile and 350 borders of crops, where 3 % and
+5 % are judged wrongly. On as many others, 2 % and 9 % are."""
 SHORTEST = 8
 """Fewer lines than this say nothing about what is usual."""
 STRICT, OUT_OF_STEP = 0.5, 1.5
-"""Correlation from which on a lattice must continue across a border, and how many times more a picture may differ there from
-itself a period away than at most elsewhere."""
+"""Least correlation of a lattice that must continue across a border, and factor by which an image may differ there from
+itself a period away. The factor is relative to the largest difference elsewhere."""
 DIGITS = 4
 """Digits of a figure after the point: the last bits of a mean depend on the processor."""
 
 
 @dataclass(frozen=True, slots=True)
 class Border:
-    """The border between the last line of an axis and the first line of a copy beside it."""
+    """The border between the last line of an axis and the first line of a copy next to it."""
 
     figure: float
     """1: as bold as the boldest lines elsewhere."""
@@ -54,8 +55,8 @@ class Border:
 def measure_border(guide: Floats, axis: int, lattice: Lattice | None = None) -> Border | None:
     """Return the border of an axis of a guide (H, W, C); None if there are too few lines to compare it with.
 
-    Compared are not the steps themselves but their ratio to the steps on both sides, because an edge of a photograph lies
-    on several lines and a cut on one. A picture on a lattice must continue on the lattice too: half a brick has no steps.
+    The ratio of each step to the steps on both sides is compared. An edge of a photograph is on several lines, but a
+    cut is on one. A picture on a lattice must continue on the lattice too: half a brick has no steps.
     """
     side, length = guide.shape[axis], guide.shape[1 - axis]
     found: Border | None = None
@@ -114,7 +115,7 @@ def _add_channels(values: Floats) -> Floats:
 
 
 def _average(values: Floats, count: int) -> NDArray[np.float64]:
-    """Return the means of all windows of so many blocks along each line."""
+    """Return the means of all windows of a number of blocks along each line."""
     sums = np.cumsum(values, axis=1, dtype=np.float64)
     sums[:, count:] -= sums[:, :-count].copy()
     means: NDArray[np.float64] = sums[:, count - 1 :] / count

@@ -23,8 +23,8 @@ class Tiling:
     Attributes
     ----------
     seam : (float or None, float or None)
-        Boldness of the border between the last row and the first row, and between the last column and the first column. 1: as
-        bold as the boldest lines elsewhere in the picture; 3: three times as bold. None: fewer than 8 lines.
+        Boldness of the border between the last row and the first row, and between the last column and the first column.
+        1 is as bold as the boldest lines elsewhere in the image. None: fewer than 8 lines.
     place : ((int, int) or None, (int, int) or None)
         Where each border is boldest: first pixel along the border, and first pixel after that.
     maps : mapping of str to Tiling
@@ -75,8 +75,8 @@ class Tiling:
 def check_tiling(image: Array | Exemplar | Material) -> Tiling:
     """Check whether a picture tiles: whether copies side by side have no visible border between them.
 
-    The step across the border is compared with the steps between other lines of the picture, at several scales, for the whole
-    border and for each part of it.
+    The step across the border is compared with the steps between other lines of the image. This is done at several
+    scales, on the whole border and on each part of it.
 
     Parameters
     ----------

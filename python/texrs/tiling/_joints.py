@@ -27,7 +27,8 @@ APART = 2
 LOSS = 1.5
 """Share of the price of a cut that an overlap of the whole side would add: what is overlapped is lost."""
 COVERED = 1.6
-"""How many times more a cut beside a cover may cost than the cut of an overlap: there are two cuts, but nothing is lost."""
+"""Factor of the cost that a cut next to a cover may have, relative to the cut of an overlap. A cover needs two cuts,
+but nothing is lost."""
 BAND = 4
 """Either cut of a cover is made in the side divided by this."""
 NEAR = 6
@@ -96,7 +97,7 @@ class Choice:
     period: int = 0
     """The length of what is covered; 0: no cover."""
     covered: float = COVERED
-    """How many times more a cut beside a cover may cost than the cut of an overlap."""
+    """Factor of the cost that a cut next to a cover may have, relative to the cut of an overlap."""
     loss: float = LOSS
     """Share of the price of a cut that an overlap of the whole side would add."""
 

@@ -13,12 +13,13 @@ from texrs.exemplar import Exemplar
 from texrs.materials import Material, Role
 
 UNEVEN, SMALL = 1.6, 128
-"""How many times brighter the best lit part is than the worst lit part, and the least side in pixels: of less, content that
-differs by chance looks the same. Of crops of textures in even light 0 of 81 are taken for lit unevenly, of others 4 of 89."""
+"""Least ratio of the brightest lit part to the darkest, and least side in pixels. In smaller images, content that
+differs by chance looks the same. Among crops of textures in even light, 0 of 81 are taken for lit unevenly on the half
+for choosing, and 4 of 89 on the other half."""
 SHORT = 0.05
 """Normals are vectors whose length differs from 1 by at most this, on the average."""
 STEP = 4
-"""One of so many pixels along each axis shows whether an image contains normals."""
+"""Step in pixels, along each axis, of the pixels that show whether an image contains normals."""
 
 
 def is_uneven(image: Exemplar | Material) -> bool:

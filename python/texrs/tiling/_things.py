@@ -12,15 +12,16 @@ from texrs.exemplar.segmentation import segment
 from texrs.tiling._joints import make_levels
 
 REACH = 3.0
-"""Depth in pixels of the coarsest level from which on all of an element is as deep."""
+"""Depth in pixels of the coarsest level; all of an element beyond it counts as equally deep."""
 CLOSE = 0.5
-"""Share of the picture that elements on a lattice cover from which on they lie close: seams then need not keep to joints."""
+"""Least share of the image that close elements on a lattice cover. Seams need not keep to the joints of close
+elements."""
 STEPS, ASLANT = 4, 0.08
 """Multiples of the shifts of a lattice among which a period is looked for, and the largest slope of a shift along an axis."""
 STRICT = 0.45
-"""Correlation of a picture with itself from which on a lattice is strict."""
+"""Least correlation of an image with itself on a strict lattice."""
 WHOLE = 0.2
-"""Part of a period by which a length may differ from a multiple of it."""
+"""Largest difference between a length and a multiple of the period, as a share of the period."""
 SMALLEST = 8
 """A picture of fewer pixels a side has no elements, and no patches of a quilt."""
 
@@ -34,7 +35,7 @@ class Things:
     side: float = 0.0
     """What the element at a pixel of one measures on the average, in pixels."""
     lattice: NDArray[np.float64] | None = None
-    """Two shifts as columns (2, 2), in pixels of the picture, by which it repeats; None if it does not."""
+    """Two shifts of the lattice as columns (2, 2), in pixels of the image; None if there is no lattice."""
     strict: bool = False
     """Whether the lattice is so regular that a length must be a multiple of its period."""
 
