@@ -126,7 +126,7 @@ def _report_others(path: Path, tif: Any, series: Any) -> None:
     if all(page is not None for page in series.pages):
         unused = sum(page.index not in taken and not page.is_reduced for page in tif.pages)
         if unused:
-            ignore(f"{path}: {unused} of {len(tif.pages)} pages not used: their size or type is not that of the first")
+            ignore(f"{path}: {unused} of {len(tif.pages)} pages not used: they do not form a stack with the first page")
 
 
 def count_planes(path: Path) -> int:
@@ -170,8 +170,8 @@ def take_image(path: Path, planes: Array, orientation: int) -> Array:
     """Return the only plane of a file."""
     if planes.shape[0] != 1:
         raise FileError(
-            f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume, "
-            "for texrs solid and texrs slice; for a picture, save one page alone"
+            f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume; "
+            "for a picture, save one page alone"
         )
     return turn_upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
 
