@@ -54,6 +54,32 @@ CASES = [
 ]
 
 
+@pytest.mark.parametrize(
+    ("names", "says", "options"),
+    [
+        (["T_Rock_N"], "read as normals, y down", ["--kind", "normal", "--green", "down"]),
+        (["stone_n", "stone_h"], "read as normals, y up", ["--kind", "normal", "--green", "up"]),
+        (
+            ["stone_n", "stone"],
+            "stone_n.png: read as normal (the folder has other maps of stone)",
+            ["--kind", "normal", "--green", "up"],
+        ),
+        (["stone_n", "brick"], "read as colours, because no other map in the folder", ["--kind", "colour"]),
+    ],
+)
+def test_short_names_count_with_their_folder(
+    places: Path, names: list[str], says: str, options: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for name in names:
+        io.write(tmp_path / f"{name}.png", UP)
+    words = ["apply", str(places / "m.npz"), str(tmp_path / f"{names[0]}.png"), "-o"]
+    assert main([*words, str(tmp_path / "plain.tif")]) == 0
+    assert says in capsys.readouterr().err
+    assert main([*words, str(tmp_path / "told.tif"), *options]) == 0
+    assert "read as" not in capsys.readouterr().err
+    assert (io.read(tmp_path / "plain.tif") == io.read(tmp_path / "told.tif")).all()
+
+
 @pytest.mark.parametrize(("name", "options", "says"), CASES)
 def test_names_count_as_in_a_folder(
     places: Path, name: str, options: list[str], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path

@@ -15,6 +15,8 @@ from texrs._arrays import as_choice, as_instance, as_list, as_ndarray
 from texrs._notices import assume
 from texrs._progress import listen
 from texrs._typing import Array, Path, Progress
+from texrs.io._formats import READ_IMAGES
+from texrs.materials._conventions import cut_name, guess_roles
 from texrs.materials._labels import REASON, holds_labels
 from texrs.materials._map import Map, split_channels
 from texrs.materials._roles import Role, guess_role
@@ -104,11 +106,26 @@ def apply(
     return blending.apply(source, several, kind=kind, green=green, finish=finish, progress=progress)
 
 
+def find_named(name: str | None, *, report: bool = False) -> Role | None:
+    """Return the role that the name of a file gives, alone or with the other names in its folder; report the latter."""
+    if name is None:
+        return None
+    file = FilePath(name)
+    if (role := guess_role(file.stem)) is not None or not file.is_file():
+        return role
+    stems = {each.stem for each in file.parent.iterdir() if each.suffix.lower() in READ_IMAGES} | {file.stem}
+    found, why = guess_roles(sorted(stem for stem in stems if cut_name(stem) == cut_name(file.stem)))
+    if report and file.stem in found:
+        assume(f"{name}: read as {found[file.stem].value} ({why[file.stem]})")
+    return found.get(file.stem)
+
+
 def find_packed(name: str | None) -> Role | None:
     """Return the role that the name of a file gives if its channels are different quantities, and report it."""
-    role = None if name is None else guess_role(FilePath(name).stem)
+    role = find_named(name)
     if role is None or not role.packed:
         return None
+    find_named(name, report=True)
     assume(f"{name}: read as {role.value}: {', '.join(word or 'not used' for word in role.layout)}")
     return role
 
@@ -139,7 +156,7 @@ def choose_kind(
         as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
     if green is not None:
         as_choice(green, "green", ("up", "down"))
-    role = None if name is None else guess_role(FilePath(name).stem)
+    role = find_named(name, report=kind is None)
     title, usual = name or "exemplars", find_kind(role)
     found = kind or usual
     if role is None and kind is None and pixels and all(holds_labels(each, axes) for each in pixels):
@@ -150,6 +167,10 @@ def choose_kind(
         assume(f"{title}: read as {usual}s, y {y}")
     elif kind is None and role is not None and usual == "label":
         assume(f"{title}: read as labels, the values of which are not mixed")
+    elif name is not None and kind is None and role is None and found == "colour":
+        # A short name such as stone_n has a role only next to other maps.
+        if cut_name(FilePath(name).stem) != FilePath(name).stem:
+            assume(f"{title}: read as colours, because no other map in the folder explains the name")
     elif green is None and found in ("normal", "vector"):
         assume(f"{title}: read with y {y}")
     return found, y
@@ -168,5 +189,5 @@ def find_kind(role: Role | None) -> Kind:
 
 def choose_finish(finish: Finish, name: str | None) -> Finish:
     """Return a finish that removes uneven light from colours alone."""
-    role = None if name is None else guess_role(FilePath(name).stem)
+    role = find_named(name)
     return replace(finish, flatten=False) if finish.flatten and role not in (None, Role.COLOUR) else finish
