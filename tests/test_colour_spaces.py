@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import texrs
 from texrs import Material, io
+from texrs._notices import collect
 from texrs.cli import main
 from texrs.errors import InputWarning, InvalidInput
 
@@ -243,3 +244,20 @@ def test_a_single_picture_is_not_converted_silently(
     io.write(tmp_path / "albedo.png", texrs.samples.pebbles((48, 48)).image)
     assert main(["tile", str(tmp_path / "albedo.png"), "-o", str(tmp_path / out)]) == 2
     assert "cannot hold uint8" in capsys.readouterr().err
+
+
+def test_colours_are_divided_by_alpha_on_the_way_out_of_exr(tmp_path: Path) -> None:
+    alpha = np.linspace(-0.2, 1, 20 * 18).clip(0, 1).reshape(20, 18, 1)
+    light = TRUTH.repeat(2, axis=0)[:20].repeat(2, axis=1)[:, :18, :3]
+    for folder, colours in (("multiplied", light * alpha), ("data", light)):
+        (tmp_path / folder).mkdir()
+        io.write(tmp_path / folder / "leaf_color.exr", np.dstack([colours, alpha]).astype(np.float32))
+        with collect(show=lambda _: None) as notices:
+            Material.read(tmp_path / folder).save(tmp_path / "out", suffix=".png", depth=8)
+        said = "leaf_color: colours are divided by alpha, because none is larger than alpha, as in EXR files"
+        assert (said in notices.assumed) is (folder == "multiplied")
+        shown = io.read(next((tmp_path / "out").glob("*.png"))) / 255
+        linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)[..., :3]
+        seen = alpha[..., 0] > 0.02
+        assert np.abs(linear - light)[seen].max() < 0.005
+        assert np.abs(shown[..., 3] - alpha[..., 0]).max() < 0.003
