@@ -614,3 +614,23 @@ def test_the_labpbr_example_of_the_command_line(tmp_path: Path, monkeypatch: pyt
     said = Material.read("in", roles={"stone_n": "normal-dx"}).notices.assumed
     assert any(re.match("stone_n: read as normals without z .* channels 3 and 4 stay as they are", s) for s in said)
     assert os.listdir("out")
+
+
+@pytest.mark.parametrize(("z", "quality", "sampling"), [(True, 75, 2), (True, 90, 0), (False, 75, 2)])
+def test_normals_in_jpeg_files_have_the_z_of_their_x_and_y(
+    z: bool, quality: int, sampling: int, tmp_path: Path
+) -> None:
+    slopes = np.random.default_rng(2).normal(0, 0.3, (66, 66, 2))
+    slopes = sum(np.roll(slopes, (i, j), (0, 1))[:64, :64] for i in range(3) for j in range(3)) / 9
+    vectors = np.dstack([slopes, np.ones((64, 64))])
+    stored = encode(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+    assert stores_z([stored])
+    if not z:
+        stored[..., 2] = 255
+    io.write(tmp_path / "rock_Color.png", DOTS.image)
+    Image.fromarray(stored).save(tmp_path / "rock_NormalGL.jpg", quality=quality, subsampling=sampling)
+    material = Material.read(tmp_path)
+    assert material["NormalGL"].role is (Role.NORMAL if z else Role.NORMAL_XY)
+    said = "rock_NormalGL.jpg: z of the normals is computed from x and y, because JPEG has changed it"
+    assert (said in material.notices.assumed) is z
+    assert (material["NormalGL"].pixels[..., :2] == io.read(tmp_path / "rock_NormalGL.jpg")[..., :2]).all()

@@ -26,6 +26,7 @@ from texrs.materials._labels import REASON, holds_labels
 from texrs.materials._map import Map, Space, find_space
 from texrs.materials._mipmaps import halve
 from texrs.materials._roles import Role, as_role
+from texrs.source_map._vectors import stores_z
 
 __all__ = ["read_maps", "write_maps"]
 
@@ -37,6 +38,10 @@ NAMED = 8
 """Maximum number of names in a notice."""
 PRIMARIES = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
 """White, red, green and blue of sRGB: x and y of each."""
+LOSSY = (".jpg", ".jpeg")
+"""Suffixes of files whose channels are not kept exactly."""
+FULL = 255
+"""The third channel of normals whose z is not stored."""
 MOST = 64
 """Maps that a material may have."""
 AT_ONCE = 4
@@ -150,7 +155,22 @@ def read_map(file: FilePath, role: Role, axes: int) -> Map:
         if space == "srgb" and notes.gamma == 1 and not notes.srgb:
             space = "linear"
         report_colours(file, notes, space)
+    elif role in (Role.NORMAL, Role.NORMAL_DX) and file.suffix.lower() in LOSSY and pixels.ndim == axes + 1 == 3:
+        pixels = restore_z(file, pixels)
     return Map(pixels, role, space)
+
+
+def restore_z(file: FilePath, pixels: Array) -> Array:
+    """Return normals with the z of their x and y, if only the loss of a JPEG file keeps their length from 1."""
+    if pixels.shape[-1] != 3 or pixels.dtype != np.uint8 or stores_z([pixels]) or np.median(pixels[..., 2]) >= FULL:
+        return pixels
+    vectors = pixels / np.float32(127.5) - 1
+    low, middle, high = np.percentile(np.linalg.norm(vectors, axis=-1), (5, 50, 95))
+    if low < 0.75 or high > 1.25 or abs(middle - 1) > 0.05:
+        return pixels
+    assume(f"{file.name}: z of the normals is computed from x and y, because JPEG has changed it")
+    z = np.sqrt(np.maximum(1 - (vectors[..., :2] ** 2).sum(axis=-1), 0))
+    return np.dstack([pixels[..., :2], np.rint((z + 1) * 127.5).astype(np.uint8)])
 
 
 def report_colours(file: Path, notes: io.Notes, space: Space) -> None:
