@@ -10,6 +10,7 @@ import pytest
 import texrs
 from texrs import io, samples
 from texrs.cli import main
+from texrs.painting._reading import read_mesh
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("xatlas")
@@ -55,6 +56,33 @@ def test_a_material_in_16_bit_along_an_axis_as_obj(here: Path) -> None:
     shown = trimesh.load("a.obj", force="mesh", process=False)
     assert len(shown.faces) == 80
     assert shown.visual.uv.shape == (len(shown.vertices), 2)
+
+
+def test_directions_are_at_the_scale_of_the_atlas(here: Path) -> None:
+    """The field and the texture have one scale, also if the atlas limits it."""
+    words = [
+        "paint",
+        "ball.stl",
+        "stripes.tif",
+        "-o",
+        "a.glb",
+        "--atlas",
+        "32",
+        "--directions",
+        "around:z",
+        "--quality",
+        "fast",
+    ]
+    assert main([*words, "-q"]) == 0
+    texture, surface = texrs.SolidTexture(STRIPES, quality="fast"), read_mesh("ball.stl")
+    scale = texrs.painting.find_scale(surface, texture, atlas=32)
+    assert scale < 4 * 20 / 12
+    turned = texrs.painting.follow("ball.stl", "around:z", scale=scale)
+    made = texrs.painting.paint(
+        "ball.stl", texrs.SolidTexture(STRIPES, field=turned, quality="fast"), scale=scale, atlas=32
+    )
+    shown = trimesh.load("a.glb", force="mesh", process=False)
+    assert np.array_equal(np.asarray(shown.visual.material.baseColorTexture)[..., :3], made.maps["image"])
 
 
 def test_colours_of_corners(here: Path) -> None:

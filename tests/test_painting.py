@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import samples
+from texrs import painting, samples
 from texrs.errors import FileError, InvalidInput
 from texrs.painting import follow, paint
 from texrs.painting._baking import bake_points, lean
 from texrs.painting._meshes import find_normals, find_tangents
+from texrs.painting._reading import read_mesh
+from texrs.painting._sets import lay_flat
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -40,6 +42,31 @@ def test_texels_show_the_texture_where_they_lie(baked: texrs.painting.Painted) -
     assert radius.min() > 9.3
     assert radius.max() < 10.001
     assert np.array_equal(baked.maps["image"][there], TEXTURE.sample(points[there][:, ::-1]))
+
+
+@pytest.mark.parametrize("spacing", [None, (2.0, 2.0, 2.0)])
+@pytest.mark.parametrize("side", [32, 256])
+def test_no_voxel_is_smaller_than_a_texel_by_default(
+    side: int, spacing: tuple[float, ...] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("xatlas")
+    texture, scales = texrs.SolidTexture(STRIPES, spacing=spacing, quality="fast"), []
+
+    def sample(texture: texrs.SolidTexture, points: np.ndarray, watch: object) -> dict[str, np.ndarray]:
+        scales.append(np.ptp(points, axis=0).max() / (texture.spacing[0] * 20))
+        return {"image": np.zeros((len(points), 3), np.uint8)}
+
+    monkeypatch.setattr(painting, "_sample", sample)
+    paint(BALL, texture, atlas=side, padding=0)
+    surface = read_mesh(BALL)
+    finest = 4 * 24 / 20
+    texel = painting.find_scale(surface, texture, atlas=side, padding=0) / texture.spacing[0]
+    assert scales[0] == pytest.approx(texel, rel=0.02)
+    assert (texel == pytest.approx(finest)) == (side == 256)
+    laid = lay_flat(surface, side, 0, fresh=False)
+    points, there = bake_points(laid.surface.vertices, laid.surface.faces, laid.surface.uv, side, 0)
+    apart = np.linalg.norm(np.diff(points, axis=1), axis=-1)[there[:, 1:] & there[:, :-1]]
+    assert np.median(apart) * texel < 1.2
 
 
 def test_nothing_is_seen_where_pieces_meet(baked: texrs.painting.Painted) -> None:

@@ -24,7 +24,7 @@ from texrs.cli._texts import About
 from texrs.errors import InvalidInput
 from texrs.io._temporary import name_prefix
 from texrs.materials import Material
-from texrs.painting import choose_scale, follow, paint
+from texrs.painting import find_scale, follow, paint
 from texrs.painting._files import check_suffix
 from texrs.painting._reading import read_mesh
 from texrs.papers.solid.window import SolidTexture
@@ -92,10 +92,12 @@ def paint_command(
     names = {n: v for o in (FOLLOWED, PAINTED, TEXTURE) for n, v in o.name_values(given).items()}
     with name_arguments(**names, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
         texture = SolidTexture(**call)
-        if followed:
-            size = painted.setdefault("scale", choose_scale(surface[0], texture))
-            texture = SolidTexture(**call | {"field": follow(surface[:2], **followed, scale=size)})
         painted["atlas"] = None if corners else painted.get("atlas", given["atlas"])
+        if followed:
+            # The field must turn the texture at the scale that the mesh shows it.
+            if "scale" not in painted:
+                painted["scale"] = find_scale(surface, texture, **painted)
+            texture = SolidTexture(**call | {"field": follow(surface[:2], **followed, scale=painted["scale"])})
         made = paint(surface, texture, **painted, progress=progress)
     depth: Any = bits
     with TemporaryDirectory(prefix=name_prefix(), dir=folder) as beside:

@@ -36,7 +36,7 @@ def __dir__() -> list[str]:
 
 
 FINEST = 4.0
-"""Exemplars along the longest side of a mesh, unless it is said how large the texture is."""
+"""Maximum number of exemplars along the longest side of a mesh by default."""
 _BAND = 1 << 20
 _BLOCK = 256.0
 
@@ -162,8 +162,8 @@ def paint(
         Of an array, or of a material, of which all maps are sampled. Its normals say how its relief leans along columns and
         rows, (0, 0, 1) not at all, and the surface leans as much wherever it cuts the texture.
     scale : float, optional
-        Voxels of the texture in a unit of the mesh; of a texture with a spacing, units of that. By default the longest side
-        shows the exemplar four times.
+        Number of voxels in a unit of the mesh, or of units of the texture's spacing. Default: the longest side shows the
+        exemplar four times, or fewer if a voxel would be smaller than a texel of the atlas.
     atlas : int, optional
         Side of the atlas that is baked, 16 to 16384; None gives the corners colours instead.
     padding : int
@@ -212,6 +212,8 @@ def paint(
         baked = [bake_points(*_take_set(laid, k), side, more) for k in range(len(laid.names))]
     if not all(there.any() for _, there in baked):
         raise InvalidInput("mesh: its atlas has no area: it lies in one line, or beyond 0 to 1")
+    if scale is None:
+        size = limit_scale(size, texture, laid.surface, side)
     points = np.concatenate([points[there] for points, there in baked])
     values = _sample(texture, points * size, watch)
     ends = np.cumsum([there.sum() for _, there in baked])[:-1]
@@ -275,10 +277,32 @@ def _spread(values: Array, there: NDArray[np.bool_]) -> Array:
 
 
 def choose_scale(vertices: NDArray[np.float64], texture: SolidTexture) -> float:
-    """Return voxels in a unit of a mesh: the longest side shows the exemplar so many times."""
+    """Return the number of voxels in a unit of a mesh if its longest side shows `FINEST` exemplars."""
     longest = float(np.ptp(vertices, axis=0).max())
     sides = [n * step for n, step in zip(texture.exemplar.shape, texture.spacing, strict=True)]
     return FINEST * max(sides) / max(longest, 1e-12)
+
+
+def find_scale(
+    surface: Surface, texture: SolidTexture, *, atlas: int | None, padding: int = 4, unwrap: bool = False
+) -> float:
+    """Return the default scale of `paint`."""
+    size = choose_scale(surface.vertices, texture)
+    if atlas is None:
+        return size
+    side, more = as_int(atlas, "atlas", 16, 16384), as_int(padding, "padding", 0, 64)
+    return limit_scale(size, texture, lay_flat(surface, side, more, fresh=unwrap).surface, side)
+
+
+def limit_scale(size: float, texture: SolidTexture, surface: Surface, side: int) -> float:
+    """Return a scale, lowered if its voxels would be smaller than the texels: the atlas cannot show finer detail."""
+    assert surface.uv is not None
+    edges = np.diff(surface.vertices[surface.faces], axis=1)
+    flat = np.diff(surface.uv[surface.faces], axis=1)
+    area = float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1).sum())
+    covered = float(np.abs(flat[:, 0, 0] * flat[:, 1, 1] - flat[:, 0, 1] * flat[:, 1, 0]).sum())
+    texels = side * np.sqrt(covered / max(area, 1e-24))
+    return min(size, float(texels) * min(texture.spacing))
 
 
 def _sample_slopes(texture: SolidTexture, points: NDArray[np.float64], slopes: Floats) -> NDArray[np.float64]:
