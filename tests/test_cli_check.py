@@ -35,7 +35,7 @@ def test_a_tile_is_left_as_it_is(folder, capsys):
     ]
     assert main(["tile", "tile.png", "-o", "again.png"]) == 0
     said = capsys.readouterr().err
-    assert "image: tiles already along the rows and columns, which are not changed" in said
+    assert "tiles already along the rows and columns, which are not changed" in said
     assert "100% of the pixels unchanged" in said
     np.testing.assert_array_equal(io.read("tile.png"), io.read("again.png"))
 
@@ -61,7 +61,7 @@ def test_uneven_light_is_printed_and_may_be_kept(folder, capsys):
     ramp = np.linspace(0.55, 1.45, 128)[:, np.newaxis]
     io.write("lit.png", np.clip(np.rint(grit * ramp), 0, 255).astype(np.uint8))
     assert main(["tile", "lit.png", "-o", "even.png"]) == 0
-    assert "image: is lit unevenly" in capsys.readouterr().err
+    assert "is lit unevenly" in capsys.readouterr().err
     assert main(["tile", "lit.png", "-o", "kept.png", "--no-flatten"]) == 0
     assert "unevenly" not in capsys.readouterr().err
 

@@ -45,7 +45,7 @@ from texrs.synthesis import Synthesis
 from texrs.tiling._check import AXES, Tiling, check_tiling, find_tiled, report_tiling
 from texrs.tiling._extend import extend
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
-from texrs.tiling._light import is_uneven
+from texrs.tiling._light import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
 from texrs.tiling._things import SMALLEST, Things, find_things
 
@@ -156,7 +156,7 @@ def tile(
             image = image if isinstance(image, Material) else even
         if already:
             along = " and ".join(AXES[a] for a in already)
-            assume(f"image: tiles already along the {along}, which are not changed")
+            assume(f"{name_image(given)}: tiles already along the {along}, which are not changed")
         made = join_edges(
             image,
             wrap=cyclic,

@@ -10,6 +10,7 @@ from texrs._evening import BRIGHTEST, measure_unevenness
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.exemplar import Exemplar
+from texrs.io import _origins
 from texrs.materials import Material, Role
 
 UNEVEN, SMALL = 1.6, 128
@@ -22,14 +23,22 @@ STEP = 4
 """Step in pixels, along each axis, of the pixels that show whether an image contains normals."""
 
 
+def name_image(image: Exemplar | Material) -> str:
+    """Return the file that a picture was read from, if it is known, or the name of the argument."""
+    origin = None if isinstance(image, Material) else _origins.find(image.image)
+    return "image" if origin is None else origin[0]
+
+
 def is_uneven(image: Exemplar | Material) -> bool:
     """Return whether there is evidence that a picture, or colours of a material, are lit unevenly, and report it."""
     if isinstance(image, Exemplar):
-        return _is_lit_unevenly(image.image)
-    return any(_is_lit_unevenly(each.pixels, each.space) for each in image.values() if each.role is Role.COLOUR)
+        return _is_lit_unevenly(image.image, name_image(image))
+    return any(
+        _is_lit_unevenly(each.pixels, name, each.space) for name, each in image.items() if each.role is Role.COLOUR
+    )
 
 
-def _is_lit_unevenly(image: Array, space: Space | None = None) -> bool:
+def _is_lit_unevenly(image: Array, name: str, space: Space | None = None) -> bool:
     pixels = as_image(image)
     colours = pixels.dtype == np.uint8 or (pixels.shape[-1] >= 3 and pixels.dtype.kind in "uf")
     # Grey levels of more bits are heights as often, and normals are not lit.
@@ -46,6 +55,6 @@ def _is_lit_unevenly(image: Array, space: Space | None = None) -> bool:
     times = round(measure_unevenness(pixels, space), 2)
     if times >= UNEVEN:
         assume(
-            f"image: is lit unevenly, one part {times:g} times brighter than another part; its light is evened out first"
+            f"{name}: is lit unevenly, one part {times:g} times brighter than another part; its light is evened out first"
         )
     return times >= UNEVEN
