@@ -86,7 +86,7 @@ def check_tiling(image: Array | Exemplar | Material) -> Tiling:
     Returns
     -------
     Tiling
-        Attributes ``tiles`` and ``seam``, each (rows, columns). It is wrong for about 3 % of the borders that tile and for
+        Attributes ``tiles`` and ``seam``, each (rows, columns). It is wrong for about 2 % of the borders that tile and for
         7 % of those that do not.
 
     Raises
