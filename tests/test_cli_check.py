@@ -27,7 +27,7 @@ def test_a_picture_is_checked_and_shown_twice_by_twice(folder, capsys):
 
 def test_a_tile_is_left_as_it_is(folder, capsys):
     assert main(["tile", "in.png", "-o", "tile.png"]) == 0
-    assert "of the pixels unchanged, seam of rows " in capsys.readouterr().err
+    assert "of the pixels in place, seam of rows " in capsys.readouterr().err
     assert main(["check", "tile.png"]) == 0
     assert [line.partition(", seam")[0] for line in capsys.readouterr().out.splitlines()[1:]] == [
         "rows (bottom to top): tile",
@@ -36,7 +36,7 @@ def test_a_tile_is_left_as_it_is(folder, capsys):
     assert main(["tile", "tile.png", "-o", "again.png"]) == 0
     said = capsys.readouterr().err
     assert "tiles already along the rows and columns, which are not changed" in said
-    assert "100% of the pixels unchanged" in said
+    assert "100% of the pixels in place" in said
     np.testing.assert_array_equal(io.read("tile.png"), io.read("again.png"))
 
 

@@ -15,6 +15,7 @@ from texrs._progress import answering, ask, listen, show_lines
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 
+PEBBLES = texrs.samples.pebbles((48, 48)).image
 STRIPES = np.tile(np.uint8([[0, 0, 200, 200]]), (32, 8))
 VERBS = [
     getattr(texrs, name)
@@ -24,8 +25,8 @@ VERBS = [
 
 
 def test_true_shows_a_bar_that_goes_when_the_verb_ends(capsys: pytest.CaptureFixture[str]):
-    expected = texrs.tile(STRIPES).image
-    assert np.array_equal(texrs.tile(STRIPES, progress=True).image, expected)
+    expected = texrs.tile(PEBBLES).image
+    assert np.array_equal(texrs.tile(PEBBLES, progress=True).image, expected)
     shown = capsys.readouterr().err
     assert "join rows" in shown
     assert "100 %" in shown
@@ -43,7 +44,7 @@ def test_without_tqdm_lines_are_written(monkeypatch: pytest.MonkeyPatch, capsys:
     monkeypatch.setattr(builtins, "__import__", refuse)
     for name in [n for n in sys.modules if n.startswith("tqdm")]:
         monkeypatch.delitem(sys.modules, name)
-    texrs.tile(STRIPES, progress=True)
+    texrs.tile(PEBBLES, progress=True)
     assert capsys.readouterr().err.splitlines() == ["segment", "join columns", "join rows"]
 
 
@@ -75,7 +76,7 @@ def test_every_verb_says_what_progress_may_be(verb):
 
 
 def test_materials_are_shown_by_one_bar(capsys: pytest.CaptureFixture[str]):
-    stack = Material({"colour": STRIPES, "height": STRIPES.astype(np.float32)})
+    stack = Material({"colour": PEBBLES, "height": PEBBLES[..., 1].astype(np.float32)})
     assert np.array_equal(texrs.tile(stack, progress=True).image, texrs.tile(stack).image)
     assert "join rows" in capsys.readouterr().err
 

@@ -57,6 +57,7 @@ WRITERS = {
     "database matrix": "database db matrix -o {}.png",
     "database splice": "database db splice dots dots -o {}.png",
     "design": "design in.png --size 48 --tiles 1 -o {}.png",
+    "check": "check in.png -o {}.png",
     "extend": "extend in.png --left 8 --slant 0 -o {}.png",
     "paint": "paint in.obj in.tif --vertices --voxels 2 -o {}.glb",
     "perspective": "perspective in.png --size 64 -o {}.png",

@@ -88,8 +88,12 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
         value = given.get(name)
         if isinstance(value, str | os.PathLike):
             with suppress(TexrsError):
-                # A verb that fills holes takes no pixel without data for a value.
+                # A verb that fills holes does not use pixels without data as values.
                 value = given[name] = as_ndarray(value, name, used="hole" not in usual)
+        elif isinstance(value, list | tuple) and any(isinstance(each, str | os.PathLike) for each in value):
+            with suppress(TexrsError):
+                paths = (str, os.PathLike)
+                value = given[name] = [as_ndarray(e, name) if isinstance(e, paths) else e for e in value]
         images += [(name, image) for image in _list_images(value)]
     if not images or not all(image.ndim in (2, 3) and image.shape[2:] < (5,) for _, image in images):
         return None

@@ -7,9 +7,10 @@ from typing import Annotated
 import numpy as np
 
 from texrs import io
+from texrs._threads import threads
 from texrs.cli import _outputs
 from texrs.cli._console import note, say
-from texrs.cli._outputs import Quiet, describe, make_argument, name_arguments, to_write
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
 from texrs.cli._readers import read_example
 from texrs.cli._texts import About
 from texrs.materials import Material
@@ -24,6 +25,7 @@ BORDERS = {"rows": "bottom to top", "columns": "right to left"}
 def check_command(
     file: Annotated[str, make_argument("FILE", "A picture, a folder of the maps of a material, or sample:NAME.")],
     out: Annotated[str | None, to_write("out", text="Picture of 2 x 2 copies to write.")] = None,
+    count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
     """Test whether a picture tiles along each axis, and how bold its borders are."""
@@ -33,7 +35,7 @@ def check_command(
     shown = np.asarray(given.base if isinstance(given, Material) else given)
     if out is not None:
         _outputs.check_output(out, shown)
-    with name_arguments(image=file):
+    with name_arguments(image=file, count="--threads"), threads(count):
         found = check_tiling(given)
     say(f"{file}: {describe(shown, 2)}")
     for name, each in (found.maps or {"": found}).items():
@@ -62,7 +64,7 @@ def list_borders(found: Tiling) -> list[str]:
 def tell_tiling(result: Synthesis) -> str:
     """Return how bold the borders of a result are, what was changed, and why its size is another one."""
     report = result.report
-    said = [f", {report['unchanged']:.0%} of the pixels unchanged"] if "unchanged" in report else []
+    said = [f", {report['in_place']:.0%} of the pixels in place"] if "in_place" in report else []
     seams = [
         f"{name} {each['seam']:.2f}" for name, each in report.get("tiling", {}).items() if each["seam"] is not None
     ]

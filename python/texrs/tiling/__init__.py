@@ -111,7 +111,7 @@ def tile(
         much of its middle that was asked for. The stages are ``"swapped"`` (the halves
         exchanged, nothing cut yet), ``"pieces"`` (which part of the picture each pixel is from) and ``"composite"``, the
         result before ``blend``. The report contains for each axis the overlap, 0 if the ends are covered, the number of joints
-        that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles. ``unchanged`` is
+        that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles. ``in_place`` is
         the share of the pixels that are those of the picture at the same place. ``resized`` is the reason for another size,
         and ``tiling`` is what `texrs.check_tiling` finds in the result.
 
@@ -222,7 +222,7 @@ def join_edges(
         "resized": reasons,
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
         "joints": {AXES[a]: describe(joined) for a, joined in found.items()},
-        "unchanged": round(measure_unchanged(source), 4),
+        "in_place": round(measure_kept_places(source), 4),
         "tiling": report_tiling(result, wrap, regular=things is not None and things.regular),
     }
     return Synthesis(result, source, stages, report)
@@ -235,7 +235,7 @@ def keeps_colours(image: Array | Exemplar | Material, blend: float) -> bool:
     return find_palette({"image": image, "blend": blend}, ("image",), {}) is not None
 
 
-def measure_unchanged(source: SourceMap) -> float:
+def measure_kept_places(source: SourceMap) -> float:
     """Return the share of the pixels that come from the same place of the picture."""
     return float((source.coordinates == np.moveaxis(np.indices(source.shape, np.float32), 0, -1)).all(axis=-1).mean())
 

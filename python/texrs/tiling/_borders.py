@@ -20,8 +20,7 @@ LINES = 64
 USUAL = 95
 """Percentile of the other lines that gives the figure 1: a border is as bold as one of the boldest lines elsewhere."""
 FLAT = 0.25
-"""Share of the mean step that is added to both parts of a ratio, so that noise in flat parts does not count as a
-step."""
+"""Share of the mean step that is added to both parts of a ratio. Noise in flat parts then does not count as a step."""
 TINY = 1e-4
 """The same for a picture without steps, in units of the guide."""
 SEEN = 1.25
@@ -30,8 +29,8 @@ these are judged wrongly. On as many others, 2 % and 7 % are."""
 SHORTEST = 8
 """Fewer lines than this say nothing about what is usual."""
 STRICT, OUT_OF_STEP = 0.5, 1.5
-"""Least correlation of a lattice that must continue across a border, and factor by which an image may differ there from
-itself a period away. The factor is relative to the largest difference elsewhere."""
+"""Least correlation of a lattice that must continue across a border, and largest ratio of the differences to the image
+a period away. The factor is relative to the largest difference elsewhere."""
 DIGITS = 4
 """Digits of a figure after the point: the last bits of a mean depend on the processor."""
 

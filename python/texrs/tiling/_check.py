@@ -23,8 +23,8 @@ class Tiling:
     Attributes
     ----------
     seam : (float or None, float or None)
-        Boldness of the border between the last row and the first row, and between the last column and the first column.
-        1 is as bold as the boldest lines elsewhere in the image. None: fewer than 8 lines.
+        Boldness of the borders between the last and the first row, and between the last and the first column.
+        The value 1 means as bold as the boldest lines elsewhere in the image. None: fewer than 8 lines.
     place : ((int, int) or None, (int, int) or None)
         Where each border is boldest: first pixel along the border, and first pixel after that.
     maps : mapping of str to Tiling

@@ -14,8 +14,9 @@ from texrs.io import _origins
 from texrs.materials import Material, Role
 
 UNEVEN, SMALL = 1.6, 128
-"""Least ratio of the brightest lit part to the darkest, and least side in pixels. In smaller images, content that differs by
-chance looks the same. On 119 crops of textures in even light that the ratio was chosen on, none is taken for lit unevenly.
+"""Least ratio of the brightest lit part to the darkest, and least side in pixels. Content that differs by chance looks
+the same in smaller images. On 119 crops of textures in even light that the ratio was chosen on, none is taken for lit
+unevenly.
 On 134 other crops, 6 are."""
 SHORT = 0.05
 """Normals are vectors whose length differs from 1 by at most this, on the average."""

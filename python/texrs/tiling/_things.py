@@ -35,7 +35,7 @@ class Things:
     side: float = 0.0
     """What the element at a pixel of one measures on the average, in pixels."""
     lattice: NDArray[np.float64] | None = None
-    """Two shifts of the lattice as columns (2, 2), in pixels of the image; None if there is no lattice."""
+    """Two shifts of the lattice as columns (2, 2), in pixels of the image; None without a lattice."""
     strict: bool = False
     """Whether the lattice is so regular that a length must be a multiple of its period."""
 

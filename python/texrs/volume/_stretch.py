@@ -23,8 +23,8 @@ def cubes(volume: ArrayLike, spacing: Sequence[float]) -> Array:
     ----------
     volume : array_like
         Shape (D, H, W) or (D, H, W, C).
-    spacing : sequence of 3 float
-        Distances between planes, rows and columns, in any unit. The smallest becomes the side of the cubes.
+    spacing : (plane, row, column) float
+        Voxel size along each axis, in any unit. The smallest becomes the side of the cubes.
 
     Returns
     -------

@@ -127,8 +127,8 @@ def solid(
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
         sample whatever it says.
-    spacing : sequence of 3 float, optional
-        Distances between planes, rows and columns, of the exemplar and of the result, in any unit. The field turns and
+    spacing : (plane, row, column) float, optional
+        Voxel size along each axis of the exemplar and of the result, in any unit. The field turns and
         scales the texture in space, not in voxels; its places and lengths are in that unit. Default: voxels are cubes of
         side 1.
     memory_limit : int, optional

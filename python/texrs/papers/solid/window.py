@@ -95,8 +95,8 @@ class SolidTexture(Texture):
         They are different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample, whatever it says.
-    spacing : sequence of 3 float, optional
-        Distances between planes, rows and columns, in any unit. The field turns in space, where voxels need not be cubes.
+    spacing : (plane, row, column) float, optional
+        Voxel size along each axis, in any unit. The field turns in space, where voxels need not be cubes.
         Its places and lengths are in the same unit. Windows and points stay in voxels. Default: 1.
     cache_bytes : int
         Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
