@@ -60,7 +60,7 @@ OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "page": (("--page",), "OUT.html", "Page that shows what was found, to be corrected by clicking."),
 }
 """All options that say what is written: what the shell calls them, what they are, and what they are for."""
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print neither progress nor notices.")]
 Threads = Annotated[
     int | None,
     typer.Option("--threads", metavar="N", help="Threads, 1 to 1024; same bytes with any.", show_default="all cores"),
