@@ -43,7 +43,7 @@ def test_a_tile_is_left_as_it_is(folder, capsys):
 def test_the_reason_of_another_size_is_printed(folder, capsys):
     io.write("scales.png", samples.load("scales", size=(256, 256)).image)
     assert main(["tile", "scales.png", "-o", "tile.png"]) == 0
-    assert ", columns 256 -> 202 pixels: 2 whole periods of 100.8" in capsys.readouterr().err
+    assert ", columns 256 -> 202 pixels: 2 whole periods of about 100.8" in capsys.readouterr().err
 
 
 def test_each_map_of_a_folder_is_checked(folder, capsys):

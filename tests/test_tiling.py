@@ -143,7 +143,10 @@ def test_a_lattice_is_cut_at_whole_periods_and_the_report_contains_the_reason(na
     key = ("rows", "columns")[axis]
     assert made.report["joints"][key]["cover"] == 0
     length = made.image.shape[axis]
-    assert made.report["resized"][key] == f"256 -> {length} pixels: {round(length / period)} whole periods of {period}"
+    assert (
+        made.report["resized"][key]
+        == f"256 -> {length} pixels: {round(length / period)} whole periods of about {period}"
+    )
     # As large as possible: not even half of a period more would have been overlapped.
     assert length > 256 - 1.5 * period
 

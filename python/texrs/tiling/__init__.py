@@ -348,11 +348,11 @@ def give_reason(joined: Joined, things: Things, axis: int, side: int) -> str:
     """Return why an axis became shorter."""
     length, period = joined.joint.period, things.find_period(axis)
     if times := things.count_periods(axis, length):
-        return f"{side} -> {length} pixels: {times} whole periods of {period:.1f}"
+        return f"{side} -> {length} pixels: {times} whole periods of about {period:.1f}"
     if things.side > ELEMENT * side:
         return f"{side} -> {length} pixels: elements are large, and fewer are cut at this length"
     if things.is_out_of_step(axis, side):
-        return f"{side} -> {length} pixels: the period of {period:.1f} does not divide {side}"
+        return f"{side} -> {length} pixels: {side} is not a multiple of the period of about {period:.1f}"
     return f"{side} -> {length} pixels: a joint that keeps the length costs {joined.dearer:.1f} times as much"
 
 
