@@ -61,9 +61,7 @@ class Verb:
     scaled: bool = True
     """Whether a pixel of the result is as large as one of the first input."""
     fills: bool = False
-    """Whether a transparent input can give an opaque result."""
-    placed: bool = False
-    """Whether each pixel of the result lies at the same place in the first input."""
+    """Whether it fills pixels of the first input and keeps the others in place. A transparent input can then become opaque."""
     beyond: str = ""
     """What makes larger ones."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
@@ -197,9 +195,9 @@ class Verb:
         first = given[next(o.name for o in self.options if o.argument)]
         name = first[0] if isinstance(first, list) else first
         notes = io.read_notes(name) if os.path.isfile(name) else io.Notes()
-        if self.placed and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
+        if self.fills and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
             ignore(f"{os.path.basename(name)}: its georeference is not written, because only TIFF holds it")
-        notes = notes if self.placed else replace(notes, georeference=())
+        notes = notes if self.fills else replace(notes, georeference=())
         return replace(notes, made=None, density=notes.density if self.scaled else None)
 
     def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:

@@ -86,7 +86,6 @@ def make_verb(name: str) -> Verb:
                 flat,
                 says=lambda made: tell_filled(made) + tell_sizes(made),
                 fills=True,
-                placed=True,
                 deep=Verb(deep, says=tell_filled, fills=True),
             )
         case "design":
@@ -118,7 +117,7 @@ def make_verb(name: str) -> Verb:
             from texrs.removal import remove
 
             verb = _see(remove, {"mask.marks": "mask"}, **{"mask.marks": THING})
-            return replace(verb, says=lambda made: tell_filled(made) + say_planes(made), fills=True, placed=True)
+            return replace(verb, says=lambda made: tell_filled(made) + say_planes(made), fills=True)
         case "solid":
             from texrs.papers.solid import solid
 
