@@ -1,48 +1,49 @@
-//! Kernels of texrs: new textures from one example.
+//! Kernels of texrs: they synthesise new textures from one example.
 //!
-//! Four layers, the lowest first; a module uses those below its own layer, and of its own layer only what the table
-//! names behind an arrow. Every kernel returns the same bytes for any number of threads.
+//! The crate has four layers, listed from the lowest to the highest. A module may use all layers
+//! below its own. In its own layer it uses only the modules after the arrow in its table row. Every
+//! kernel returns the same bytes for any number of threads.
 //!
 //! | foundation | |
 //! |---|---|
-//! | [`error`] | the one error type |
-//! | [`grid`] | shape, strides, wrap or clamp per axis; two and three dimensions from one source |
-//! | `memory` | allocations that may fail |
+//! | [`error`] | the error type of the crate |
+//! | [`grid`] | grids of two or three axes: shape, strides, and wrapping or clamping per axis |
+//! | `memory` | allocations that return an error if memory is short |
 //! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
-//! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
+//! | [`hash`] | counter-based noise: a random value depends on its position, not on a stream |
 //! | [`fixed`] | coordinates and frames in fixed point |
-//! | `functions` | exponentials, sines and roots, the same on every machine |
-//! | `fft` | Fourier transforms of lines and of images |
+//! | `functions` | exponentials, sines and roots with the same value on every machine |
+//! | `fft` | Fourier transforms of lines, images and volumes |
 //! | [`pca`] | principal components |
-//! | `wide` | wide registers, chosen at run time |
+//! | `wide` | SIMD code, chosen at run time |
 //!
 //! | kernels | |
 //! |---|---|
 //! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
 //! | [`patch_search`] | exact best matches of a masked patch |
-//! | [`complete`] | filling holes by example -> `seam`, `patch_search` |
-//! | [`poisson`] | images from their differences, near given values |
+//! | [`complete`] | exemplar-based filling of holes -> `seam`, `patch_search` |
+//! | [`poisson`] | images reconstructed from their differences, near given values |
 //! | [`distance`] | signed distances to the outlines of labelled pieces |
-//! | [`warp`] | where each pixel comes from, of pictures warped by moved points, and of moved shapes -> `gather` |
-//! | [`gather`] | an exemplar of any type looked up through coordinates |
+//! | [`warp`] | source coordinates of the pixels of warped images and moved shapes -> `gather` |
+//! | [`gather`] | lookup of exemplars of any type through coordinates |
 //! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
-//! | [`nearby`] | sums over what lies near by, of values at few points of an image |
-//! | [`smooth`] | arrays smoothed along their axes, as by a Gaussian |
-//! | [`mean_shift`] | joint spatial and range filtering |
-//! | [`reconstruction`] | grey-scale reconstruction: what is left of an image without its small domes |
-//! | [`regions`] | regions of one colour: the graph-based merge |
+//! | [`nearby`] | windowed sums of values that are given at a few points of an image |
+//! | [`smooth`] | smoothing of arrays along their axes, such as Gaussian blur |
+//! | [`mean_shift`] | mean-shift filtering in space and colour |
+//! | [`reconstruction`] | grey-scale reconstruction: an image without its small domes |
+//! | [`regions`] | segmentation into regions of similar colour by graph-based merging |
 //! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
-//! | [`image_io`] | 8/16-bit and float image files, with limits |
+//! | [`image_io`] | 8-bit, 16-bit and float image files, with limits |
 //!
 //! | engine | |
 //! |---|---|
-//! | [`appearance`] | appearance vectors: what the neighbourhood of each sample of an exemplar looks like |
+//! | [`appearance`] | appearance vectors: descriptions of the neighbourhood of each exemplar sample |
 //! | [`guide`] | soft constraints on an output -> `appearance` |
-//! | [`blocks`] | patch-based initialisation: cells filled by pieces that fit -> `appearance`, `guide` |
-//! | [`pyramid`] | from one resolution to the next |
-//! | [`optimize`] | coordinates corrected until every window is like one of the exemplar -> `appearance`, `guide` |
-//! | [`stitcher`] | patches pulled through frames, cut where it shows least, healed -> `guide` |
-//! | [`quilt`] | patches of pictures, chosen one by one and cut in -> `stitcher` |
+//! | [`blocks`] | patch-based initialisation: each cell gets a matching piece -> `appearance`, `guide` |
+//! | [`pyramid`] | upsampling of coordinates to the next resolution |
+//! | [`optimize`] | correction of coordinates until every window resembles one of the exemplar -> `appearance`, `guide` |
+//! | [`stitcher`] | patches transformed by frames, cut along the least visible seams and healed -> `guide` |
+//! | [`quilt`] | patches of images, chosen one by one and cut in -> `stitcher` |
 //! | [`coherence`] | k-coherence: similarity sets, and correction among their candidates -> `appearance` |
 //!
 //! The topmost layer, `bindings`, is the Python module `texrs._rust` (feature `python`).

@@ -12,7 +12,7 @@ use crate::foundation::grid::{Grid, Region};
 use crate::foundation::memory;
 use crate::{Error, Result};
 
-/// An exemplar at one resolution, analysed.
+/// The analysis of an exemplar at one resolution.
 #[pyclass(frozen)]
 pub(super) struct Appearance(pub(super) Analysis);
 
@@ -21,7 +21,7 @@ pub(super) enum Analysis {
     Three(appearance::Appearance<3>),
 }
 
-/// Runs `$body` with `$a` bound to the analysis of either dimension, and `D` its number of axes.
+/// Runs `$body` with `$a` bound to the analysis, and `D` to its number of axes.
 macro_rules! either {
     ($analysis:expr, $a:ident, $body:expr) => {
         match $analysis {
@@ -40,10 +40,10 @@ macro_rules! either {
 }
 pub(super) use either;
 
-/// Shape, origin and cyclic axes of a region.
+/// Shape, origin and wrapped axes of a region.
 pub(super) type Where = (Vec<usize>, Vec<i32>, Vec<bool>);
 pub(super) type PlacesOut<'py> = Bound<'py, PyArray1<i32>>;
-/// Colours, vectors, basis, bias, gain and spacing.
+/// Colours, feature vectors, basis, bias, gain and spacing.
 type PartsOut<'py> = (
     Bound<'py, PyArray1<i16>>,
     Bound<'py, PyArray1<i16>>,
@@ -69,7 +69,7 @@ pub(super) fn region<const D: usize>((shape, origin, wrap): &Where) -> Result<Re
     Region::new(grid, fixed("origin", origin)?)
 }
 
-/// One frame, or one a point.
+/// Returns one frame for all points, or one for each point.
 pub(super) fn frames<const D: usize>(values: &[i16]) -> Result<Frames<'_, D>> {
     let rows: &[[i16; D]] = grouped("frames", values)?;
     let frames: &[Frame<D>] = grouped("frames", rows)?;
@@ -79,7 +79,8 @@ pub(super) fn frames<const D: usize>(values: &[i16]) -> Result<Frames<'_, D>> {
     })
 }
 
-/// Values of the exemplar's samples and of the output's points, weights, samples by value, and what excess counts.
+/// Values of the exemplar samples and of the output points, weights, samples sorted by value, and
+/// the weight of an excess in 1 / 256.
 pub(super) type GuideIn<'py> = (
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, i16>,
@@ -163,7 +164,8 @@ impl Appearance {
         either!(&self.0, a, a.channels())
     }
 
-    /// Median distance from a window to the nearest other one, in variances of all windows.
+    /// Median distance from a window to its nearest other window, in units of the variance of all
+    /// windows.
     #[getter]
     fn spacing(&self) -> f64 {
         either!(
@@ -201,6 +203,7 @@ impl Appearance {
         gain: i64,
         spacing: i32,
     ) -> PyResult<Self> {
+        // Both dimensions read the same arrays, but the types of the parts differ.
         macro_rules! parts {
             () => {
                 Parts {
@@ -228,8 +231,8 @@ impl Appearance {
         }))
     }
 
-    /// Places for a region: cells filled by pieces that fit.
-    #[allow(clippy::too_many_arguments)] // the options of the kernel
+    /// Initialises the coordinates of a region: each cell gets a matching piece of the exemplar.
+    #[allow(clippy::too_many_arguments)] // one argument for each option of the kernel
     fn blocks<'py>(
         &self,
         py: Python<'py>,
@@ -261,6 +264,7 @@ impl Appearance {
             margin,
         };
         let values = frames.as_slice()?;
+        // `D` is the number of axes of the exemplar.
         let places = run(py, progress, |monitor| {
             either!(&self.0, a, {
                 let region = region::<D>(&place)?;
@@ -277,8 +281,9 @@ impl Appearance {
         Ok(PyArray1::from_vec(py, places))
     }
 
-    /// Corrects places, and returns the number of passes and the share of points that the last two changed.
-    #[allow(clippy::too_many_arguments)] // the options of the kernel
+    /// Corrects coordinates in place. Returns the number of passes, and the fraction of points that
+    /// the last two passes changed.
+    #[allow(clippy::too_many_arguments)] // one argument for each option of the kernel
     fn correct<'py>(
         &self,
         py: Python<'py>,
@@ -332,7 +337,7 @@ impl Appearance {
     }
 }
 
-/// Places of a region from those of the region of half the resolution.
+/// Returns the coordinates of a region from those of the same region at half the resolution.
 #[pyfunction]
 pub(super) fn upsample<'py>(
     py: Python<'py>,

@@ -8,7 +8,7 @@ use crate::engine::coherence::{self, Kinds, Options, Similarity};
 use crate::foundation::fixed::Place;
 use crate::foundation::memory;
 
-/// Similarity sets: `k` samples for each of the exemplar's.
+/// Returns similarity sets: `k` similar samples for each sample of the exemplar.
 #[pyfunction]
 pub(super) fn similar<'py>(
     py: Python<'py>,
@@ -28,9 +28,9 @@ pub(super) fn similar<'py>(
     Ok(PyArray1::from_vec(py, found.sets))
 }
 
-/// Places corrected by k-coherence.
+/// Corrects coordinates by k-coherence.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)] // the options of the kernel
+#[allow(clippy::too_many_arguments)] // one argument for each option of the kernel
 pub(super) fn cohere<'py>(
     py: Python<'py>,
     appearance: &Appearance,
@@ -60,6 +60,7 @@ pub(super) fn cohere<'py>(
         samples: kinds.0.as_slice()?,
         points: kinds.1.as_slice()?,
     };
+    // The kernel corrects a copy, because the caller's array is read-only.
     let places = run(py, progress, |monitor| {
         either!(&appearance.0, a, {
             let region = region::<D>(&place)?;
@@ -82,7 +83,7 @@ pub(super) fn cohere<'py>(
     Ok(PyArray1::from_vec(py, places))
 }
 
-/// Places displaced by noise of their points in the world.
+/// Displaces coordinates by noise that depends on the world coordinates of their points.
 #[pyfunction]
 pub(super) fn jitter<'py>(
     py: Python<'py>,

@@ -11,7 +11,8 @@ use crate::foundation::memory;
 use crate::kernels::complete::{Canvas, Options, complete as fill};
 use crate::kernels::patch_search::Pick;
 
-/// Colours with the holes filled, the patch of each pixel, and (exemplar, from row, column, to row, column) of each patch.
+/// Filled colours, the patch number of each pixel, and five numbers for each patch: exemplar,
+/// source row and column, target row and column.
 type Filled<'py> = (
     Bound<'py, PyArray3<f32>>,
     Bound<'py, PyArray2<i32>>,
@@ -19,7 +20,7 @@ type Filled<'py> = (
 );
 
 #[pyfunction]
-#[allow(clippy::too_many_arguments)] // the arguments of the Python wrapper, one for one
+#[allow(clippy::too_many_arguments)] // the arguments of the Python wrapper
 pub(super) fn complete<'py>(
     py: Python<'py>,
     colours: PyReadonlyArray3<'py, f32>,
@@ -38,6 +39,7 @@ pub(super) fn complete<'py>(
         unreachable!("three axes by type")
     };
     let grid = Grid::new([rows, columns], wrap)?;
+    // The kernel writes into copies, because the caller's arrays are read-only.
     let mut colours = memory::copied("colours", colours.as_slice()?)?;
     let mut known = memory::copied("known", known.as_slice()?)?;
     let keep = match &keep {

@@ -4,10 +4,11 @@ use pyo3::prelude::*;
 use super::run;
 use crate::kernels::distance::{self, Piece};
 
-/// A label, the first pixel of a window, and its shape.
+/// A label, the first pixel of its window, and the shape of the window.
 type Window = (i32, [i64; 2], [usize; 2]);
 
-/// Signed distances to the outline of each of some labels, in its window; None where that has but one side.
+/// Returns the signed distances to the outline of each piece in its window, or `None` if the window
+/// contains only one side of the outline.
 #[pyfunction]
 pub(super) fn outlines<'py>(
     py: Python<'py>,

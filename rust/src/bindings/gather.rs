@@ -11,7 +11,8 @@ use crate::foundation::memory;
 use crate::kernels::gather::{CHUNK, Element, Exemplar, Interpolation};
 use crate::{Error, Result};
 
-/// Exemplars (rows, columns, channels) or (planes, rows, columns, channels), one type; coordinates (pixels, axes).
+/// Looks up exemplars of one dtype at coordinates (pixels, axes). Exemplars have the shape (rows,
+/// columns, channels) or (planes, rows, columns, channels).
 #[pyfunction]
 pub(super) fn gather<'py>(
     py: Python<'py>,
@@ -73,6 +74,7 @@ fn axes<'py, T: Element + numpy::Element, const D: usize>(
         .iter()
         .map(|a| exemplar(a, wrap))
         .collect::<Result<Vec<_>>>()?;
+    // All exemplars have the same number of channels, which the kernel checks.
     let channels = arrays
         .first()
         .and_then(|a| a.shape().last().copied())

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use super::run;
 use crate::kernels::mean_shift::{Options, filter};
 
-/// Image (rows, columns, channels).
+/// Filters an image (rows, columns, channels).
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // the arguments of the Python function
 pub(super) fn mean_shift<'py>(

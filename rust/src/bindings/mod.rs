@@ -1,5 +1,5 @@
-//! The bindings: the only place that names pyo3 and numpy. A function here checks nothing but types, lets go of the
-//! interpreter, and calls a kernel.
+//! Python bindings. Only this folder names pyo3 and numpy. A function here checks only types,
+//! releases the interpreter, and calls a kernel.
 
 mod appearance;
 mod coherence;
@@ -30,7 +30,7 @@ use pyo3::prelude::*;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// How often a waiting caller looks for Ctrl-C and reports progress.
+/// A waiting caller checks for Ctrl-C and reports progress at this interval.
 const POLL: Duration = Duration::from_millis(50);
 
 thread_local! {
@@ -38,7 +38,7 @@ thread_local! {
 }
 
 impl From<Error> for PyErr {
-    /// The class of `texrs.errors` that bears the variant's name.
+    /// Returns an exception of the class in `texrs.errors` that corresponds to the variant.
     fn from(error: Error) -> Self {
         let class = match &error {
             Error::Value { .. } | Error::Shape { .. } => "InvalidInput",
@@ -58,8 +58,11 @@ impl From<Error> for PyErr {
     }
 }
 
-/// Runs a kernel without the interpreter lock, in the pool of this thread's choice. Ctrl-C stops it; `progress`, if
-/// given, is called with the share that is done and stops it by raising. Without one, who watches the call around it is asked.
+/// Runs a kernel without the interpreter lock, in the pool that this thread has selected.
+///
+/// Ctrl-C stops the kernel. If `progress` is given, it is called with the fraction that is done,
+/// and stops the kernel by raising. Otherwise the observers of the outer Python call are asked
+/// whether to stop.
 fn run<R: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -84,8 +87,8 @@ fn run<R: Send>(
     })
 }
 
-/// Runs a kernel as [`run`] does; on the calling thread where it is so small that to wake another would take longer. It then
-/// must not share its work.
+/// Runs a kernel like [`run`], but on the calling thread if `small` is true, because waking another
+/// thread would take longer. A small kernel must not distribute its work.
 fn run_small<R: Send>(
     py: Python<'_>,
     small: bool,
@@ -97,7 +100,7 @@ fn run_small<R: Send>(
     run(py, None, work)
 }
 
-/// Values in groups of `N`, an error where some are left.
+/// Returns values in groups of `N`, or an error if some are left over.
 fn grouped<'a, T, const N: usize>(argument: &'static str, values: &'a [T]) -> Result<&'a [[T; N]]> {
     match values.as_chunks() {
         (groups, []) => Ok(groups),
@@ -109,14 +112,14 @@ fn grouped<'a, T, const N: usize>(argument: &'static str, values: &'a [T]) -> Re
     }
 }
 
-/// Sets the number of threads that kernels called from this thread use (0: RAYON_NUM_THREADS, or all cores) and
-/// returns the former one.
+/// Sets the number of threads of the kernels that this thread calls, and returns the previous
+/// number. Zero means `RAYON_NUM_THREADS`, or all cores.
 #[pyfunction]
 fn set_threads(threads: usize) -> usize {
     THREADS.replace(threads)
 }
 
-/// Kernels of texrs. Private: use `texrs.kernels`.
+/// Kernels of texrs. This module is private: use `texrs.kernels`.
 #[pymodule(gil_used = false)]
 mod _rust {
     #[pymodule_export]

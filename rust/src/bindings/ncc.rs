@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use super::run;
 use crate::kernels::ncc;
 
-/// The channels of an image, made ready to be compared with many templates.
+/// The channels of an image, prepared for correlation with many templates.
 #[pyclass(frozen)]
 pub(super) struct Correlation(ncc::Correlation, [usize; 2]);
 

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use super::{grouped, run};
 use crate::kernels::nearby;
 
-/// The sums around points of an image of the values of others near by, under a separable window.
+/// Returns, at each point, the sum of the values of all points under a separable window around it.
 #[pyfunction]
 pub(super) fn sum_nearby<'py>(
     py: Python<'py>,

@@ -7,10 +7,10 @@ use super::run;
 use crate::foundation::memory;
 use crate::kernels::patch_search::{Exemplar, Index, Match, Pick, Query};
 
-/// Cost, exemplar, row, column.
+/// Cost, exemplar, row and column of each match.
 type Found = Vec<(f64, usize, usize, usize)>;
 
-/// Exemplars that many patches are looked for in.
+/// Exemplars, prepared for the search of many patches.
 #[pyclass(frozen)]
 pub(super) struct PatchIndex(pub(super) Index);
 

@@ -8,7 +8,8 @@ use super::run;
 use crate::Error;
 use crate::kernels::poisson::{Domain, Edge, Problem};
 
-/// Image and differences (rows, columns, channels); the edges of both axes: fixed, wrap or free.
+/// Reconstructs an image (rows, columns, channels) from differences. The boundary of each axis is
+/// "dirichlet", "periodic" or "free".
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // the arguments of the Python function
 pub(super) fn poisson<'py>(
@@ -39,7 +40,7 @@ pub(super) fn poisson<'py>(
     PyArray1::from_vec(py, out).reshape(shape)
 }
 
-/// What flows into each pixel (rows, columns, channels), replaced by the solution.
+/// Replaces the flow into each pixel (rows, columns, channels) by the solution.
 #[pyfunction]
 pub(super) fn poisson_spread(
     py: Python<'_>,

@@ -9,23 +9,24 @@ use super::{grouped, run};
 use crate::engine::quilt::{Options, Picture, Pixels, Quilt, Span, Window};
 use crate::foundation::memory;
 
-/// Colours, and the lattice.
+/// Colours, and the lattice if there is one.
 type PictureIn<'py> = (PyReadonlyArray3<'py, f32>, Option<[[f64; 2]; 2]>);
-/// Exemplar, coordinates, hand and cell of all pixels.
+/// Exemplar, coordinates, mirror flag and cell of each pixel.
 type PixelsIn<'py> = (
     PyReadonlyArray1<'py, u16>,
     PyReadonlyArray2<'py, f32>,
     PyReadonlyArray1<'py, bool>,
     PyReadonlyArray1<'py, u32>,
 );
-/// Size, wrap, patch, whether it is regular, and the fixed axis.
+/// Size, wrapped axes, patch size, whether the images are regular, and the fixed axis.
 type OptionsIn = ([usize; 2], [bool; 2], [usize; 2], bool, Option<usize>);
-/// Start, extent, overlap before and after, along rows and columns.
+/// Start, extent, and overlap before and after, along rows and columns.
 type WindowIn = [[usize; 4]; 2];
-/// What each pixel shows, and of which patch.
+/// The pixel number that each output pixel shows, and the number of its patch.
 type QuiltOut<'py> = (Bound<'py, PyArray2<u32>>, Bound<'py, PyArray2<u32>>);
 
-/// Patches of pictures stitched into a texture; the first window takes the patch at (picture, row, column).
+/// Stitches patches of images into a texture. The first window takes the patch at (image, row,
+/// column).
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // the arguments of the Python function
 pub(super) fn quilt<'py>(
@@ -38,6 +39,7 @@ pub(super) fn quilt<'py>(
     waves: Vec<Vec<WindowIn>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<QuiltOut<'py>> {
+    // Copy the arrays, because the kernel runs without the interpreter.
     let mut all = Vec::with_capacity(pictures.len());
     for (colours, lattice) in &pictures {
         all.push(Picture {
@@ -61,6 +63,7 @@ pub(super) fn quilt<'py>(
         regular,
         fixed,
     };
+    // Convert the windows, then run the kernel wave by wave.
     let span = |[start, extent, before, after]: [usize; 4]| Span {
         start,
         extent,

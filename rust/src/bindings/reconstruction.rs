@@ -5,7 +5,7 @@ use super::run;
 use crate::foundation::grid::Grid;
 use crate::kernels::reconstruction;
 
-/// The largest image below a mask that is reached from a seed.
+/// Returns the largest image below a mask that a seed reaches.
 #[pyfunction]
 pub(super) fn reconstruct<'py>(
     py: Python<'py>,

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use super::run;
 use crate::kernels::regions::{Options, merge};
 
-/// Image (rows, columns, channels); labels (rows, columns).
+/// Returns the labels (rows, columns) of the regions of an image (rows, columns, channels).
 #[pyfunction]
 pub(super) fn merge_regions<'py>(
     py: Python<'py>,

@@ -8,10 +8,10 @@ use crate::kernels::seam::cost::Cost;
 use crate::kernels::seam::{labels, stitch, strip};
 use crate::{Error, Result};
 
-/// Points of a cut that needs no thread of its own.
+/// Maximum number of points of a cut that runs on the calling thread.
 const SMALL: usize = 4096;
 
-/// The flat mask, the value and the number of edges.
+/// The flat mask, the cost of the cut and the number of edges.
 type Cut<'py> = (Bound<'py, PyArray1<bool>>, f64, usize);
 
 fn cost(name: &str) -> Result<Cost> {
@@ -43,9 +43,10 @@ fn slices<'a, const D: usize>(
     })
 }
 
-/// Images (..., channels), masks (...); old seams: kept, ab and ba, one array an axis each.
+/// Cuts between images (..., channels) with masks (...). Old seams are three lists with one array
+/// for each axis: `kept`, `ab` and `ba`.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)] // Python's wrapper names them
+#[allow(clippy::too_many_arguments)] // the arguments of the Python wrapper
 pub(super) fn seam_cut<'py>(
     py: Python<'py>,
     a: PyReadonlyArrayDyn<'py, f32>,
@@ -131,7 +132,8 @@ fn grid<const D: usize>(shape: &[usize], wrap: &[bool]) -> Result<Grid<D>> {
     )
 }
 
-/// Each strip: two images (rows, columns, channels), the axis that its seam crosses, a penalty (rows, columns).
+/// The arrays of each strip: two images (rows, columns, channels), the axis that the seam crosses,
+/// and a penalty (rows, columns).
 type StripArrays<'py> = (
     PyReadonlyArray3<'py, f32>,
     PyReadonlyArray3<'py, f32>,
@@ -162,6 +164,7 @@ pub(super) fn seam_strips<'py>(
             })
         })
         .collect::<PyResult<Vec<_>>>()?;
+    // Each strip is one task, because a strip is too small to be divided.
     let cuts = run(py, None, |monitor| {
         par::map(pasted.len(), |i| strip::cut(&pasted[i], monitor))
             .into_iter()
@@ -173,7 +176,7 @@ pub(super) fn seam_strips<'py>(
         .collect())
 }
 
-/// Unary costs (..., 2); pairwise costs one array an axis.
+/// Returns binary labels from unary costs (..., 2) and pairwise costs, one array for each axis.
 #[pyfunction]
 pub(super) fn seam_labels<'py>(
     py: Python<'py>,

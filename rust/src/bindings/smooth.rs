@@ -6,14 +6,15 @@ use super::run;
 use crate::foundation::memory;
 use crate::kernels::smooth::{Axis, Edge, smooth as smooth_along};
 
-/// Numbers of either precision.
+/// Values of single or double precision.
 #[derive(FromPyObject)]
 pub(super) enum Numbers<'py> {
     Single(PyReadonlyArray1<'py, f32>),
     Double(PyReadonlyArray1<'py, f64>),
 }
 
-/// An array smoothed along its axes: of each the weights, from the middle on, and what lies beyond its ends.
+/// Smooths an array along its axes. Each axis has weights, from the central weight outwards, and an
+/// edge rule.
 #[pyfunction]
 pub(super) fn smooth<'py>(
     py: Python<'py>,

@@ -6,7 +6,7 @@ use crate::foundation::memory;
 use crate::foundation::par;
 use crate::kernels::sparse::{self, Lower};
 
-/// Where columns begin, rows and values of a lower triangle.
+/// Column starts, rows and values of a lower triangle.
 type Entries<'py> = (
     PyReadonlyArray1<'py, u32>,
     PyReadonlyArray1<'py, u32>,
@@ -38,7 +38,7 @@ impl Cholesky {
         .map(Self)
     }
 
-    /// Several at once, side by side: each as by itself.
+    /// Factors several matrices in parallel. Each factor equals the factor of a separate call.
     #[staticmethod]
     fn several(py: Python<'_>, matrices: Vec<Entries<'_>>, limit: usize) -> PyResult<Vec<Self>> {
         let lower = matrices
@@ -70,7 +70,7 @@ impl Cholesky {
         self.0.entries()
     }
 
-    /// Right sides, one after the other.
+    /// Solves for several right-hand sides, stored one after the other.
     fn solve<'py>(
         &self,
         py: Python<'py>,

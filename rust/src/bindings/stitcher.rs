@@ -23,7 +23,7 @@ enum Either {
     Three(Known<3>),
 }
 
-/// A source, and what the search of it needs, once that was asked for.
+/// A source and the data for its search, which are prepared at the first use.
 struct Known<const D: usize> {
     source: Source<D>,
     prepared: OnceLock<Prepared<D>>,
@@ -42,7 +42,8 @@ impl<const D: usize> Known<D> {
     }
 }
 
-/// Places, patches, the frame of each patch, the mean cost of seams, and moves that healed.
+/// Coordinates, patch numbers, the frame of each patch, the mean cost of the seams, and the number
+/// of healing moves.
 type StitchedOut<'py> = (
     Bound<'py, PyArray1<i32>>,
     Bound<'py, PyArray1<u32>>,
@@ -90,7 +91,8 @@ impl Stitcher {
         .map(Self)
     }
 
-    /// Weights: colour, contact, jump, depth, joint, presence, surprise, distortion, guide.
+    /// Stitches a region. The weights are colour, contact, jump, depth, joint, presence, surprise,
+    /// distortion and guide.
     #[allow(clippy::too_many_arguments)] // the arguments of the Python method
     fn stitch<'py>(
         &self,
@@ -111,6 +113,7 @@ impl Stitcher {
         let (jacobians, held, given) = (jacobians.as_slice()?, held.as_slice()?, given.as_slice()?);
         let loose = loose.as_slice()?;
         let demand = slices(&demand)?;
+        // The source has two or three axes, and the types of its results differ.
         macro_rules! stitched {
             ($source:expr) => {
                 run(py, progress, |monitor| -> Result<_> {
@@ -156,7 +159,7 @@ impl Stitcher {
         ))
     }
 
-    /// What the seams cost between the points of a region that show different patches.
+    /// Returns the cost of the seams between the points of a region that show different patches.
     fn judge<'py>(
         &self,
         py: Python<'py>,
@@ -183,7 +186,7 @@ impl Stitcher {
         Ok(PyArray1::from_vec(py, seams))
     }
 
-    /// Cuts patches into a region that is covered already, but for its ends.
+    /// Cuts patches into a region that is already covered, except for its ends.
     #[allow(clippy::too_many_arguments)] // the arguments of the Python method
     fn cover<'py>(
         &self,
@@ -201,6 +204,7 @@ impl Stitcher {
         let (places, patches, seams) = (places.as_slice()?, patches.as_slice()?, seams.as_slice()?);
         let (distortion, table) = (distortion.as_slice()?, table.as_slice()?);
         let jacobians = jacobians.as_slice()?;
+        // The table of patches has 10 columns for two axes and 17 for three.
         macro_rules! covered {
             ($known:expr, $columns:literal) => {
                 run(py, progress, |monitor| -> Result<_> {
@@ -246,10 +250,11 @@ impl Stitcher {
     }
 }
 
-/// Side, overlap, candidates, share of them that covers the worst seams, and whether to bend and to heal.
+/// Side, overlap, number of candidates, fraction of patches that cover the worst seams, and whether
+/// patches bend and elements are healed.
 type PatchIn = (f32, f32, usize, f32, bool, bool);
 
-/// Places, patches, seams, distortion, and the table of patches.
+/// Coordinates, patch numbers, seams, distortion and the table of patches.
 type ShownIn<'py> = (
     PyReadonlyArray1<'py, i32>,
     PyReadonlyArray1<'py, u32>,
@@ -265,7 +270,8 @@ type ShownOut<'py> = (
     Bound<'py, PyArray1<i32>>,
 );
 
-/// A patch from its row: centre, place, frame, side in units of 1/4096, and whether it is rigid.
+/// Reads a patch from its row: centre, place, frame, side in units of 1/4096, and whether it is
+/// rigid.
 fn read<const D: usize>(row: &[i32]) -> Patch<D> {
     let frame: Frame<D> =
         std::array::from_fn(|i| std::array::from_fn(|j| row[2 * D + i * D + j] as i16));
@@ -278,7 +284,7 @@ fn read<const D: usize>(row: &[i32]) -> Patch<D> {
     }
 }
 
-/// The row of a patch.
+/// Returns the row of a patch.
 fn write<const D: usize>(patch: &Patch<D>) -> Vec<i32> {
     let frame = patch.frame.as_flattened().iter().map(|&x| i32::from(x));
     let mut row: Vec<i32> = patch
@@ -336,11 +342,12 @@ fn options(patch: PatchIn, weights: [f32; 9], charges: [f32; 3], seed: u64) -> O
 
 type PyReadonlyArray3In<'py> = numpy::PyReadonlyArray3<'py, i16>;
 
-/// Samples that patches are cut from, in a row.
+/// A flat list of samples that patches are cut from.
 #[pyclass(frozen)]
 pub(super) struct PatchSamples(pub(super) Samples);
 
-/// What a window shows, the seams of it, the points that a patch covers, and those that must take it.
+/// The shape of a window, its samples, its seams, the points that a patch covers, and the points
+/// that must take the patch.
 type PastingIn<'py> = (
     [usize; 2],
     PyReadonlyArray1<'py, u32>,
@@ -349,7 +356,7 @@ type PastingIn<'py> = (
     PyReadonlyArray1<'py, bool>,
 );
 
-/// The points that take a patch, and the seams of the window then.
+/// The points that take a patch, and the seams of the window after the cut.
 type PastedOut<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f32>>);
 
 fn pasting<'a>(window: &'a PastingIn<'_>) -> PyResult<Pasting<'a>> {

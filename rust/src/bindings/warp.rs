@@ -8,7 +8,8 @@ use crate::foundation::grid::Grid;
 use crate::kernels::gather::CHUNK;
 use crate::kernels::warp::{self, Mesh, Motion, Shape, Warped};
 
-/// Places (pixels, 2), triangle of each pixel, and how many were drawn, turned over, and heavy and turned over.
+/// Source coordinates (pixels, 2), the triangle of each pixel, and three counts: drawn triangles,
+/// flipped triangles, and flipped triangles whose corners all have a weight.
 type WarpedOut<'py> = (
     Bound<'py, PyArray2<f32>>,
     Bound<'py, PyArray1<u32>>,
@@ -24,7 +25,7 @@ fn out<'py>(py: Python<'py>, warped: Warped) -> PyResult<WarpedOut<'py>> {
     ))
 }
 
-/// A dense mesh of `source` pixels, drawn where they go.
+/// Draws the dense mesh of `source` pixels at the target positions.
 #[pyfunction]
 pub(super) fn warp_mesh<'py>(
     py: Python<'py>,
@@ -43,7 +44,7 @@ pub(super) fn warp_mesh<'py>(
     out(py, warped)
 }
 
-/// Scattered points (points, 2), and the corners of their triangles.
+/// Warps by scattered points (points, 2). Also returns the corners of their triangles.
 #[pyfunction]
 pub(super) fn warp_points<'py>(
     py: Python<'py>,
@@ -63,8 +64,9 @@ pub(super) fn warp_points<'py>(
     Ok((out(py, warped)?, corners))
 }
 
-/// The window's first pixel and its shape, then flat: places (pixels, 2), distance, what is inside, what is deep; how many
-/// pixels are of the shape, and the linear part of the way back.
+/// The first pixel and the shape of the window. Then flat arrays: source coordinates (pixels, 2),
+/// distance, inside, deep. Then the number of pixels inside and the linear part of the inverse
+/// motion.
 type PlacedOut<'py> = (
     [usize; 2],
     [usize; 2],
@@ -76,9 +78,10 @@ type PlacedOut<'py> = (
     [[f64; 2]; 2],
 );
 
-/// A shape (rows, columns) as the distance to its outline, moved about its centre over a canvas.
+/// Moves a shape about its centre over a canvas. The shape is an array (rows, columns) of distances
+/// to its outline.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)] // Python's wrapper names them
+#[allow(clippy::too_many_arguments)] // the arguments of the Python wrapper
 pub(super) fn place<'py>(
     py: Python<'py>,
     distance: PyReadonlyArray2<'py, f32>,
@@ -95,6 +98,7 @@ pub(super) fn place<'py>(
         grid,
         origin,
     };
+    // Return nothing if the moved shape is outside the canvas.
     let motion = Motion::new(centre, shift, matrix)?;
     let Some(window) = motion.window(&shape, canvas) else {
         return Ok(None);

@@ -1,23 +1,26 @@
 //! Coordinates and frames in fixed point.
 //!
-//! A synthesis moves coordinates by frames many thousand times, and its choices hang on where they round to. In fixed
-//! point every step is exact, so the result is the same on any machine and in any order of work. What leaves 32 bits comes
-//! round: it is far outside of any exemplar either way, and brought inside like all that is.
+//! A synthesis transforms coordinates by frames many thousand times, and its choices depend on how
+//! they round. In fixed point every step is exact, so the result is the same on any machine and in
+//! any order of work. Coordinates that overflow 32 bits wrap around. This is harmless: such
+//! coordinates are far outside any exemplar and are mapped back into it like all others.
 
 use crate::{Error, Result};
 
-/// Binary digits after the point.
+/// Number of binary digits after the point.
 pub const BITS: u32 = 12;
-/// One sample.
+/// The fixed-point value of one sample.
 pub const ONE: i32 = 1 << BITS;
 
-/// A place in an exemplar, in units of 1 / [`ONE`] of a sample; sample centres are at the multiples of [`ONE`].
+/// A position in an exemplar, in units of 1 / [`ONE`] of a sample. Sample centres are at the
+/// multiples of [`ONE`].
 pub type Place<const D: usize> = [i32; D];
 
-/// A Jacobian dS/dp, in units of 1 / [`ONE`]: entries from -8 to 8. Row: axis of the exemplar; column: of the output.
+/// A Jacobian dS/dp in units of 1 / [`ONE`]: entries range from -8 to 8. Rows are axes of the
+/// exemplar; columns are axes of the output.
 pub type Frame<const D: usize> = [[i16; D]; D];
 
-/// The frame that leaves everything as it is.
+/// The identity frame.
 pub const fn identity<const D: usize>() -> Frame<D> {
     let mut frame = [[0; D]; D];
     let mut axis = 0;
@@ -28,13 +31,13 @@ pub const fn identity<const D: usize>() -> Frame<D> {
     frame
 }
 
-/// The sample nearest to a place; half-way goes to the higher one.
+/// Returns the sample nearest to a position. Ties round up.
 #[inline(always)]
 pub fn nearest<const D: usize>(place: Place<D>) -> [i32; D] {
     place.map(|x| x.wrapping_add(ONE / 2) >> BITS)
 }
 
-/// The displacement J step of a step in whole samples of the output.
+/// Returns the displacement `J * step`, in fixed point, of a step in whole samples of the output.
 #[inline(always)]
 pub fn apply<const D: usize>(frame: &Frame<D>, step: [i32; D]) -> Place<D> {
     let mut moved = [0i32; D];
@@ -46,7 +49,7 @@ pub fn apply<const D: usize>(frame: &Frame<D>, step: [i32; D]) -> Place<D> {
     moved
 }
 
-/// `a + b`.
+/// Returns `a + b`.
 #[inline(always)]
 pub fn add<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
     let mut sum = a;
@@ -56,7 +59,7 @@ pub fn add<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
     sum
 }
 
-/// `a - b`.
+/// Returns `a - b`.
 #[inline(always)]
 pub fn sub<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
     let mut difference = a;
@@ -66,17 +69,17 @@ pub fn sub<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
     difference
 }
 
-/// The frames of a region: one for all of it, or one a point.
+/// The frames of a region: one frame for the whole region or one frame for each point.
 #[derive(Debug, Clone, Copy)]
 pub enum Frames<'a, const D: usize> {
-    /// The same everywhere.
+    /// The same frame at every point.
     Constant(Frame<D>),
-    /// One a point, in row-major order.
+    /// One frame for each point, in row-major order.
     Dense(&'a [Frame<D>]),
 }
 
 impl<const D: usize> Frames<'_, D> {
-    /// The frame of the point at a row-major position.
+    /// Returns the frame of the point at a row-major position.
     #[inline(always)]
     pub fn at(&self, index: usize) -> Frame<D> {
         match self {
@@ -85,7 +88,7 @@ impl<const D: usize> Frames<'_, D> {
         }
     }
 
-    /// An error unless there is one for all, or one for each of `points`.
+    /// Returns an error unless there is one frame for all points, or one for each of `points`.
     pub fn check(&self, points: usize) -> Result<()> {
         match self {
             Self::Dense(frames) if frames.len() != points => Err(Error::Shape {
@@ -97,15 +100,16 @@ impl<const D: usize> Frames<'_, D> {
         }
     }
 
-    /// Whether nothing is turned or stretched anywhere.
+    /// Whether the frame is the identity at every point.
     pub fn is_identity(&self) -> bool {
         matches!(self, Self::Constant(frame) if *frame == identity())
     }
 }
 
-/// F = J^-1 in fixed point, as far as 32 bits hold it; the identity for a singular frame.
+/// Returns F = J^-1 in fixed point, with entries clamped to 64, or the identity if the frame is
+/// singular.
 pub fn inverse<const D: usize>(frame: &Frame<D>) -> [[i32; D]; D] {
-    // Gauss-Jordan elimination with pivots: at most three rows.
+    // Gauss-Jordan elimination with pivots on at most three rows.
     let mut a = frame.map(|row| row.map(f64::from));
     let mut b = [[0.0; D]; D];
     for i in 0..D {
@@ -139,7 +143,7 @@ pub fn inverse<const D: usize>(frame: &Frame<D>) -> [[i32; D]; D] {
         }
     }
     let unit = f64::from(ONE);
-    // Beyond this a window would not fit on any lattice.
+    // Larger entries would spread a window beyond any lattice.
     let most = 64.0 * unit;
     b.map(|row| row.map(|x| (x * unit * unit).clamp(-most, most).round() as i32))
 }

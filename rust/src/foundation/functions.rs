@@ -1,14 +1,17 @@
-//! Functions whose values are the same on every machine: those of the standard library are the system's, which chooses its
-//! code by what the processor can do, and rounds another way in each. The only file that names libm.
+//! Functions with the same values on every machine.
+//!
+//! The standard library calls the system's functions, whose code and rounding depend on the
+//! processor. Only this file names libm.
 
 pub(crate) use libm::{exp, sincos};
 
-/// The root of a positive number: of an area in two dimensions, of a volume in three.
+/// Returns the D-th root of a positive number: the side of a square of area `x`, or of a cube of
+/// volume `x`.
 pub(crate) fn root<const D: usize>(x: f64) -> f64 {
     if D == 2 { x.sqrt() } else { libm::cbrt(x) }
 }
 
-/// The largest power of two that is at most a positive normal number.
+/// Returns the largest power of two that is at most `x`, a positive normal number.
 pub(crate) fn power_below(x: f64) -> f64 {
     f64::from_bits(x.to_bits() & (0x7ff << 52))
 }

@@ -1,8 +1,8 @@
-//! Grids of two or three axes: shape, row-major strides, and what lies beyond an edge.
+//! Grids of two or three axes: shape, row-major strides, and the points beyond an edge.
 
 use crate::{Error, Result};
 
-/// A box of `shape` points in row-major order whose axes end or wrap.
+/// A box of `shape` points in row-major order. Each axis either ends or wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid<const D: usize> {
     shape: [usize; D],
@@ -10,7 +10,10 @@ pub struct Grid<const D: usize> {
 }
 
 impl<const D: usize> Grid<D> {
-    /// A grid; refuses an empty axis and a number of points that overflows.
+    /// Returns a grid.
+    ///
+    /// # Errors
+    /// An axis is empty, or the number of points overflows.
     pub fn new(shape: [usize; D], wrap: [bool; D]) -> Result<Self> {
         let mut points = 1usize;
         for &n in &shape {
@@ -30,12 +33,12 @@ impl<const D: usize> Grid<D> {
         Ok(Self { shape, wrap })
     }
 
-    /// Points along each axis.
+    /// Number of points along each axis.
     pub fn shape(&self) -> [usize; D] {
         self.shape
     }
 
-    /// Which axes are cyclic.
+    /// Flags of the axes along which the grid wraps.
     pub fn wrap(&self) -> [bool; D] {
         self.wrap
     }
@@ -46,7 +49,7 @@ impl<const D: usize> Grid<D> {
         self.shape.iter().product()
     }
 
-    /// Distance in memory between neighbours along each axis.
+    /// Distance in memory between neighbours along each axis, in points.
     pub fn strides(&self) -> [usize; D] {
         let mut strides = [1; D];
         for axis in (0..D.saturating_sub(1)).rev() {
@@ -64,7 +67,7 @@ impl<const D: usize> Grid<D> {
             .fold(0, |at, (&p, &n)| at * n + p)
     }
 
-    /// The point at a row-major position.
+    /// Returns the point at a row-major position.
     #[inline(always)]
     pub fn point(&self, mut index: usize) -> [usize; D] {
         let mut point = [0; D];
@@ -75,7 +78,8 @@ impl<const D: usize> Grid<D> {
         point
     }
 
-    /// All points, in row-major order: cheaper than [`Self::point`] of each position.
+    /// Returns all points in row-major order. This is cheaper than calling [`Self::point`] for each
+    /// position.
     pub fn points(&self) -> impl Iterator<Item = [usize; D]> + use<D> {
         let shape = self.shape;
         let mut next = [0; D];
@@ -92,12 +96,13 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    /// Coordinate `i` brought onto the axis: around it where it wraps, to the nearest end where it does not.
+    /// Maps coordinate `i` onto the axis: modulo the length if the axis wraps, else to the nearest
+    /// end.
     #[inline(always)]
     pub fn resolve(&self, axis: usize, i: isize) -> usize {
         let n = self.shape[axis] as isize;
         if (0..n).contains(&i) {
-            // Nearly always; a remainder costs more than all else here.
+            // The coordinate is nearly always inside, so the costly remainder is avoided here.
             i as usize
         } else if self.wrap[axis] {
             i.rem_euclid(n) as usize
@@ -106,7 +111,8 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// Coordinate `i` if the axis has it, around the axis where it wraps.
+    /// Returns coordinate `i` if it is on the axis, modulo the length if the axis wraps, else
+    /// `None`.
     pub fn inside(&self, axis: usize, i: isize) -> Option<usize> {
         let n = self.shape[axis] as isize;
         if self.wrap[axis] {
@@ -116,7 +122,8 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// The next point along `axis`: `None` at an end, the first point where the axis wraps (and is longer than one).
+    /// Returns the next point along `axis`. At the end this is the first point if the axis wraps
+    /// and has more than one point, else `None`.
     pub fn next(&self, point: [usize; D], axis: usize) -> Option<[usize; D]> {
         let mut next = point;
         next[axis] += 1;
@@ -130,22 +137,28 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// A part of an endless lattice: its points, and where its first one lies in the world. What is hashed is the place in
-/// the world, so every part that holds a point gives it the same noise.
+/// A box of an unbounded lattice: its grid, and the world coordinates of its first point.
+///
+/// Noise is hashed from world coordinates, so every region that contains a point gives it the same
+/// noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Region<const D: usize> {
-    /// Its points; cyclic axes are those along which the output repeats.
+    /// The points of the region. Wrapped axes are those along which the output repeats.
     pub grid: Grid<D>,
-    /// World coordinates of its first point.
+    /// World coordinates of the first point.
     pub origin: [i32; D],
 }
 
 impl<const D: usize> Region<D> {
-    /// World coordinates of its points are less than this from zero, so that steps between any two fit into 32 bits.
+    /// Limit of the absolute world coordinates. Steps between any two points then fit into 32 bits.
     pub const FAR: i32 = 1 << 30;
 
-    /// A region; refuses more than 2^32 - 1 points, which are numbered by 32 bits, and points beyond [`Self::FAR`].
+    /// Returns a region.
+    ///
+    /// # Errors
+    /// The grid has more than 2^32 - 1 points, which do not fit 32-bit indices, or a point beyond
+    /// [`Self::FAR`].
     pub fn new(grid: Grid<D>, origin: [i32; D]) -> Result<Self> {
         if grid.len() > u32::MAX as usize {
             return Err(Error::Limit {
@@ -179,7 +192,8 @@ impl<const D: usize> Region<D> {
         world
     }
 
-    /// Row-major position of the point a step away, around cyclic axes; `None` beyond an end.
+    /// Returns the row-major position of the point one `step` away, modulo the length along wrapped
+    /// axes, or `None` beyond an end.
     #[inline(always)]
     pub fn step(&self, point: [usize; D], step: [i32; D]) -> Option<usize> {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());

@@ -1,13 +1,14 @@
 //! Counter-based noise: Philox4x32-10.
 //!
-//! Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. A value is a function
-//! of the seed and of the place it belongs to, so it does not depend on the order in which places are visited.
+//! Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. A value
+//! depends only on the seed and on its position. The order of visits to positions therefore does
+//! not matter.
 
 const ROUNDS: usize = 10;
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
-/// The Philox4x32-10 block function.
+/// Computes the Philox4x32-10 block function.
 pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     let (mut c, mut k) = (counter, key);
     for round in 0..ROUNDS {
@@ -26,27 +27,28 @@ pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     c
 }
 
-/// Noise of one seed, addressed by position.
+/// The noise of one seed, addressed by position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Noise {
     key: [u32; 2],
 }
 
 impl Noise {
-    /// The noise of a seed.
+    /// Returns the noise of a seed.
     pub fn new(seed: u64) -> Self {
         Self {
             key: [seed as u32, (seed >> 32) as u32],
         }
     }
 
-    /// The noise of one use among several, independent of that of the others.
+    /// Returns noise for one of several uses. The noise of each use is independent of the others.
     pub fn part(&self, use_: u32) -> Self {
         let [a, b, ..] = self.words([use_, 0x7061_7274, 0, 0]);
         Self { key: [a, b] }
     }
 
-    /// The four words of a point of the world of two or three axes.
+    /// Returns four random words for a point of a world of two or three axes. `count` selects one
+    /// of several draws.
     pub fn at<const D: usize>(&self, world: [i32; D], count: u32) -> [u32; 4] {
         let mut position = [0, 0, 0, count];
         for axis in 0..D.min(3) {
@@ -55,19 +57,19 @@ impl Noise {
         self.words(position)
     }
 
-    /// Four independent words for a position of up to four coordinates.
+    /// Returns four independent random words for a position of up to four coordinates.
     pub fn words(&self, position: [u32; 4]) -> [u32; 4] {
         philox(position, self.key)
     }
 
-    /// A number in [0, 1) with 53 random bits.
+    /// Returns a number in [0, 1) with 53 random bits.
     pub fn uniform(&self, position: [u32; 4]) -> f64 {
         let [a, b, ..] = self.words(position);
         let bits = (u64::from(a) << 32 | u64::from(b)) >> 11;
         bits as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// A number in `0..n`, with a bias below n / 2^64.
+    /// Returns a number in `0..n` with a bias below n / 2^64.
     pub fn below(&self, n: u64, position: [u32; 4]) -> u64 {
         let [a, b, ..] = self.words(position);
         let bits = u64::from(a) << 32 | u64::from(b);

@@ -1,23 +1,24 @@
-//! Memory that grows with what a caller asks for: where there is too little of it, that is an error, not the end of the
-//! process.
+//! Allocation of memory whose size depends on the caller's arguments. A shortage is returned as an
+//! error and does not abort the process.
 
 use crate::{Error, Result};
 
-/// `len` copies of `value`, for what is named `what`.
+/// Returns `len` copies of `value`. `what` names the memory in the error.
 pub(crate) fn filled<T: Clone>(what: &str, value: T, len: usize) -> Result<Vec<T>> {
     check::<T>(what, len)?;
-    // Asked for anew: memory that the system hands out as zeros is not written twice.
+    // Allocate again instead of filling the reserved memory: `vec!` gets zeroed pages from the
+    // system, so zeros are not written twice.
     Ok(vec![value; len])
 }
 
-/// A copy of values, for what is named `what`: of what the bindings may not keep.
+/// Returns a copy of an array that the bindings may not keep. `what` names it in the error.
 #[cfg(feature = "python")]
 pub(crate) fn copied<T: Copy>(what: &str, values: &[T]) -> Result<Vec<T>> {
     check::<T>(what, values.len())?;
     Ok(values.to_vec())
 }
 
-/// An error where there is no room for `len` values.
+/// Returns an error if memory for `len` values is not available.
 pub(crate) fn check<T>(what: &str, len: usize) -> Result<()> {
     Vec::<T>::new()
         .try_reserve_exact(len)
@@ -32,7 +33,7 @@ fn too_little<T>(what: &str, len: usize) -> Error {
     }
 }
 
-/// Room for `more` values after those that are there.
+/// Reserves room for `more` values after the existing ones.
 pub(crate) fn reserve<T>(what: &str, values: &mut Vec<T>, more: usize) -> Result<()> {
     let len = values.len();
     values
@@ -40,13 +41,16 @@ pub(crate) fn reserve<T>(what: &str, values: &mut Vec<T>, more: usize) -> Result
         .map_err(|_| too_little::<T>(what, len.saturating_add(more)))
 }
 
-/// Less than this is not asked for: where so little is not there, nothing goes on.
+/// Requests below this number of bytes are not checked: a process that lacks 1 MiB cannot continue
+/// anyway.
 const LITTLE: usize = 1 << 20;
 
-/// An error where there is no room for what a kernel takes in all, `each` bytes for each of `count` things.
+/// Returns an error if the memory of a kernel is not available: `each` bytes for each of `count`
+/// elements.
 ///
-/// What it takes is asked for at once and given back, before any work: of its parts, some of which are made in other crates, each
-/// would end the process where it did not fit. The bytes are measured ones (`tests/test_kernels_memory.py` limits each kernel).
+/// The whole amount is allocated at once and freed before any work. The kernel's separate
+/// allocations, some of them in other crates, would each abort the process if they failed. `each`
+/// is measured (`tests/test_kernels_memory.py` limits each kernel).
 pub(crate) fn room(what: &str, count: usize, each: usize) -> Result<()> {
     match count.saturating_mul(each) {
         0..LITTLE => Ok(()),
@@ -54,7 +58,7 @@ pub(crate) fn room(what: &str, count: usize, each: usize) -> Result<()> {
     }
 }
 
-/// The product of sizes, an error where it is more than can be counted.
+/// Returns the product of sizes, or an error if it overflows.
 pub(crate) fn product(what: &'static str, sizes: &[usize]) -> Result<usize> {
     let all = sizes
         .iter()

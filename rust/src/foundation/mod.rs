@@ -1,4 +1,4 @@
-//! What every kernel stands on: knows nothing of textures.
+//! The layer below all kernels: arithmetic, memory and threads, without any code about textures.
 
 pub mod error;
 pub(crate) mod fft;

@@ -1,7 +1,8 @@
 //! Threads: a pool that belongs to the process, fixed chunks, progress and cancellation.
 //!
-//! The only file that names rayon. Its global pool is never used: threads do not survive a `fork`, so a child that
-//! inherits a pool waits for ever. Pools here are keyed by the process id, built on first use and never dropped.
+//! Only this file names rayon. Its global pool is never used, because threads do not survive a
+//! `fork` and a child that inherits a pool waits forever. The pools of this module are keyed by the
+//! process id, built on first use and never dropped.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -12,8 +13,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::{Error, Result};
 
-/// A chain of pools that grows at its end. It is never locked while a pool is being built, so a `fork` at any moment
-/// leaves the child a chain that it can walk.
+/// A link of the list of pools, which grows at its end. The list is never locked while a pool is
+/// being built. After a `fork` at any moment, the child can therefore traverse the list.
 struct Link {
     process: u32,
     threads: usize,
@@ -23,7 +24,8 @@ struct Link {
 
 static POOLS: OnceLock<Box<Link>> = OnceLock::new();
 
-/// The number of threads in force when a caller asks for none: `RAYON_NUM_THREADS`, or what the machine offers.
+/// Returns the number of threads if the caller requests none: `RAYON_NUM_THREADS`, or the number of
+/// available cores.
 pub fn default_threads() -> usize {
     std::env::var("RAYON_NUM_THREADS")
         .ok()
@@ -34,7 +36,7 @@ pub fn default_threads() -> usize {
         .min(MAX_THREADS)
 }
 
-/// More threads than this only cost memory.
+/// Maximum number of threads. More threads would only cost memory.
 pub const MAX_THREADS: usize = 1024;
 
 fn pool(threads: usize) -> Result<&'static ThreadPool> {
@@ -72,7 +74,7 @@ fn pool(threads: usize) -> Result<&'static ThreadPool> {
     }
 }
 
-/// What a running kernel and its caller tell each other.
+/// Shared state of a running kernel and its caller: progress and cancellation.
 #[derive(Debug)]
 pub struct Monitor {
     done: AtomicU64,
@@ -93,18 +95,21 @@ impl Default for Monitor {
 }
 
 impl Monitor {
-    /// Announces how many steps are ahead.
+    /// Announces the total number of steps.
     pub fn expect(&self, steps: u64) {
         self.total.store(steps, Ordering::Relaxed);
     }
 
-    /// Says that `steps` more are done; an error once the caller has asked to stop.
+    /// Reports that `steps` more steps are done.
+    ///
+    /// # Errors
+    /// The caller has asked to stop.
     pub fn advance(&self, steps: u64) -> Result<()> {
         self.done.fetch_add(steps, Ordering::Relaxed);
         self.check()
     }
 
-    /// An error once the caller has asked to stop.
+    /// Returns an error if the caller has asked to stop.
     pub fn check(&self) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Err(Error::Cancelled(self.started.elapsed()));
@@ -117,7 +122,7 @@ impl Monitor {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Share of the announced steps that is done, 0 to 1.
+    /// Returns the fraction of the announced steps that is done, 0 to 1.
     pub fn fraction(&self) -> f64 {
         let total = self.total.load(Ordering::Relaxed);
         if total == 0 {
@@ -127,7 +132,7 @@ impl Monitor {
     }
 }
 
-/// Runs `work` in the pool of `threads` threads (0: [`default_threads`]).
+/// Runs `work` in the pool of `threads` threads. Zero means [`default_threads`].
 pub fn install<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> Result<R> {
     let threads = if threads == 0 {
         default_threads()
@@ -139,7 +144,8 @@ pub fn install<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> Resu
 
 /// Runs `work` in the pool while the calling thread calls `poll` about every `interval`.
 ///
-/// When `poll` fails the monitor is cancelled, the kernel is awaited, and the error of `poll` is returned.
+/// If `poll` fails, the function cancels the monitor, waits for the kernel and returns the error of
+/// `poll`.
 pub fn watch<R: Send, E: From<Error>>(
     threads: usize,
     interval: Duration,
@@ -156,11 +162,12 @@ pub fn watch<R: Send, E: From<Error>>(
     let mut stopped = None;
     let result = pool(threads)?.in_place_scope(|scope| {
         let monitor = &monitor;
-        // The sender moves in, so that a panic of the work drops it and ends the loop below. The receiver lives until
-        // the scope ends, so the send cannot fail.
+        // Move the sender into the task, so that a panic of the task drops it and ends the loop
+        // below. The receiver lives until the scope ends, so the send cannot fail.
         scope.spawn(move |_| {
             let _ = send.send(work(monitor));
         });
+        // Poll until the task sends its result. After an error of `poll`, only wait for the task.
         loop {
             match receive.recv_timeout(interval) {
                 Ok(result) => return Some(result),
@@ -183,15 +190,18 @@ pub fn watch<R: Send, E: From<Error>>(
     }
 }
 
-/// Threads of the pool that the caller is in, 1 outside of all: for what is faster in one piece, and no different.
+/// Number of threads of the pool that the caller runs in, or 1 outside all pools. Kernels use it to
+/// skip a division of work that changes only the time.
 pub(crate) fn threads() -> usize {
     rayon::current_thread_index().map_or(1, |_| rayon::current_num_threads())
 }
 
-/// Calls `f(i, chunk)` for each chunk of `size` items. Chunks are fixed by `size`, so results cannot depend on threads.
+/// Calls `f(i, chunk)` for each chunk of `size` items. Chunks depend only on `size`, so results do
+/// not depend on the number of threads.
 pub fn chunks_mut<T: Send>(data: &mut [T], size: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
     if data.len() <= size {
-        // Nothing to share: other threads stay asleep, and the caller need not be in a pool.
+        // A single chunk runs on the calling thread, which then need not be in a pool. Other
+        // threads stay asleep.
         if !data.is_empty() {
             f(0, data);
         }
@@ -202,12 +212,12 @@ pub fn chunks_mut<T: Send>(data: &mut [T], size: usize, f: impl Fn(usize, &mut [
         .for_each(|(i, chunk)| f(i, chunk));
 }
 
-/// `[f(0), f(1), ...]` in order.
+/// Returns `[f(0), f(1), ...]` in order.
 pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
     (0..n).into_par_iter().map(f).collect()
 }
 
-/// Runs both and returns both results.
+/// Runs both closures and returns both results.
 pub fn join<A: Send, B: Send>(
     a: impl FnOnce() -> A + Send,
     b: impl FnOnce() -> B + Send,

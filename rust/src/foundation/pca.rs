@@ -1,17 +1,20 @@
 //! Principal components of many samples.
 //!
-//! Only the leading ones are found, by subspace iteration (Golub and Van Loan, *Matrix Computations*, section 8.2) on
-//! the covariance: a few products with a thin matrix instead of a whole decomposition. The start is hashed, sums have
-//! a fixed order, and each component's largest entry is made positive, so the same samples always give the same axes.
+//! Only the leading components are computed, by subspace iteration (Golub and Van Loan, *Matrix
+//! Computations*, section 8.2) on the covariance. This takes a few products with a thin matrix
+//! instead of a full decomposition. The start vectors are hashed, sums have a fixed order, and the
+//! largest entry of each component is made positive. The same samples therefore always give the
+//! same axes.
 
 use crate::foundation::hash::Noise;
 use crate::foundation::par;
 
-/// Products with the covariance. Components that matter are apart by far more than these many leave undecided.
+/// Number of products with the covariance. Relevant components have converged long before.
 const ROUNDS: usize = 24;
-/// Vectors carried along beyond those asked for: they speed the last ones up.
+/// Number of vectors that are iterated in addition to the requested ones. They make the last
+/// requested vectors converge faster.
 const SPARE: usize = 8;
-/// Rows of the covariance that one task makes at a time.
+/// Number of covariance rows that one task computes.
 const ROWS: usize = 8;
 
 /// The mean and the principal axes of a set of samples.
@@ -19,15 +22,15 @@ const ROWS: usize = 8;
 pub struct Principal {
     /// Mean sample.
     pub mean: Vec<f32>,
-    /// Axes, orthonormal, the one with the largest variance first.
+    /// Orthonormal axes, in order of decreasing variance.
     pub axes: Vec<Vec<f32>>,
-    /// Variance of the samples over all dimensions.
+    /// Variance of the samples, summed over all dimensions.
     pub variance: f64,
-    /// Share of the variance that the axes keep.
+    /// Fraction of the variance that the axes keep, 0 to 1.
     pub kept: f64,
 }
 
-/// The `keep` leading principal components of samples of `n` numbers each.
+/// Returns the `keep` leading principal components of samples of `n` numbers each.
 pub fn principal(samples: &[f32], n: usize, keep: usize) -> Principal {
     let count = samples.len() / n;
     let mut sums = vec![0.0f64; n];
@@ -44,6 +47,7 @@ pub fn principal(samples: &[f32], n: usize, keep: usize) -> Principal {
     let variance: f64 = (0..n).map(|i| covariance[i * n + i]).sum();
     let keep = keep.min(n);
     let width = (keep + SPARE).min(n);
+    // Start from hashed vectors, so that the result is reproducible.
     let noise = Noise::new(0);
     let mut basis: Vec<Vec<f64>> = (0..width)
         .map(|k| {
@@ -57,12 +61,14 @@ pub fn principal(samples: &[f32], n: usize, keep: usize) -> Principal {
         basis = par::map(width, |k| multiply(&covariance, &basis[k]));
         orthonormalise(&mut basis);
     }
-    // Within the subspace: the eigenvectors of the small matrix B^T C B.
+    // Compute the eigenvectors of the small matrix B^T C B within the subspace.
     let images = par::map(width, |k| multiply(&covariance, &basis[k]));
     let mut small: Vec<Vec<f64>> = (0..width)
         .map(|i| (0..width).map(|j| dot(&basis[i], &images[j])).collect())
         .collect();
     let turn = jacobi(&mut small);
+    // Sort the eigenvectors by decreasing variance, and transform them back to the space of the
+    // samples.
     let mut order: Vec<usize> = (0..width).collect();
     order.sort_by(|&a, &b| small[b][b].total_cmp(&small[a][a]).then(a.cmp(&b)));
     let mut kept = 0.0;
@@ -91,7 +97,7 @@ pub fn principal(samples: &[f32], n: usize, keep: usize) -> Principal {
     }
 }
 
-/// The covariance matrix, rows of f64.
+/// Returns the covariance matrix as rows of f64.
 fn covariance(samples: &[f32], mean: &[f32]) -> Vec<f64> {
     let n = mean.len();
     let count = (samples.len() / n).max(1);
@@ -100,7 +106,8 @@ fn covariance(samples: &[f32], mean: &[f32]) -> Vec<f64> {
         let first = block * ROWS;
         let mut sums = vec![0.0f32; rows.len()];
         let mut centred = vec![0.0f32; n];
-        // Short runs in f32, which the compiler makes wide, then f64: the error stays that of a short run.
+        // Sum short runs in f32, which the compiler vectorises, and add the runs in f64. The
+        // rounding error is that of a short run.
         for run in samples.chunks(64 * n) {
             sums.fill(0.0);
             for sample in run.chunks_exact(n) {
@@ -132,7 +139,7 @@ fn multiply(matrix: &[f64], vector: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// A dot product with eight partial sums, which the compiler keeps in wide registers.
+/// Returns a dot product. Eight partial sums let the compiler use SIMD registers.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (heads, tails) = (a.chunks_exact(8), b.chunks_exact(8));
@@ -150,7 +157,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// Gram-Schmidt, twice for accuracy; a vector that depends on the ones before becomes zero.
+/// Orthonormalises vectors by the Gram-Schmidt process, twice for accuracy. A vector that depends
+/// on previous vectors becomes zero.
 fn orthonormalise(basis: &mut [Vec<f64>]) {
     for k in 0..basis.len() {
         let (before, rest) = basis.split_at_mut(k);
@@ -176,12 +184,14 @@ fn orthonormalise(basis: &mut [Vec<f64>]) {
     }
 }
 
-/// Makes a small symmetric matrix diagonal by Jacobi rotations; returns the rotations' product.
+/// Makes a small symmetric matrix diagonal by Jacobi rotations, and returns the product of the
+/// rotations.
 fn jacobi(a: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
     let n = a.len();
     let mut turn: Vec<Vec<f64>> = (0..n)
         .map(|i| (0..n).map(|j| f64::from(u8::from(i == j))).collect())
         .collect();
+    // At most 30 sweeps over all pairs (p, q). Each rotation makes the entry (p, q) zero.
     for _ in 0..30 {
         let off: f64 = (0..n)
             .flat_map(|i| (0..i).map(move |j| (i, j)))
@@ -220,7 +230,8 @@ fn jacobi(a: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
 mod tests {
     use super::*;
 
-    /// Samples with known axes: independent, of falling spread along turned directions.
+    /// Samples with known axes: independent coefficients, with decreasing spread, along cosine
+    /// directions.
     fn samples(n: usize, count: usize) -> Vec<f32> {
         let noise = Noise::new(3);
         let mut out = Vec::with_capacity(n * count);

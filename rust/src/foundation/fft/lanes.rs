@@ -1,5 +1,6 @@
-//! Numbers side by side, as one number: what is written for one line transforms several at once, in the registers that
-//! every machine has, and each comes out as it would alone.
+//! A SIMD number type: several f32 values that behave as one number. A transform of one line of
+//! this type transforms several lines at once, in the registers that every machine has. Each line
+//! gets the same values as if transformed alone.
 
 use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
@@ -7,16 +8,16 @@ use rustfft::num_traits::{FromPrimitive, Num, One, Signed, Zero};
 
 use crate::foundation::wide::{add_four, multiply_four, subtract_four};
 
-/// Numbers of [`Lanes`].
+/// Number of values in [`Lanes`].
 pub(crate) const LANES: usize = 4;
 
-/// Numbers of as many lines.
+/// One value for each of [`LANES`] lines.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[repr(align(16))]
 pub(crate) struct Lanes(pub(crate) [f32; LANES]);
 
 impl Lanes {
-    /// The same number in each.
+    /// Returns the same number in all lanes.
     #[inline(always)]
     pub(crate) fn all(x: f32) -> Self {
         Self([x; LANES])
@@ -41,7 +42,7 @@ macro_rules! operations {
 }
 operations!(Add add add_four, Sub sub subtract_four, Mul mul multiply_four, Div div each(Div::div), Rem rem each(Rem::rem));
 
-/// An operation on each pair of numbers.
+/// Returns a function that applies an operation to each pair of numbers.
 fn each(
     operation: impl Fn(f32, f32) -> f32,
 ) -> impl Fn([f32; LANES], [f32; LANES]) -> [f32; LANES] {
@@ -120,7 +121,8 @@ mod tests {
     #[test]
     fn each_of_several_lines_is_transformed_as_it_is_alone() {
         let noise = Noise::new(7);
-        // Of all kinds of plans: radix 4, mixed, small primes, Rader's and Bluestein's.
+        // The lengths cover all kinds of plans: radix 4, mixed, small primes, Rader's and
+        // Bluestein's.
         for len in [1, 2, 8, 30, 31, 60, 83, 101, 256, 509, 1021, 1023, 1999] {
             let sample = |line: usize, k: usize, part: u32| {
                 noise.uniform([line as u32, k as u32, part, 0]) as f32 - 0.5

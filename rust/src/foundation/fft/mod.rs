@@ -1,8 +1,9 @@
-//! Fourier transforms: of lines of complex numbers, and of images and volumes of real ones. The only folder that names the
-//! FFT crate.
+//! Fourier transforms of lines of complex numbers and of real images and volumes. Only this folder
+//! names the FFT crate.
 //!
-//! None is normalised: there and back multiplies by the number of points. Real lines go two at a time, as one complex line
-//! (Press et al., *Numerical Recipes*, 12.3).
+//! Transforms are not normalised: a forward and an inverse transform multiply by the number of
+//! points. Two real lines are transformed together as one complex line (Press et al., *Numerical
+//! Recipes*, 12.3).
 
 mod lanes;
 mod volumes;
@@ -14,17 +15,17 @@ pub(crate) use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftDirection, FftNum, FftPlanner, FftPlannerScalar};
 pub(crate) use volumes::Volumes;
 
-/// Rows of an image that are transposed at a time.
+/// Number of image rows that are transposed together.
 const GROUP: usize = 8;
 
-/// Transforms of lines of one length, in place.
+/// In-place transforms of lines of one length.
 pub(crate) struct Lines<T> {
     forward: Arc<dyn Fft<T>>,
     inverse: Arc<dyn Fft<T>>,
 }
 
 impl<T: FftNum + Default> Lines<T> {
-    /// Plans the transforms of `len` points, by the same sums on every machine.
+    /// Plans the transforms of `len` points. The order of sums is the same on every machine.
     pub(crate) fn new(len: usize) -> Self {
         Self::plan(|way| FftPlannerScalar::new().plan_fft(len, way))
     }
@@ -36,7 +37,8 @@ impl<T: FftNum + Default> Lines<T> {
         }
     }
 
-    /// Transforms one or several lines; `work` is memory to be kept for the next call.
+    /// Transforms one or several lines. `work` is scratch memory, which the caller keeps for the
+    /// next call.
     pub(crate) fn forward(&self, lines: &mut [Complex<T>], work: &mut Vec<Complex<T>>) {
         let work = grow(work, self.forward.get_inplace_scratch_len());
         self.forward.process_with_scratch(lines, work);
@@ -50,14 +52,18 @@ impl<T: FftNum + Default> Lines<T> {
 }
 
 impl Lines<f32> {
-    /// Plans the transforms of `len` points, by what the processor does fastest, in half the time. Its last bits hang on that,
-    /// so no result may hang on them. Of these numbers alone: others would be compiled for every processor too.
+    /// Plans the transforms of `len` points with the fastest code for the processor, in half the
+    /// time.
+    ///
+    /// The last bits depend on the processor, so no result may depend on them. Only f32 is
+    /// supported, because each further type would be compiled for every processor as well.
     fn fastest(len: usize) -> Self {
         Self::plan(|way| FftPlanner::new().plan_fft(len, way))
     }
 }
 
-/// Spectra of the real and of the imaginary part, from a frequency of both and its mirror.
+/// Splits a frequency of `a + i b` and the mirrored frequency into the frequencies of the real
+/// lines `a` and `b`.
 #[inline(always)]
 pub(crate) fn split<T: FftNum>(z: Complex<T>, mirror: Complex<T>) -> (Complex<T>, Complex<T>) {
     let half = T::one() / (T::one() + T::one());
@@ -67,14 +73,15 @@ pub(crate) fn split<T: FftNum>(z: Complex<T>, mirror: Complex<T>) -> (Complex<T>
     )
 }
 
-/// Writes the spectrum of `a + i b` from the halves that tell the rest of those of `a` and of `b`, which are real.
+/// Writes the spectrum of `a + i b` from the half spectra of the real lines `a` and `b`. The other
+/// halves follow by symmetry.
 #[inline(always)]
 fn join<T: FftNum>(line: &mut [Complex<T>], half: impl Fn(usize) -> (Complex<T>, Complex<T>)) {
     let n = line.len();
     for k in 0..=n / 2 {
         let (a, b) = half(k);
         if k == 0 || 2 * k == n {
-            // Of a real line these are real but for a trace of rounding.
+            // These frequencies of a real line are real, except for rounding errors.
             line[k] = Complex::new(a.re, b.re);
         } else {
             line[k] = Complex::new(a.re - b.im, a.im + b.re);
@@ -83,15 +90,17 @@ fn join<T: FftNum>(line: &mut [Complex<T>], half: impl Fn(usize) -> (Complex<T>,
     }
 }
 
-/// Transforms of real images of one size. A spectrum is the half that tells the rest, transposed, frequency of the
-/// columns first, so that both passes run over contiguous memory.
+/// Transforms of real images of one size.
+///
+/// A spectrum contains only the half that determines the rest. It is transposed, with frequencies
+/// of the columns first, so that both passes run over contiguous memory.
 pub(crate) struct Images<T> {
     size: [usize; 2],
     rows: Lines<T>,
     columns: Lines<T>,
 }
 
-/// What a transform of an image needs besides its input and output.
+/// Scratch memory of a transform of an image.
 #[derive(Default)]
 pub(crate) struct Scratch<T> {
     real: Vec<T>,
@@ -100,7 +109,8 @@ pub(crate) struct Scratch<T> {
 }
 
 impl<T: FftNum + Default> Images<T> {
-    /// Plans the transforms of images of `size` rows and columns, by the same sums on every machine.
+    /// Plans the transforms of images of `size` rows and columns. The order of sums is the same on
+    /// every machine.
     pub(crate) fn new(size: [usize; 2]) -> Self {
         let [columns, rows] = size.map(Lines::new);
         Self {
@@ -110,17 +120,18 @@ impl<T: FftNum + Default> Images<T> {
         }
     }
 
-    /// Rows and columns.
+    /// Number of rows and columns.
     pub(crate) fn size(&self) -> [usize; 2] {
         self.size
     }
 
-    /// Complex numbers of a spectrum.
+    /// Number of complex values of a spectrum.
     pub(crate) fn len(&self) -> usize {
         (self.size[1] / 2 + 1) * self.size[0]
     }
 
-    /// Writes the spectrum of `rows` rows, which `row(r, out)` writes into zeros; those that lack are zero.
+    /// Computes the spectrum of an image whose first `rows` rows are given. `row(r, out)` writes a
+    /// row into zeros; the other rows are zero.
     pub(crate) fn forward(
         &self,
         rows: usize,
@@ -134,6 +145,7 @@ impl<T: FftNum + Default> Images<T> {
         let line = grow(&mut scratch.lines, width);
         spectrum.clear();
         spectrum.resize(self.len(), Complex::default());
+        // Transform two real rows together as one complex line.
         for first in (0..rows).step_by(2) {
             real.fill(T::default());
             let pair = 2.min(rows - first);
@@ -154,7 +166,8 @@ impl<T: FftNum + Default> Images<T> {
         self.columns.forward(spectrum, &mut scratch.work);
     }
 
-    /// Passes the first `rows` rows of the inverse of `spectrum`, which is used up, to `take(r, row)`.
+    /// Computes the inverse of `spectrum` and passes its first `rows` rows to `take(r, row)`. The
+    /// contents of `spectrum` are destroyed.
     pub(crate) fn inverse(
         &self,
         spectrum: &mut [Complex<T>],
@@ -166,6 +179,7 @@ impl<T: FftNum + Default> Images<T> {
         self.columns.inverse(spectrum, &mut scratch.work);
         let real = grow(&mut scratch.real, width);
         let lines = grow(&mut scratch.lines, width * GROUP / 2);
+        // Transpose a group of rows, and transform its rows in pairs.
         for first in (0..rows).step_by(GROUP) {
             let group = GROUP.min(rows - first);
             let lines = &mut lines[..width * group.div_ceil(2)];
@@ -190,7 +204,7 @@ impl<T: FftNum + Default> Images<T> {
 }
 
 impl Images<f32> {
-    /// Plans the transforms of images of `size` rows and columns, as [`Lines::fastest`] does.
+    /// Plans the transforms of images of `size` rows and columns, like [`Lines::fastest`].
     pub(crate) fn fastest(size: [usize; 2]) -> Self {
         let [columns, rows] = size.map(Lines::fastest);
         Self {
@@ -201,7 +215,7 @@ impl Images<f32> {
     }
 }
 
-/// The first `len` numbers of a buffer that is made longer where it must be.
+/// Returns the first `len` values of a buffer, which grows if necessary.
 fn grow<T: Clone + Default>(buffer: &mut Vec<T>, len: usize) -> &mut [T] {
     if buffer.len() < len {
         buffer.resize(len, T::default());
@@ -214,7 +228,8 @@ mod tests {
     use super::*;
     use crate::foundation::hash::Noise;
 
-    /// Holds transforms of images, of whose spectra the first frequency is a sum, to be undone within `most`.
+    /// Checks that the first frequency is the sum of the image, and that the inverse transform
+    /// restores the image within `most`.
     fn check<T: FftNum + Default + Into<f64>>(plan: &Images<T>, most: f64) {
         let (size, noise) = (plan.size(), Noise::new(2));
         let image = |r: usize, c: usize| noise.uniform([r as u32, c as u32, 0, 0]) - 0.5;

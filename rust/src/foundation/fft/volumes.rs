@@ -1,19 +1,20 @@
-//! Transforms of real volumes, by all threads; an image is a volume of one row a plane.
+//! Transforms of real volumes by all threads. An image is a volume whose planes have one row.
 
 use super::{Complex, Lines, join, split};
 use crate::foundation::par;
 
-/// Transforms of real volumes of one size, of `f32`.
+/// Transforms of real `f32` volumes of one size.
 ///
-/// A spectrum is the half that tells the rest, with its axes reversed: each pass then reads and writes whole planes.
+/// A spectrum contains only the half that determines the rest, with its axes in reverse order. Each
+/// pass then reads and writes whole planes.
 pub(crate) struct Volumes {
     size: [usize; 3],
-    /// Along each axis.
+    /// Transforms along each axis.
     lines: [Lines<f32>; 3],
 }
 
 impl Volumes {
-    /// Plans the transforms of volumes of so many planes, rows and columns.
+    /// Plans the transforms of volumes of `size` planes, rows and columns.
     pub(crate) fn new(size: [usize; 3]) -> Self {
         Self {
             size,
@@ -21,7 +22,8 @@ impl Volumes {
         }
     }
 
-    /// A size of at least `n` along an axis whose transform is fast.
+    /// Returns the smallest size of at least `n` that has only the prime factors 2, 3 and 5, whose
+    /// transform is fast.
     pub(crate) fn fast(n: usize) -> usize {
         let smooth = |mut m: usize| {
             for p in [2, 3, 5] {
@@ -34,16 +36,16 @@ impl Volumes {
         (n..).find(|&m| smooth(m)).unwrap_or(n)
     }
 
-    /// Columns of a spectrum.
+    /// Number of columns of a spectrum.
     fn half(&self) -> usize {
         self.size[2] / 2 + 1
     }
 
-    /// The spectrum of a volume.
+    /// Returns the spectrum of a volume.
     pub(crate) fn forward(&self, volume: &[f32]) -> Vec<Complex<f32>> {
         let ([planes, rows, columns], half) = (self.size, self.half());
         let zero = Complex::default();
-        // Two planes at a time: columns, then rows.
+        // Transform along columns, then along rows, two planes at a time.
         let mut middle = vec![zero; planes * half * rows];
         par::chunks_mut(&mut middle, 2 * half * rows, |pair, out| {
             let (mut line, mut work) = (vec![zero; columns], Vec::new());
@@ -67,7 +69,7 @@ impl Volumes {
                 self.lines[1].forward(out, &mut work);
             }
         });
-        // Column by column: planes.
+        // Transform along planes, one column at a time.
         let mut spectrum = vec![zero; middle.len()];
         par::chunks_mut(&mut spectrum, rows * planes, |column, out| {
             for plane in 0..planes {
@@ -81,13 +83,13 @@ impl Volumes {
         spectrum
     }
 
-    /// The volume of a spectrum, which is used up; times the number of its points.
+    /// Returns the volume of a spectrum, multiplied by the number of its points.
     pub(crate) fn inverse(&self, mut spectrum: Vec<Complex<f32>>) -> Vec<f32> {
         let ([planes, rows, columns], half) = (self.size, self.half());
         let zero = Complex::default();
         par::chunks_mut(&mut spectrum, rows * planes, |_, column| {
             self.lines[0].inverse(column, &mut Vec::new());
-            // So that a plane's rows lie together.
+            // Store the rows of each plane next to each other.
             let old = column.to_vec();
             for plane in 0..planes {
                 for row in 0..rows {
@@ -97,7 +99,7 @@ impl Volumes {
         });
         let mut volume = vec![0.0; planes * rows * columns];
         par::chunks_mut(&mut volume, 2 * rows * columns, |pair, out| {
-            // Of an odd number of planes the last goes with zeros.
+            // The last plane of an odd number is paired with zeros.
             let (mut lines, mut work) = (vec![zero; 2 * half * rows], Vec::new());
             for (plane, lines) in (2 * pair..planes).zip(lines.chunks_exact_mut(half * rows)) {
                 for column in 0..half {
