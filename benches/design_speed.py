@@ -77,7 +77,7 @@ def run(image: np.ndarray, options: argparse.Namespace) -> None:
         "one 256^2 texture of 2 tiles": lambda: texrs.design(image, 256, tiles=2),
         "1024^2, cyclic, 8 tiles": lambda: texrs.design(image, 1024, tiles=8),
         "1024^2, not cyclic, 8 tiles": lambda: texrs.design(image, 1024, tiles=8, wrap=False),
-        "1024^2, cyclic, 8 tiles, blend=0": lambda: texrs.design(image, 1024, tiles=8, blend=0),
+        "1024^2, cyclic, 8 tiles, screening=0": lambda: texrs.design(image, 1024, tiles=8, screening=0),
     }
     growth = (256, 512, 1024, 2048)
     for size in growth:

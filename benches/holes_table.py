@@ -42,11 +42,11 @@ photograph's own (>= 0.95); seam: mean gradient across its boundary over that in
 OPTIONS: dict[str, dict[str, Any]] = {
     "patch": {"method": "patch"},
     "patch, measured": {"method": "patch", "scale_map": "auto"},
-    "patch, blended": {"method": "patch", "blend": 0.003},
+    "patch, blended": {"method": "patch", "screening": 0.003},
     "patch, no scales": {"method": "patch", "scale_map": None},
     "optimise": {"method": "optimise"},
     "optimise, measured": {"method": "optimise", "scale_map": "auto"},
-    "optimise, blended": {"method": "optimise", "blend": 0.003},
+    "optimise, blended": {"method": "optimise", "screening": 0.003},
     "optimise, no scales": {"method": "optimise", "scale_map": None},
 }
 

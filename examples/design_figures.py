@@ -39,7 +39,7 @@ def draw_comparison() -> np.ndarray:
             source,
             quilt(source, LARGE, seed=1),
             lay_tiles(make_tiles(source), size),
-            texrs.design(source, size, seed=1, plan="still", tiles=1, deformation=still, blend=None).image,
+            texrs.design(source, size, seed=1, plan="still", tiles=1, deformation=still, screening=None).image,
             texrs.design(source, size, seed=1, method="paper").image,
             texrs.design(source, size, seed=1).image,
         ]

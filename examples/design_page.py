@@ -18,7 +18,7 @@ STILL = texrs.DeformationOptions(operations=0, mirror=False)
 BUILT_IN = ("pebbles", "leaves_and_flowers", "beans", "dots", "tilted_discs", "bark")
 WAYS = {
     "texrs.design": {},
-    "plain quilting (nothing deformed)": {"deformation": STILL, "tiles": 1, "blend": None},
+    "plain quilting (nothing deformed)": {"deformation": STILL, "tiles": 1, "screening": None},
     "as printed (method=paper)": {"method": "paper"},
 }
 

@@ -99,8 +99,8 @@ def test_names_count_as_in_a_folder(
         assert set(np.unique(plain)) <= set(np.unique(io.read(places / name)))
     # The same through a store, in parts.
     pytest.importorskip("zarr")
-    assert main([*words, str(tmp_path / "parts.zarr"), "--blend", "0"]) == 0
-    assert main([*words, str(tmp_path / "told.zarr"), "--blend", "0", *options]) == 0
+    assert main([*words, str(tmp_path / "parts.zarr"), "--screening", "0"]) == 0
+    assert main([*words, str(tmp_path / "told.zarr"), "--screening", "0", *options]) == 0
     assert (io.read(tmp_path / "parts.zarr") == io.read(tmp_path / "told.zarr")).all()
 
 

@@ -413,10 +413,10 @@ def test_away_from_seams_differences_stay(designed):
 
 def test_blending_can_be_left_out(designed):
     sample, result = designed
-    plain = texrs.design(sample, 256, seed=5, tiles=2, blend=None)
+    plain = texrs.design(sample, 256, seed=5, tiles=2, screening=None)
     np.testing.assert_array_equal(plain.image, plain.stages["composite"])
     np.testing.assert_array_equal(plain.stages["composite"], result.stages["composite"])
-    assert plain.report["blend"] == 0
+    assert plain.report["screening"] == 0
     assert plain.report["seams"]["before"] == plain.report["seams"]["after"]
 
 

@@ -220,7 +220,7 @@ def test_apply(here: Path, capsys: Capture) -> None:
     result = np.load("results/height.npy")
     assert result.dtype == np.float32
     assert (result == texrs.apply(places, height)).all()
-    assert main(["apply", "s.npz", "in.png", "height.npy", "-o", "results", "--blend", "0", "-q"]) == 0
+    assert main(["apply", "s.npz", "in.png", "height.npy", "-o", "results", "--screening", "0", "-q"]) == 0
     assert (iio.imread("results/in.png") == view(places, COLOURS)).all()
     np.testing.assert_allclose(np.load("results/height.npy"), view(places, height), rtol=1e-6)
     normal = [
@@ -230,7 +230,7 @@ def test_apply(here: Path, capsys: Capture) -> None:
         "down",
         "--interpolation",
         "linear",
-        "--blend",
+        "--screening",
         "0",
         "-q",
         "--threads",
@@ -245,10 +245,10 @@ def test_apply(here: Path, capsys: Capture) -> None:
 
 def test_apply_blends(here: Path) -> None:
     assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--map", "s.npz"]) == 0
-    assert main(["design", "in.png", "-q", *TINY, "--blend", "0", "-o", "plain.png", "--map", "plain.npz"]) == 0
+    assert main(["design", "in.png", "-q", *TINY, "--screening", "0", "-o", "plain.png", "--map", "plain.npz"]) == 0
     # The map of a result that was not blended can be, and the other way round.
     for source, blend, same in (("s.npz", "0", "plain.png"), ("plain.npz", "0.15", "out.png")):
-        assert main(["apply", source, "in.png", "-q", "--blend", blend, "-o", "again.png", "--force"]) == 0
+        assert main(["apply", source, "in.png", "-q", "--screening", blend, "-o", "again.png", "--force"]) == 0
         assert (iio.imread("again.png") == iio.imread(same)).all()
     assert (iio.imread("plain.png") != iio.imread("out.png")).any()
 

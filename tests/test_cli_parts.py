@@ -207,8 +207,8 @@ def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixt
     assert "holds something else" in capsys.readouterr().err
     assert main([*words, f"{files}/b.zarr", weave, "--force", "--kind", "label", "-q"]) == 0
     assert np.array_equal(io.read(files / "b.zarr"), io.read(files / "a.png"))
-    assert main([*words, f"{files}/c.zarr", weave, "--blend", "0.2"]) == 2
-    assert "--blend 0 leaves them as they are" in capsys.readouterr().err
+    assert main([*words, f"{files}/c.zarr", weave, "--screening", "0.2"]) == 2
+    assert "--screening 0 leaves them as they are" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_a_stack_of_each_convention_comes_back_in_register(key: str, tmp_path: P
     assert [each.file for each in material.values()] == sorted(pictures)
     roles = {f"{CONVENTIONS[key].start}Stone02_1K{file.end}": file.role for file in CONVENTIONS[key].files}
     assert {each.file: each.role for each in material.values()} == roles
-    result = texrs.design(material, 64, seed=1, deformation=TURNED, blend=None)
+    result = texrs.design(material, 64, seed=1, deformation=TURNED, screening=None)
     frames = result.source.frames()
     assert (np.degrees(np.arctan2(frames[..., 1, 0], frames[..., 0, 0])) > 20).mean() > 0.1
     assert result.material is not None
@@ -338,7 +338,7 @@ def test_normals_turn_by_x_and_y_and_the_rest_stays(held: str, dtype: str) -> No
     material = Material({"albedo": DOTS.image, "n": stored}, roles={"n": "normal-dx"})
     bare = held != "A = height"
     assert material["n"].role is (Role.NORMAL_DX_XY if bare else Role.NORMAL_DX)
-    result = texrs.design(material, 64, seed=1, deformation=TURNED, blend=None)
+    result = texrs.design(material, 64, seed=1, deformation=TURNED, screening=None)
     assert result.material is not None
     made = result.material["n"].pixels
     unit = made if dtype == "float32" else made / np.iinfo(dtype).max

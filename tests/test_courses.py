@@ -139,7 +139,7 @@ def test_upright_courses_are_laid_like_level_ones() -> None:
 
 def test_the_map_of_a_turned_wall_leads_back_to_it() -> None:
     wall = lay_wall((224, 224), (16, 36), turn=5.0, seed=7)
-    made = texrs.design(wall, 256, seed=3, blend=None)
+    made = texrs.design(wall, 256, seed=3, screening=None)
     np.testing.assert_array_equal(made.source.render(wall), made.image)
     frames = made.source.frames()
     # What is level in the texture climbs in the photograph.

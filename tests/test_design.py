@@ -337,8 +337,8 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
         ((PICTURE,), {"wrap": (True,)}, "wrap"),
         ((PICTURE,), {"tiles": 0}, "tiles"),
         ((PICTURE,), {"patch": 64}, "patch"),
-        ((PICTURE,), {"blend": -0.1}, "blend"),
-        ((PICTURE,), {"blend": "strong"}, "blend"),
+        ((PICTURE,), {"screening": -0.1}, "screening"),
+        ((PICTURE,), {"screening": "strong"}, "screening"),
     ],
 )
 def test_bad_input_names_the_argument(arguments, options, names):

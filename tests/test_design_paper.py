@@ -164,7 +164,7 @@ def test_options_of_elements_play_no_part(pebbles, result):
         method="paper",
         elements=ElementOptions(kind="grid"),
         deformation=DeformationOptions(translate=0.0, rotate=10.0, mirror=False),
-        blend=0.5,
+        screening=0.5,
     )
     np.testing.assert_array_equal(other.image, result.image)
 

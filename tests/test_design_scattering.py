@@ -46,7 +46,7 @@ def test_densities_are_kept(grit, pebbles, density, seed):
 
 
 def test_things_are_whole_and_apart(grit, pebbles):
-    result = texrs.design([grit, pebbles], SIZE, density=0.15, deformation=COPIED, tiles=1, blend=None)
+    result = texrs.design([grit, pebbles], SIZE, density=0.15, deformation=COPIED, tiles=1, screening=None)
     source = result.source
     whole = {e.label: int((e.distance > EDGE).sum()) for e in measure_elements(pebbles.labels) if not any(e.touches)}
     lies = source.exemplar == 1

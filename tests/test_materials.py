@@ -76,7 +76,7 @@ def test_every_verb_gives_every_map_back(verb: str) -> None:
 
 
 def test_maps_stay_in_register_exactly() -> None:
-    result = texrs.design(STONES, (72, 64), blend=None)
+    result = texrs.design(STONES, (72, 64), screening=None)
     assert result.material is not None
     place, labels = result.material["place"].pixels, result.material["labels"].pixels
     whole = (result.source.coordinates == np.rint(result.source.coordinates)).all(axis=-1)

@@ -81,7 +81,7 @@ def test_maps_of_a_material_keep_theirs():
 def test_it_can_be_turned_off():
     with ask(False):
         assert len(find_colours(texrs.design(ART, 80).image)) > 6
-    assert len(find_colours(texrs.design(ART, 80, blend=0.5).image)) > 6
+    assert len(find_colours(texrs.design(ART, 80, screening=0.5).image)) > 6
     with ask(True):
         pebbles = samples.pebbles((64, 64)).image
         assert find_colours(texrs.design(pebbles, 80).image) <= find_colours(pebbles)

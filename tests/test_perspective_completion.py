@@ -113,7 +113,7 @@ def test_all_of_a_picture_from_another():
     image, everything = np.zeros((64, 80, 3), np.uint8), np.ones((64, 80), bool)
     ramp = np.linspace(0.7, 1.5, 64, dtype=np.float32)[:, np.newaxis].repeat(80, axis=1)
     result = texrs.complete(
-        image, everything, exemplar=other, scale_map=ramp, exemplar_scale_map=theirs, method="optimise", blend=1e-4
+        image, everything, exemplar=other, scale_map=ramp, exemplar_scale_map=theirs, method="optimise", screening=1e-4
     )
     assert result.source.exemplar.all()
     assert result.image.std() > 20
@@ -139,7 +139,7 @@ def test_blending_takes_the_light_of_the_picture(method, box):
     hole = hole_in(image.shape, box)
     dark = (data.grass()[200:360, 200:360] * 0.7).astype(np.uint8)
     plain = fill(image, hole, method=method, exemplar=dark)
-    light = fill(image, hole, method=method, exemplar=dark, blend=1e-4)
+    light = fill(image, hole, method=method, exemplar=dark, screening=1e-4)
     np.testing.assert_array_equal(light.image[~hole], image[~hole])
     np.testing.assert_array_equal(light.stages["composite"], plain.image)
     np.testing.assert_array_equal(light.source.coordinates, plain.source.coordinates)
@@ -207,7 +207,7 @@ def test_an_output_that_wraps(floor):
             {"hole": np.ones((64, 64), bool), "scale_map": "auto", "exemplar": np.zeros((40, 40), np.uint8)},
             "scale_map: 'auto' measures what is known",
         ),
-        ({"blend": "soft"}, "blend: needs a number"),
+        ({"screening": "soft"}, "screening: needs a number"),
         ({"hole": "alpha"}, "hole: 'alpha' needs an image with an alpha channel"),
         ({"method": "optimise", "patch": 12}, "patch: method 'optimise' has no patches"),
         ({"method": "optimise", "hole": np.ones((64, 64), bool)}, "hole: covers the whole image"),

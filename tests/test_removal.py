@@ -232,7 +232,7 @@ def test_grey_pictures_of_16_bit_and_again() -> None:
     floor = look("pebbles", PLANE)[..., 0].astype(np.uint16) * 200
     marked = np.zeros(SIZE, bool)
     marked[70:90, 60:90] = True
-    one, two = (texrs.remove(floor, marked, view=PLANE, seed=4, blend=None) for _ in range(2))
+    one, two = (texrs.remove(floor, marked, view=PLANE, seed=4, screening=None) for _ in range(2))
     assert one.image.dtype == np.uint16
     assert one.image.shape == SIZE
     assert one.stages["composite"].shape == SIZE

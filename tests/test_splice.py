@@ -36,7 +36,7 @@ def spliced() -> Callable[[str, str], texrs.Synthesis]:
 
     def get(a: str, b: str) -> texrs.Synthesis:
         if (a, b) not in made:
-            made[a, b] = texrs.splice(ENTRIES[a], ENTRIES[b], cells=False, seed=1, blend=None)
+            made[a, b] = texrs.splice(ENTRIES[a], ENTRIES[b], cells=False, seed=1, screening=None)
         return made[a, b]
 
     return get
@@ -249,9 +249,9 @@ def test_threads_do_not_matter(a: str, b: str) -> None:
 
 def test_any_dtype_and_channels() -> None:
     mine = ENTRIES["dots"]
-    usual = texrs.splice(mine, ENTRIES["pebbles"], 96, blend=None).image
+    usual = texrs.splice(mine, ENTRIES["pebbles"], 96, screening=None).image
     wide = replace(mine, image=mine.image.astype(np.uint16) * 257)
-    assert (texrs.splice(wide, ENTRIES["pebbles"], 96, blend=None).image == usual.astype(np.uint16) * 257).all()
+    assert (texrs.splice(wide, ENTRIES["pebbles"], 96, screening=None).image == usual.astype(np.uint16) * 257).all()
     grey = replace(mine, image=mine.image[..., 0])
     assert texrs.splice(grey, ENTRIES["pebbles"], (64, 96)).image.shape == (64, 96)
     floats = replace(mine, image=mine.image.astype(np.float32) * 4 - 2)

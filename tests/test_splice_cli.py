@@ -38,7 +38,7 @@ def test_splice(tmp_path: Path) -> None:
         "112x96",
         "--seed",
         "2",
-        "--blend",
+        "--screening",
         "0",
         "-q",
     ]

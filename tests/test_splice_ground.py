@@ -49,14 +49,14 @@ def test_the_ground_is_as_rough_as_it_was() -> None:
 
     mine = make_discs()
     own = roughness(mine.image, ~binary_dilation(mine.mask, iterations=4))
-    for blend in (None, 0.01):
-        result = texrs.splice(mine, LAYOUT, seed=1, blend=blend)
+    for screening in (None, 0.01):
+        result = texrs.splice(mine, LAYOUT, seed=1, screening=screening)
         assert 0.95 <= roughness(result.image, find_ground(result)) / own <= 1.1
 
 
 def test_ground_comes_from_ground() -> None:
     mine = make_discs()
-    result = texrs.splice(mine, LAYOUT, seed=1, blend=None)
+    result = texrs.splice(mine, LAYOUT, seed=1, screening=None)
     rows, columns = result.source.coordinates.astype(int)[result.source.label == 0].T
     assert not mine.mask[rows, columns].any()
     assert len(np.unique(rows * SIDE + columns)) > 0.3 * (~mine.mask).sum()
@@ -85,7 +85,7 @@ def test_elements_bring_their_shadows() -> None:
 
 def test_elements_and_ground_are_in_one_light() -> None:
     mine = make_discs(light=0.8)
-    plain, even = (texrs.splice(mine, LAYOUT, seed=1, blend=weight) for weight in (None, 0.01))
+    plain, even = (texrs.splice(mine, LAYOUT, seed=1, screening=weight) for weight in (None, 0.01))
     np.testing.assert_array_equal(plain.source.coordinates, even.source.coordinates)
     # From what a disc brings along outwards to the ground: where neighbours are none in the texture.
     apart = np.abs(np.diff(plain.source.coordinates, axis=1)).sum(axis=-1) != 1
@@ -110,7 +110,7 @@ def test_without_ground_to_speak_of_it_is_warped_as_before() -> None:
     full = Elements(mine.image, mine.points, mask, (39, 39), Layout.DISJOINT, mine.scores)
     result = texrs.splice(full, LAYOUT, 96, seed=1)
     assert result.image.shape == (96, 96, 3)
-    assert result.report["blend"] == 0
+    assert result.report["screening"] == 0
 
 
 def test_what_is_kept_of_a_texture_changes_nothing() -> None:
@@ -133,7 +133,7 @@ def test_what_is_kept_of_a_texture_changes_nothing() -> None:
     assert not (fresh[0] == fresh[2]).all()
 
 
-@pytest.mark.parametrize("blend", [-1.0, float("nan"), "soft"])
-def test_bad_weights(blend: object) -> None:
-    with pytest.raises(texrs.errors.InvalidInput, match="blend: needs a number"):
-        texrs.splice(make_discs(), LAYOUT, blend=blend)  # type: ignore[arg-type]
+@pytest.mark.parametrize("screening", [-1.0, float("nan"), "soft"])
+def test_bad_weights(screening: object) -> None:
+    with pytest.raises(texrs.errors.InvalidInput, match="screening: needs a number"):
+        texrs.splice(make_discs(), LAYOUT, screening=screening)  # type: ignore[arg-type]

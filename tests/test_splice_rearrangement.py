@@ -198,9 +198,9 @@ def test_any_picture_in_uneven_light(kind: str) -> None:
 
 def test_without_correction_it_is_the_texture_looked_up() -> None:
     mine = make_discs(light=0.5)
-    result = texrs.self_splice(mine, "randomise", seed=1, blend=None)
+    result = texrs.self_splice(mine, "randomise", seed=1, screening=None)
     np.testing.assert_array_equal(result.image, result.source.render(mine.image, interpolation="nearest"))
-    assert result.report["blend"] == 0
+    assert result.report["screening"] == 0
 
 
 def test_no_strength_keeps_what_the_border_cuts() -> None:
@@ -225,10 +225,10 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
     np.testing.assert_array_equal(made[0].source.label, made[1].source.label)
 
 
-@pytest.mark.parametrize("blend", [-1.0, float("inf"), "soft"])
-def test_bad_weights(blend: Any) -> None:
-    with pytest.raises(InvalidInput, match="blend: needs a number"):
-        texrs.self_splice(BUTTONS, "regularise", blend=blend)
+@pytest.mark.parametrize("screening", [-1.0, float("inf"), "soft"])
+def test_bad_weights(screening: Any) -> None:
+    with pytest.raises(InvalidInput, match="screening: needs a number"):
+        texrs.self_splice(BUTTONS, "regularise", screening=screening)
 
 
 def test_of_a_texture_without_elements_the_ground_is_left() -> None:

@@ -44,7 +44,7 @@ def test_the_layout_goes_on(name: str) -> None:
 @pytest.mark.parametrize("edit", [None, {"op": "randomise", "amount": 0.1}])
 def test_the_map_looks_into_the_texture(name: str, edit: Any) -> None:
     mine = ENTRIES[name]
-    result = texrs.self_splice(mine, edit, LARGE, seed=1, blend=None)
+    result = texrs.self_splice(mine, edit, LARGE, seed=1, screening=None)
     assert result.source.shapes == ((128, 128),)
     np.testing.assert_array_equal(result.source.render(mine.image), result.image)
     # What the map shows at an element's place is one: so the mask says, which took no part in the picture.

@@ -408,9 +408,9 @@ def test_an_exemplar_is_tiled_as_its_array():
 
 def test_seams_can_be_blended():
     pebbles = samples.pebbles((96, 96)).image
-    plain, blended = texrs.tile(pebbles, overlap=12), texrs.tile(pebbles, overlap=12, blend=0.05)
+    plain, blended = texrs.tile(pebbles, overlap=12), texrs.tile(pebbles, overlap=12, screening=0.05)
     assert (blended.stages["composite"] == plain.image).all()
     assert (blended.image != plain.image).any()
-    assert blended.report["blend"] == 0.05
-    with pytest.raises(InvalidInput, match="blend"):
-        texrs.tile(pebbles, blend=-1)
+    assert blended.report["screening"] == 0.05
+    with pytest.raises(InvalidInput, match="screening"):
+        texrs.tile(pebbles, screening=-1)

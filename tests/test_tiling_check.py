@@ -122,7 +122,7 @@ def test_pixel_art_that_tiles_comes_back():
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_design_that_wraps_comes_back(name, seed):
     image = texrs.design(picture(name, 96), 128, wrap=True, seed=seed).image
-    made = texrs.tile(image, blend=0.1)
+    made = texrs.tile(image, screening=0.1)
     np.testing.assert_array_equal(made.image, image)
     assert made.report["joints"] == {}
 

@@ -67,16 +67,16 @@ def test_labels_are_not_mixed() -> None:
     hole = make_ball(labels.shape, 8)
     result = texrs.complete(labels, hole)
     assert result.report["labels"]
-    assert result.report["blend"] == 0
+    assert result.report["screening"] == 0
     assert set(np.unique(result.image)) <= set(np.unique(labels[~hole]))
-    with pytest.raises(InvalidInput, match="blend: labels cannot be mixed"):
-        texrs.complete(labels, hole, blend=0.1)
+    with pytest.raises(InvalidInput, match="screening: labels cannot be mixed"):
+        texrs.complete(labels, hole, screening=0.1)
 
 
 def test_the_correction_can_be_left_out() -> None:
     volume = make_noise()
     hole = make_ball(volume.shape, 8)
-    plain = texrs.complete(volume, hole, blend=0)
+    plain = texrs.complete(volume, hole, screening=0)
     assert (plain.image == plain.stages["composite"]).all()
     assert (texrs.complete(volume, hole).stages["composite"] == plain.image).all()
 
@@ -108,7 +108,7 @@ def test_holes_of_any_shape() -> None:
     corner[:10, :12, 30:] = True
     specks = np.random.default_rng(2).random(volume.shape) < 0.002
     for hole in (corner, specks, corner | specks):
-        result = texrs.complete(volume, hole, blend=0)
+        result = texrs.complete(volume, hole, screening=0)
         assert (result.image[~hole] == volume[~hole]).all()
         assert ((result.source.label > 0) == hole).all()
 
@@ -123,7 +123,7 @@ def test_holes_of_any_shape() -> None:
         ({"wrap": True}, "wrap: is for pictures"),
         ({"patch": 3}, "patch: "),
         ({"patch": 41}, "patch: "),
-        ({"blend": -1}, "blend: "),
+        ({"screening": -1}, "screening: "),
         (
             {"image": np.zeros((40, 40, 8), np.uint8), "hole": np.ones((40, 40, 8), bool)},
             "hole: ",

@@ -55,7 +55,7 @@ class Palette:
             return made
         source = make_plain(made.source)
         image = source.render(self.images if len(self.images) > 1 else self.images[0], interpolation="nearest")
-        known = {"blend": 0.0, "interpolation": "nearest"}
+        known = {"screening": 0.0, "interpolation": "nearest"}
         report = {**made.report, **{key: value for key, value in known.items() if key in made.report}}
         stages = {name: image if name == "composite" else stage for name, stage in made.stages.items()}
         return replace(made, image=image, source=source, stages=stages, report={**report, "palette": self.count})
@@ -76,9 +76,9 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
 
     A path among the arguments is replaced by the image in it. Arguments that ask for other colours turn this off.
     """
-    asked, blend, how = _ASKED.get(), given.get("blend"), given.get("interpolation")
+    asked, weight, how = _ASKED.get(), given.get("screening"), given.get("interpolation")
     # Values of other types are refused by the verb.
-    wanted = isinstance(blend, int | float) and blend not in (0, usual.get("blend"))
+    wanted = isinstance(weight, int | float) and weight not in (0, usual.get("screening"))
     smooth = isinstance(how, str) and how not in ("nearest", usual.get("interpolation"))
     fading = any(isinstance(value, Mask) and value.feather for value in given.values())
     if asked is False or wanted or smooth or fading or given.get("flatten") is True:

@@ -41,7 +41,7 @@ def extend(
     to: int | Sequence[int] | None = None,
     view: View | Plane | Sequence[View | Plane] | None = None,
     boundary: int = 0,
-    blend: float | None = 0.1,
+    screening: float | None = 0.1,
     light: bool = True,
     seed: int = 0,
     progress: Progress | bool | None = None,
@@ -64,7 +64,7 @@ def extend(
         itself, up to the line in which they meet; all but one need a ground.
     boundary : int
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
-    blend : float, optional
+    screening : float, optional
         Weight of the values when the colours of what is added are corrected, as in `texrs.complete`; None or 0: no correction.
     light : bool
         Whether slow changes of light, as towards a window, are followed; beyond the photograph it stays as it is at the border.
@@ -117,7 +117,7 @@ def extend(
     if size == (rows, columns):
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
     check_work("extend", [pixels], size, "top, bottom, left, right" if to is None else "to")
-    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
     rim, number, follow = as_int(boundary, "boundary", 0, 64), as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)
     views = as_views(view)
@@ -172,7 +172,7 @@ def extend(
         "patches": list(made.counts),
         "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
         "boundary": rim,
-        "blend": screening,
+        "screening": screening,
         "light": follow,
         "seed": number,
         "planes": [{"plane": None if plane is None else plane.as_dict(), "found": found} for plane, found in planes],

@@ -44,7 +44,7 @@ def remove(
     margin: int | None = None,
     boundary: int | None = None,
     patch: int | None = None,
-    blend: float | None = 0.1,
+    screening: float | None = 0.1,
     light: bool = True,
     seed: int = 0,
     progress: Progress | bool | None = None,
@@ -69,7 +69,7 @@ def remove(
         1/40 of the shorter side, of planes whose things lie apart 1/12. Only what seams run around changes.
     patch : int, optional
         Side of the patches in pixels, as in `texrs.complete`.
-    blend : float, optional
+    screening : float, optional
         Weight of the values when the colours of what is filled in are corrected, as in `texrs.complete`; None or 0: no
         correction.
     light : bool
@@ -123,7 +123,7 @@ def remove(
     rim, things = round(RIM * min(shape)), min(64, round(THINGS * min(shape)))
     if boundary is not None:
         rim = things = as_int(boundary, "boundary", 0, 64)
-    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
     number, follow = as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)
     side = None if patch is None else as_int(patch, "patch", 4, min(shape))
@@ -159,7 +159,7 @@ def remove(
         "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
         "margin": wide,
         "boundary": rim,
-        "blend": screening,
+        "screening": screening,
         "light": follow,
         "seed": number,
         "planes": [{"plane": None if plane is None else plane.as_dict(), "found": found} for plane, found in planes],

@@ -31,7 +31,7 @@ def design_of_16_bits_that_does_not_repeat() -> Parts:
         exemplar,
         (128, 144),
         wrap=False,
-        blend=None,
+        screening=None,
         elements=ElementOptions(kind="grid"),
         tiles=3,
         deformation=DeformationOptions(rotate=30, translate=0.3),
@@ -55,7 +55,7 @@ def design_of_marked_elements() -> Parts:
         (112, 112),
         elements=ElementOptions(labels=beans.labels),
         deformation=DeformationOptions(operations=3, scale=(0.7, 1.4), mirror=False, start=0.3, growth_rate=1.9),
-        blend=0.01,
+        screening=0.01,
     )
     return parts_of(result, report=DESIGNED)
 

@@ -174,7 +174,7 @@ COMPLETED = ("filled", "replaced_outside", "patch", "patches")
 @case
 def complete_with_patches() -> Parts:
     hole = box((128, 144), (40, 90), (50, 100)) | box((128, 144), (0, 30), (120, 144))
-    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, boundary=5, blend=0.003, seed=3)
+    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, boundary=5, screening=0.003, seed=3)
     return parts_of(result, report=COMPLETED, stages=("known", "patches", "composite"))
 
 
@@ -210,7 +210,7 @@ def complete_with_a_scale_map() -> Parts:
 def complete_with_a_source() -> Parts:
     hole = box((96, 112), (20, 70), (30, 80))
     other = floats("pebbles", 80, 96, seed=5)
-    result = texrs.complete(floats("grit", 96, 112), hole, exemplar=other, blend=0.001, boundary=2, seed=1)
+    result = texrs.complete(floats("grit", 96, 112), hole, exemplar=other, screening=0.001, boundary=2, seed=1)
     return parts_of(result, report=COMPLETED, stages=("patches", "composite"))
 
 
@@ -219,7 +219,7 @@ def complete_with_a_source() -> Parts:
 
 def designed(name: str, seed: int) -> texrs.Synthesis:
     """Return a texture with turned and mirrored elements, seams and all."""
-    return texrs.design(colour(name, 96, 96, seed=seed), (112, 128), seed=seed, blend=None, tiles=2)
+    return texrs.design(colour(name, 96, 96, seed=seed), (112, 128), seed=seed, screening=None, tiles=2)
 
 
 @case

@@ -27,7 +27,6 @@ from texrs.source_map import Finish, SourceMap
 
 APPLIED = Options(
     apply,
-    names={"finish.screening": "blend"},
     leave={
         "source": "it is an argument",
         "exemplars": "they are arguments, as many as wanted",
@@ -56,7 +55,7 @@ def apply_command(
     values = APPLIED.read(given, which=lambda o: not o.file)
     places = SourceMap.load(source)
     if given["finish_screening"] and places.axes != 2:
-        raise InvalidInput("--blend: is for pictures; the source map is that of a volume")
+        raise InvalidInput("--screening: is for pictures; the source map is that of a volume")
     groups = group(maps, len(places.shapes))
     targets = name_targets(groups, out, [source, *maps])
     finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
@@ -100,7 +99,7 @@ def store_map(
     if finish.screening is not None or finish.light is not None or finish.fade is not None:
         raise InvalidInput(
             f"--out: {out} is made in parts, and the seams of this result are blended, which takes all of it at once; "
-            "--blend 0 leaves them as they are, or write to a file"
+            "--screening 0 leaves them as they are, or write to a file"
         )
     read = io.read if places.axes == 2 else io.read_volume
     images = [read(path) for path in paths]
@@ -128,7 +127,7 @@ def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> F
     known = places.finish or Finish((True,) * places.axes)
     fields = {path[1]: value for path, value in values.items() if path[0] == "finish"}
     if "screening" in fields:
-        fields["screening"] = as_float(fields["screening"], "--blend", 0, 1e6) or None
+        fields["screening"] = as_float(fields["screening"], "--screening", 0, 1e6) or None
     if "band" in fields:
         fields["band"] = as_int(fields["band"], "--band", 1, 2**31)
     return replace(known, **fields)

@@ -29,7 +29,9 @@ CELLS = 256
 """Of the index texture along each side."""
 TILED = Options(TileSet, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
 DESIGNED = Options(
-    design_variants, only=("elements", "deformation", "plan", "tiles", "patch", "blend"), names={"elements": "element"}
+    design_variants,
+    only=("elements", "deformation", "plan", "tiles", "patch", "screening"),
+    names={"elements": "element"},
 )
 PANEL = "Larger than memory"
 

@@ -61,7 +61,7 @@ def complete(
     patch: int | None = None,
     boundary: int = 0,
     mirror: bool | None = None,
-    blend: float | None = None,
+    screening: float | None = None,
     wrap: bool | Sequence[bool] | None = None,
     seed: int = 0,
     progress: Progress | bool | None = None,
@@ -72,7 +72,7 @@ def complete(
     ----------
     image : (H, W[, C]) or (D, H, W[, C]) array, or Exemplar
         The picture or the volume, any real dtype, at least 4 pixels or 16 voxels a side. Values in the hole are ignored and
-        may be NaN. A volume takes ``patch``, ``boundary``, ``blend`` and ``seed``; the other options are for pictures.
+        may be NaN. A volume takes ``patch``, ``boundary``, ``screening`` and ``seed``; the other options are for pictures.
     hole : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
         Mask of the pixels to fill, white where it marks. "alpha": all pixels that are not fully opaque. "nan": all pixels
         that are NaN or infinite. "nodata": the value that the file of the image states for pixels without data. A number:
@@ -111,7 +111,7 @@ def complete(
         Whether patches may be mirrored; False for lettered textures. By default along those axes where nothing tells the
         picture beside the hole from its mirror image, as light from one side does; not where there is a scale map: what is
         seen at an angle has an upper side.
-    blend : float, optional
+    screening : float, optional
         Weight of the values, 0 to 1e6, when colours of what is filled are corrected so that seams disappear: the smaller,
         the wider the correction; 0.003 is good for the picture's own colours, less where an ``exemplar`` has other light.
         None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the hole. Volumes:
@@ -130,7 +130,7 @@ def complete(
         The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
         into ``[image, exemplar]``; pixels that are kept map to themselves, and none maps into the hole. To render a
         picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
-        (each in a shade of its own) and ``"composite"``, the result before ``blend``. In the report ``"measured"`` tells of
+        (each in a shade of its own) and ``"composite"``, the result before ``screening``. In the report ``"measured"`` tells of
         a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is; ``"exemplar_measured"``
         the same of the exemplar's. ``"filled"`` is the share of the image that is filled, 0 to 1.
 
@@ -179,7 +179,9 @@ def complete(
         for name in (name for name, given in flat.items() if given):
             raise InvalidInput(f"{name}: is for pictures; leave it out for a volume")
         volume: Any = image
-        return complete_volume(volume, hole, patch=patch, boundary=boundary, blend=blend, seed=seed, progress=progress)
+        return complete_volume(
+            volume, hole, patch=patch, boundary=boundary, screening=screening, seed=seed, progress=progress
+        )
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
     if kind is not None and scale_map is None:
@@ -187,7 +189,7 @@ def complete(
     said = None if kind is None else as_kind(kind)
     if mirror is not None or scale_map is not None:
         mirror = False if mirror is None else as_bool(mirror, "mirror")
-    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
     cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), as_marks(hole)
     picture, marked = find_hole(image.image if isinstance(image, Exemplar) else image, mask, cyclic)
     open_ = widen(marked, mask.feather, cyclic)
@@ -263,7 +265,7 @@ def complete(
         "tried": [[s, round(shown, 3)] for s, shown in made.tried],
         "patches": count,
         "mirror": len(mirrors) > 1,
-        "blend": screening,
+        "screening": screening,
         "wrap": list(cyclic),
     }
     if method == "optimise":

@@ -72,7 +72,7 @@ def complete_volume(
     *,
     patch: int | None,
     boundary: int,
-    blend: float | None,
+    screening: float | None,
     seed: int,
     progress: Progress | None,
 ) -> Synthesis:
@@ -80,7 +80,7 @@ def complete_volume(
     volume, hole_ = check_volume(image.image if isinstance(image, Exemplar) else image, hole)
     shape, labels = hole_.shape, image._labels if isinstance(image, Exemplar) else None
     width, number = as_int(boundary, "boundary", 0, 1024), as_seed(seed)
-    weight = None if blend is None else as_float(blend, "blend", 0, 1e6)
+    weight = None if screening is None else as_float(screening, "screening", 0, 1e6)
     side = None if patch is None else as_int(patch, "patch", 6, min(shape))
     watch = progress or (lambda stage, share: None)
     watch("complete", 0.0)
@@ -106,7 +106,7 @@ def complete_volume(
         result = composite
         weight = (0.0 if labelled else BLEND) if weight is None else weight
         if weight and labelled:
-            raise InvalidInput("blend: labels cannot be mixed; leave it out, or pass 0")
+            raise InvalidInput("screening: labels cannot be mixed; leave it out, or pass 0")
         if weight:
             result = composite.copy()
             result[part] = correct_seams(composite[part], hole_[part], new, places, weight, watch)
@@ -125,7 +125,7 @@ def complete_volume(
         "patches": count,
         "seams": round(seams, 6),
         "labels": labelled,
-        "blend": weight or 0.0,
+        "screening": weight or 0.0,
     }
     stages = {"known": bare, "patches": shades, "composite": composite}
     finished = source.finished((False,) * 3, interpolation="nearest")

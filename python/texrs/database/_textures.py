@@ -57,7 +57,7 @@ class SpliceOptions(TypedDict, total=False):
     nets: bool | None
     turns: bool | None
     refine: bool
-    blend: float | None
+    screening: float | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -348,7 +348,7 @@ class TextureDatabase:
             Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``blend``.
+            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``screening``.
 
         Returns
         -------
@@ -402,7 +402,7 @@ class TextureDatabase:
             Called as ``progress("matrix", share)``; raising stops the work. True shows a bar.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``blend``.
+            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``screening``.
 
         Returns
         -------

@@ -72,7 +72,7 @@ def tile(
     wrap: bool | Sequence[bool] | None = None,
     size: int | Sequence[int] | None = None,
     overlap: int | Sequence[int] | None = None,
-    blend: float | None = None,
+    screening: float | None = None,
     flatten: bool | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -93,7 +93,7 @@ def tile(
     overlap : int or (rows, columns), optional
         How many pixels of two opposite edges are laid over each other, 1 to half the side, instead of a size. By
         default what shows least.
-    blend : float, optional
+    screening : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear: the smaller, the wider the
         correction. None or 0: no correction, so that each pixel is one of the picture. See `texrs.blend`.
     flatten : bool, optional
@@ -110,8 +110,8 @@ def tile(
         The image, in the dtype and with the channels of the picture; an axis that does not wrap keeps its length, or that
         much of its middle that was asked for. The stages are ``"swapped"`` (the halves
         exchanged, nothing cut yet), ``"pieces"`` (which part of the picture each pixel is from) and ``"composite"``, the
-        result before ``blend``. The report contains for each axis the overlap, 0 if the ends are covered, the number of joints
-        that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles. ``in_place`` is
+        result before colours are corrected. The report contains for each axis the overlap, 0 if the ends are covered, the number of
+        joints that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles. ``in_place`` is
         the share of the pixels that are those of the picture at the same place. ``resized`` is the reason for another size,
         and ``tiling`` is what `texrs.check_tiling` finds in the result.
 
@@ -141,7 +141,10 @@ def tile(
     cyclic = as_wrap(wrap, usual=True)
     pixels = as_image(given.base, "image") if isinstance(given, Material) else given.pixels
     rows, columns = pixels.shape[:2]
-    wanted, weight = as_sides(size, (rows, columns), cyclic), as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    wanted, weight = (
+        as_sides(size, (rows, columns), cyclic),
+        as_float(0.0 if screening is None else screening, "screening", 0, 1e6),
+    )
     choices = as_choices(overlap, size is None, (rows, columns), wanted, cyclic)
     check_work("tile", [pixels], wanted, "image" if size is None else "size", way=LARGER)
     evened = None if flatten is None else as_bool(flatten, "flatten")
@@ -163,7 +166,7 @@ def tile(
             size=wanted,
             choices=choices,
             already=already,
-            blend=weight,
+            screening=weight,
             flatten=evened,
             progress=listen(progress),
         )
@@ -181,7 +184,7 @@ def join_edges(
     size: tuple[int, int],
     choices: Sequence[Choice],
     already: Sequence[int],
-    blend: float,
+    screening: float,
     flatten: bool,
     progress: Progress | None,
 ) -> Synthesis:
@@ -200,7 +203,7 @@ def join_edges(
         source = extend(exemplar.guidance, size, wrap, watch)
     else:
         source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, watch)
-    weight = blend if found or larger else 0.0
+    weight = screening if found or larger else 0.0
     source = source.finished(wrap, screening=weight or None, flatten=flatten)
     composite = source.render(exemplar.image)
     # The picture is in even light already.
@@ -216,7 +219,7 @@ def join_edges(
         "method": "tile" if found or source.shape == shape else "quilt",
         "size": list(source.shape),
         "wrap": list(wrap),
-        "blend": weight,
+        "screening": weight,
         "flatten": flatten,
         "already": [AXES[a] for a in already],
         "resized": reasons,
@@ -228,11 +231,11 @@ def join_edges(
     return Synthesis(result, source, stages, report)
 
 
-def keeps_colours(image: Array | Exemplar | Material, blend: float) -> bool:
+def keeps_colours(image: Array | Exemplar | Material, screening: float) -> bool:
     """Return whether a result has no other colours than the picture, which is then never in another light."""
     if isinstance(image, Material):
         return has_few_colours(np.asarray(image.base))
-    return find_palette({"image": image, "blend": blend}, ("image",), {}) is not None
+    return find_palette({"image": image, "screening": screening}, ("image",), {}) is not None
 
 
 def measure_kept_places(source: SourceMap) -> float:

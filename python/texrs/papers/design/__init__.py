@@ -89,7 +89,7 @@ def design(
     plan: Choice = "auto",
     tiles: int = 4,
     patch: int | None = None,
-    blend: float | None = SCREENING,
+    screening: float | None = SCREENING,
     method: Method = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -127,7 +127,7 @@ def design(
     patch : int, optional
         Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
         default.
-    blend : float, optional
+    screening : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear (section 3.6): the smaller, the
         wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
         of several exemplars with ``across=False``.
@@ -135,7 +135,7 @@ def design(
         "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
         by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
         match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
-        and ``mirror`` of their deformation play no part, nor does the amount of ``blend``.
+        and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
     progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
         True shows a bar.
@@ -199,7 +199,7 @@ def design(
         plan=plan,
         tiles=tiles,
         patch=patch,
-        blend=blend,
+        screening=screening,
         method=method,
         progress=progress,
     )
@@ -221,7 +221,7 @@ def design_variants(
     plan: Choice = "auto",
     tiles: int = 4,
     patch: int | None = None,
-    blend: float | None = SCREENING,
+    screening: float | None = SCREENING,
     method: Method = None,
     progress: Progress | bool | None = None,
 ) -> Iterator[Synthesis]:
@@ -264,7 +264,7 @@ def design_variants(
     patch : int, optional
         Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
         default.
-    blend : float, optional
+    screening : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear (section 3.6): the smaller, the
         wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
         of several exemplars with ``across=False``.
@@ -272,7 +272,7 @@ def design_variants(
         "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
         by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
         match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
-        and ``mirror`` of their deformation play no part, nor does the amount of ``blend``.
+        and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
     progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
         True shows a bar.
@@ -312,7 +312,7 @@ def design_variants(
         plan=plan,
         tiles=tiles,
         patch=patch,
-        blend=blend,
+        screening=screening,
         method=method,
         progress=progress,
     )

@@ -94,7 +94,7 @@ def check_arguments(
     plan: Choice,
     tiles: int,
     patch: int | None,
-    blend: float | None,
+    screening: float | None,
     method: Method,
     progress: Progress | None,
 ) -> Arguments:
@@ -128,7 +128,7 @@ def check_arguments(
         plan,
         as_int(tiles, "tiles", 1, 64),
         None if patch is None else as_int(patch, "patch", 4, min(min(e.shape) for e in exemplars)),
-        as_float(0.0 if blend is None else blend, "blend", 0, 1e6),
+        as_float(0.0 if screening is None else screening, "screening", 0, 1e6),
         method == "paper",
         progress or (lambda stage, share: None),
     )

@@ -68,7 +68,7 @@ def describe(
         "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
         "density": None if arguments.density is None else describe_density(plans, composite, arguments.density),
         "holes": [t.holes for t in tiles],
-        "blend": arguments.screening,
+        "screening": arguments.screening,
         "seams": seams,
         "operations": [t.log for t in tiles],
     }

@@ -117,7 +117,7 @@ def splice(
     nets: bool | None = None,
     turns: bool | None = None,
     refine: bool = True,
-    blend: float | None = SCREENING,
+    screening: float | None = SCREENING,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Arrange the elements of one texture as those of another are.
@@ -157,7 +157,7 @@ def splice(
         Whether cells may be turned; by default where nothing tells ``a`` from itself upside down, as light and letters do.
     refine : bool
         Whether to refine what is not rigid; by cells, what is stretched. Nets, and ground between separate elements, need none.
-    blend : float, optional
+    screening : float, optional
         Of separate elements on their ground: weight of the values, 0 to 1e6, when colours are corrected so that the light
         does not change where they meet, see `texrs.blend`; where the texture has a lit side the result has it too, and things
         do not bring the light of their old places. None or 0: no correction, and the picture is the texture looked up through
@@ -190,7 +190,7 @@ def splice(
     >>> from texrs.elements import Elements, Layout
     >>> buttons = Elements.of_sample(texrs.samples.dots((128, 128)))
     >>> stones = Elements.of_sample(texrs.samples.pebbles((128, 128)))
-    >>> result = texrs.splice(buttons, stones, seed=1, blend=None)
+    >>> result = texrs.splice(buttons, stones, seed=1, screening=None)
     >>> row, column = result.source.coordinates[30, 40].astype(int)
     >>> result.image.shape, bool((result.image[30, 40] == buttons.image[row, column]).all())
     ((128, 128, 3), True)
@@ -198,7 +198,7 @@ def splice(
     """
     progress = listen(progress)
     as_method(method, None, "paper", "preview")
-    number, part, screening = as_seed(seed), as_float(strength, "strength", 0, 1), _as_screening(blend)
+    number, part, screening = as_seed(seed), as_float(strength, "strength", 0, 1), _as_screening(screening)
     enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
     turned = enlarged is None if align is None else as_bool(align, "align")
     if enlarged is not None and method == "paper":
@@ -280,7 +280,7 @@ def self_splice(
     seed: int = 0,
     method: Method = None,
     refine: bool = True,
-    blend: float | None = SCREENING,
+    screening: float | None = SCREENING,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Edit the layout of a texture's own elements (Figure 9).
@@ -309,7 +309,7 @@ def self_splice(
         where these go; nothing is kept rigid or filled.
     refine : bool
         Whether to refine what is deformed: connected figures, and separate elements that show too little of their ground.
-    blend : float, optional
+    screening : float, optional
         Of separate elements on their ground: weight of the values, 0 to 1e6, when the colours of what changed are corrected
         so that the light does not change where things meet, as in `splice`. All else keeps its values. None or 0: no
         correction.
@@ -350,12 +350,18 @@ def self_splice(
     progress = listen(progress)
     as_method(method, None, "paper", "preview")
     asked, number = None if size is None else as_size(size, minimum=16), as_seed(seed)
-    steps, screening = as_steps(() if edit is None else edit, number), _as_screening(blend)
+    steps, screening = as_steps(() if edit is None else edit, number), _as_screening(screening)
     watch = progress or (lambda stage, share: None)
     mine = as_elements(a, "a", watch)
     check_work("self_splice", [mine.image], asked or mine.mask.shape, "a" if asked is None else "size")
     if asked is not None and asked != mine.mask.shape:
-        rest: dict[str, Any] = {"seed": number, "method": method, "refine": refine, "blend": blend, "progress": watch}
+        rest: dict[str, Any] = {
+            "seed": number,
+            "method": method,
+            "refine": refine,
+            "screening": screening,
+            "progress": watch,
+        }
         inside = all(n <= m for n, m in zip(asked, mine.mask.shape, strict=True))
         resized = crop(mine, asked) if inside else splice(mine, mine, asked, align=False, **rest)
         entry = read_elements(mine, resized)
@@ -381,8 +387,8 @@ def self_splice(
     return replace(result, report={**result.report, "edit": steps})
 
 
-def _as_screening(blend: object) -> float:
-    return as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+def _as_screening(screening: object) -> float:
+    return as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
 
 
 def _synthesize(
