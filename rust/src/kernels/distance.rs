@@ -1,8 +1,9 @@
 //! Signed distances to the outlines of labelled pieces of an image.
 //!
-//! Meijster, Roerdink and Hesselink, *A general algorithm for computing distance transforms in linear time*, ISMM 2000: the
-//! nearest mark along each column, then the lower envelope of parabolas along each row. Squares are whole numbers, so the
-//! distances are exact.
+//! Meijster, Roerdink and Hesselink, *A general algorithm for computing distance transforms in
+//! linear time*, ISMM 2000. The method finds the nearest mark along each column, then the lower
+//! envelope of parabolas along each row. Squared distances are integers, so the distances are
+//! exact.
 
 use crate::foundation::error::check_shape;
 use crate::foundation::memory;
@@ -12,22 +13,26 @@ use crate::{Error, Result};
 /// A piece of a label image, and the window around it.
 #[derive(Debug, Clone, Copy)]
 pub struct Piece {
-    /// Its label.
+    /// Label of the piece.
     pub label: i32,
-    /// The first pixel of the window; the window may reach beyond the image, whose edge then goes on.
+    /// First pixel of the window. The window may extend beyond the image, whose edge pixels are
+    /// then repeated.
     pub low: [i64; 2],
     /// Rows and columns of the window.
     pub shape: [usize; 2],
 }
 
-/// Most pixels of a window along an axis: squares of distances stay whole numbers.
+/// Maximum number of pixels of a window along an axis. Squares of distances then fit integers
+/// exactly.
 const MOST: usize = 1 << 20;
 
-/// For each piece, the distance in pixels of each pixel of its window to the nearest one on the other side of its outline,
-/// negative outside; `None` where the window has but one side.
+/// Returns the signed distances of each piece's window: from each pixel to the nearest pixel across
+/// the outline, in pixels. Distances are negative outside the piece. The result is `None` if the
+/// window contains only one side.
 ///
 /// # Errors
-/// A label image that does not fit its shape, empty or very large windows, or a monitor that was cancelled.
+/// The label image does not fit its shape, a window is empty or too large, or the monitor was
+/// cancelled.
 pub fn outlines(
     labels: &[i32],
     shape: [usize; 2],
@@ -62,7 +67,7 @@ pub fn outlines(
     .collect()
 }
 
-/// Which pixels of a window are of the piece.
+/// Returns the flags of the window pixels that belong to the piece.
 fn cut_out(labels: &[i32], shape: [usize; 2], piece: &Piece) -> Vec<bool> {
     let bring = |axis: usize, i: usize| {
         let at = piece.low[axis].saturating_add(i as i64);
@@ -76,7 +81,8 @@ fn cut_out(labels: &[i32], shape: [usize; 2], piece: &Piece) -> Vec<bool> {
     mine
 }
 
-/// Signed distances of the pixels of a window; `None` where all or none is marked.
+/// Returns the signed distances of the pixels of a window, or `None` if all or no pixels are
+/// marked.
 fn measure(mine: &[bool], shape: [usize; 2]) -> Option<Vec<f32>> {
     if mine.iter().all(|m| *m) || !mine.contains(&true) {
         return None;
@@ -92,9 +98,9 @@ fn measure(mine: &[bool], shape: [usize; 2]) -> Option<Vec<f32>> {
     Some(mine.iter().zip(&inner).zip(&outer).map(signed).collect())
 }
 
-/// Squared distance of each pixel to the nearest one that is marked as `mark` says.
+/// Returns the squared distance of each pixel to the nearest pixel whose flag equals `mark`.
 fn squares(mine: &[bool], [rows, columns]: [usize; 2], mark: bool) -> Vec<i64> {
-    // Farther than any mark.
+    // Value larger than any distance to a mark.
     let far = (rows + columns) as i64;
     let mut along = vec![far; mine.len()];
     for row in 0..rows {
@@ -115,6 +121,7 @@ fn squares(mine: &[bool], [rows, columns]: [usize; 2], mark: bool) -> Vec<i64> {
             along[i] = along[i].min(along[i + columns] + 1);
         }
     }
+    // Combine the distances along columns into distances in the plane, row by row.
     let mut envelope = Envelope::default();
     for row in along.chunks_exact_mut(columns) {
         envelope.lower(row);
@@ -122,16 +129,16 @@ fn squares(mine: &[bool], [rows, columns]: [usize; 2], mark: bool) -> Vec<i64> {
     along
 }
 
-/// The parabolas of a row that are the least somewhere.
+/// The parabolas of a row that are lowest somewhere.
 #[derive(Default)]
 struct Envelope {
     heights: Vec<i64>,
-    /// The middle of each, and from where on it is the least.
+    /// The vertex of each parabola, and the first position where it is lowest.
     parts: Vec<(i64, i64)>,
 }
 
 impl Envelope {
-    /// Replaces distances along columns by the squares of the least distances.
+    /// Replaces distances along columns by squared distances in the plane.
     fn lower(&mut self, row: &mut [i64]) {
         self.heights.clear();
         self.heights.extend(row.iter().map(|g| g * g));
@@ -139,6 +146,8 @@ impl Envelope {
         let value = |x: i64, middle: i64| (x - middle) * (x - middle) + heights[middle as usize];
         parts.clear();
         parts.push((0, 0));
+        // Build the envelope from left to right. A parabola that is above the new one at its own
+        // start is removed.
         for u in 1..row.len() as i64 {
             while let Some(&(middle, from)) = parts.last() {
                 if value(from, middle) <= value(from, u) {
@@ -149,7 +158,7 @@ impl Envelope {
             match parts.last() {
                 None => parts.push((u, 0)),
                 Some(&(middle, _)) => {
-                    // The last place at which the one before is not the worse.
+                    // Last position where the previous parabola is not higher.
                     let (a, b) = (heights[middle as usize], heights[u as usize]);
                     let until = (u * u - middle * middle + b - a).div_euclid(2 * (u - middle));
                     if until + 1 < row.len() as i64 {
@@ -158,6 +167,7 @@ impl Envelope {
                 }
             }
         }
+        // Read the envelope from right to left.
         for x in (0..row.len()).rev() {
             while let Some(&(_, from)) = parts.last()
                 && from > x as i64

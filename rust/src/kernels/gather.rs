@@ -1,26 +1,29 @@
-//! Exemplars looked up through coordinates: the last step of every synthesis.
+//! Lookup of exemplars through coordinates: the last step of every synthesis.
 //!
-//! Any scalar type, any number of channels, two or three axes. A coordinate that falls on a sample gives that sample,
-//! bit for bit, whatever the interpolation; between samples the sum runs in `f64` in a fixed order. The cubic kernel
-//! (Catmull-Rom: Keys, *Cubic convolution interpolation*, IEEE ASSP 1981, a = -1/2) is clipped to the range of its taps,
-//! so that it neither rings nor leaves the range of the data, high dynamic range included.
+//! Exemplars have any scalar type, any number of channels, and two or three axes. A coordinate on a
+//! sample returns this sample bit for bit, with any interpolation. Between samples the sum runs in
+//! `f64` in a fixed order.
+//!
+//! The cubic kernel (Catmull-Rom: Keys, *Cubic convolution interpolation*, IEEE ASSP 1981, a =
+//! -1/2) is clipped to the range of its taps. It therefore neither rings nor leaves the range of
+//! the data, including high dynamic range.
 
 use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Output pixels a task takes at a time: so many need no pool.
+/// Number of output pixels of a task. A call with at most this many pixels needs no thread pool.
 pub const CHUNK: usize = 4096;
 
-/// How values between samples are made.
+/// Interpolation between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interpolation {
-    /// The nearest sample; half-way goes to the higher one.
+    /// The nearest sample. Ties round up.
     Nearest,
-    /// Multilinear.
+    /// Multilinear interpolation.
     Linear,
-    /// Catmull-Rom, clipped to the range of its taps.
+    /// Catmull-Rom interpolation, clipped to the range of its taps.
     Cubic,
 }
 
@@ -28,11 +31,11 @@ mod sealed {
     pub trait Sealed {}
 }
 
-/// A scalar that images are made of.
+/// A scalar type of images.
 pub trait Element: Copy + Send + Sync + Default + sealed::Sealed {
-    /// Its value.
+    /// Returns the value as `f64`.
     fn to_f64(self) -> f64;
-    /// The nearest representable value.
+    /// Returns the nearest representable value.
     fn from_f64(value: f64) -> Self;
 }
 
@@ -42,7 +45,8 @@ macro_rules! integer_elements {
         impl Element for $t {
             fn to_f64(self) -> f64 { f64::from(self) }
             fn from_f64(value: f64) -> Self {
-                // A cast goes towards zero; `f64::floor` is a call where the CPU is not known to have it.
+                // A cast rounds towards zero, so correct it for negative values. `f64::floor` would
+                // be a function call on CPUs that may lack the instruction.
                 let above = value + 0.5;
                 let cast = above as $t;
                 if f64::from(cast) > above { cast.saturating_sub(1) } else { cast }
@@ -63,7 +67,7 @@ macro_rules! float_elements {
 }
 float_elements!(f32, f64);
 
-/// One exemplar: samples in row-major order, channels last.
+/// An exemplar: samples in row-major order, channels last.
 #[derive(Debug, Clone, Copy)]
 pub struct Exemplar<'a, T, const D: usize> {
     data: &'a [T],
@@ -72,7 +76,7 @@ pub struct Exemplar<'a, T, const D: usize> {
 }
 
 impl<'a, T, const D: usize> Exemplar<'a, T, D> {
-    /// A view of `grid.len() * channels` samples.
+    /// Returns a view of `grid.len() * channels` samples.
     pub fn new(data: &'a [T], grid: Grid<D>, channels: usize) -> Result<Self> {
         check_shape("exemplar", &[grid.len(), channels], data.len())?;
         Ok(Self {
@@ -89,8 +93,9 @@ impl<'a, T, const D: usize> Exemplar<'a, T, D> {
 
 /// Fills `out` (pixels x channels) with `exemplars[which[p]]` at `coordinates[p]`.
 ///
-/// `which` may be empty when there is one exemplar. Coordinates are in samples, in axis order, with sample centres at the
-/// integers; beyond an edge the exemplar wraps or repeats its edge, as its grid says.
+/// `which` may be empty if there is only one exemplar. Coordinates are in samples, in axis order,
+/// with sample centres at integers. Beyond an edge the exemplar wraps or repeats its edge,
+/// depending on its grid.
 pub fn gather<T: Element, const D: usize>(
     exemplars: &[Exemplar<'_, T, D>],
     which: &[u16],
@@ -99,6 +104,7 @@ pub fn gather<T: Element, const D: usize>(
     out: &mut [T],
     monitor: &Monitor,
 ) -> Result<()> {
+    // Check the arguments.
     let channels = exemplars
         .first()
         .ok_or_else(|| Error::value("exemplars", "at least one is needed, got none"))?
@@ -133,6 +139,7 @@ pub fn gather<T: Element, const D: usize>(
     if channels == 0 {
         return Ok(());
     }
+    // Look up chunks of pixels in parallel.
     monitor.expect(coordinates.len() as u64);
     par::chunks_mut(out, CHUNK * channels, |chunk, out| {
         let first = chunk * CHUNK;
@@ -155,10 +162,10 @@ pub fn gather<T: Element, const D: usize>(
     monitor.check()
 }
 
-/// Samples around one coordinate at most: four along each of three axes.
+/// Maximum number of samples around a coordinate: four along each of three axes.
 const MOST: usize = 64;
 
-/// The places and weights of the samples around one coordinate.
+/// Positions and weights of the samples around a coordinate.
 struct Taps {
     at: [(usize, f64); MOST],
 }
@@ -172,8 +179,8 @@ impl Default for Taps {
 }
 
 impl Taps {
-    /// Lays `W` taps along each axis, of which the first is so far from where the coordinate is rounded down to; returns how
-    /// many there are. That `W` is known lets loops be unrolled.
+    /// Sets `W` taps along each axis, starting at offset `first` from the rounded-down coordinate,
+    /// and returns the number of taps. `W` is a constant so that loops can be unrolled.
     #[inline(always)]
     fn lay<const D: usize, const W: usize>(
         &mut self,
@@ -187,12 +194,13 @@ impl Taps {
         self.at[0] = (0, 1.0);
         for axis in 0..D {
             let base = floor(f64::from(at[axis]));
-            // Beyond what can be counted the base is not below it.
+            // For coordinates beyond the range of `isize` the base is saturated, so clamp the
+            // fraction.
             let weights = weigh((f64::from(at[axis]) - base as f64).clamp(0.0, 1.0));
             let places: [usize; W] = std::array::from_fn(|k| {
                 grid.resolve(axis, base.saturating_add(first + k as isize)) * strides[axis]
             });
-            // From behind, so that what there is is read before it is replaced.
+            // Iterate backwards, so that each tap is read before it is overwritten.
             for k in (0..W).rev() {
                 for tap in 0..count {
                     let (index, so_far) = self.at[tap];
@@ -205,10 +213,10 @@ impl Taps {
     }
 }
 
-/// From here on every `f32` is whole.
+/// Every `f32` of at least this size is an integer.
 const WHOLE: f32 = (1 << 23) as f32;
 
-/// The largest integer that is not above a number; a call of `f64::floor` costs more.
+/// Returns the largest integer that is not above a number. A call of `f64::floor` costs more.
 #[inline(always)]
 fn floor(x: f64) -> isize {
     let cast = x as isize;
@@ -225,6 +233,7 @@ fn look_up<T: Element, const D: usize>(
 ) {
     let grid = &exemplar.grid;
     let whole = |x: &f32| (*x as i32) as f32 == *x || x.abs() >= WHOLE;
+    // A coordinate on a sample copies this sample.
     if interpolation == Interpolation::Nearest || at.iter().all(whole) {
         let mut point = [0; D];
         for axis in 0..D {
@@ -239,6 +248,7 @@ fn look_up<T: Element, const D: usize>(
     } else {
         taps.lay(grid, at, 0, |t| [1.0 - t, t])
     };
+    // Common channel counts are compiled separately, so that their loops unroll.
     let (taps, n) = (&taps.at[..count], exemplar.channels);
     match n {
         3 => weighted::<T, 3>(exemplar.data, n, taps, clip, out),
@@ -251,7 +261,7 @@ fn look_up<T: Element, const D: usize>(
     }
 }
 
-/// Weighted sums of `C` channels of pixels that lie `stride` samples apart.
+/// Computes weighted sums of `C` channels of pixels that are `stride` samples apart.
 #[inline(always)]
 fn weighted<T: Element, const C: usize>(
     data: &[T],
@@ -261,7 +271,7 @@ fn weighted<T: Element, const C: usize>(
     out: &mut [T],
 ) {
     let (mut sum, mut low, mut high) = ([0.0; C], [f64::INFINITY; C], [f64::NEG_INFINITY; C]);
-    // A tap without weight must not spread its infinity.
+    // Skip taps with weight 0, because 0 times infinity would be NaN.
     for &(index, weight) in taps.iter().filter(|tap| tap.1 != 0.0) {
         for (c, sample) in data[index * stride..][..C].iter().enumerate() {
             let sample = sample.to_f64();
@@ -271,7 +281,7 @@ fn weighted<T: Element, const C: usize>(
         }
     }
     for (c, value) in out.iter_mut().enumerate() {
-        // By comparisons, for NaN has no range: it stays what it is.
+        // Use comparisons instead of `clamp`, so that NaN stays NaN.
         *value = T::from_f64(if clip && sum[c] < low[c] {
             low[c]
         } else if clip && sum[c] > high[c] {
@@ -340,7 +350,8 @@ mod tests {
         let data = [1.0f32, 2.0, 4.0, 8.0];
         for how in [Interpolation::Linear, Interpolation::Cubic] {
             for (far, row) in [(3e38, [4.0, 8.0]), (-3e38, [1.0, 2.0]), (1e19, [4.0, 8.0])] {
-                // One axis between samples, the other where a row cannot be told from the next.
+                // One coordinate is between samples; the other is so large that a row cannot be
+                // distinguished from the next.
                 let found = at(&data, [2, 2], false, [far, 0.5], how);
                 assert!((row[0]..=row[1]).contains(&found), "{found} at {far}");
             }

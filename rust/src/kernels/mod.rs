@@ -1,4 +1,5 @@
-//! Nouns of the literature, each usable by itself; none knows a paper that uses it.
+//! Algorithms of the literature. Each can be used on its own and does not depend on the methods
+//! that use it.
 
 pub mod complete;
 pub mod distance;

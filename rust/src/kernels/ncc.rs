@@ -1,26 +1,29 @@
-//! Normalised cross-correlation: how alike a template and each window of an image are, whatever their brightness and
-//! contrast.
+//! Normalised cross-correlation: similarity of a template and each window of an image, independent
+//! of brightness and contrast.
 //!
 //! Lewis, *Fast normalized cross-correlation*, Vision Interface 1995:
 //!
 //! 1. the numerator is a product of spectra;
 //! 2. mean and variance of each window come from running sums.
 //!
-//! Departures: the template is centred, so the numerator needs no mean of the window; a window (or a template) without
-//! variance correlates with nothing, instead of dividing by zero; everything is f64 and the answer is rounded to 20
-//! bits, so that what a threshold decides hangs on no transform's last bits.
+//! Departures from the paper:
+//!
+//! - The template is centred, so the numerator does not need the mean of the window.
+//! - A window or template without variance has correlation 0 instead of dividing by zero.
+//! - All arithmetic is f64, and results are rounded to 20 bits. A threshold on them then does not
+//!   depend on the last bits of a transform.
 
 use crate::foundation::fft::{Complex, Images, Scratch};
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Variance of a window, as a share of its channel's, below which it shows nothing.
+/// Variance of a window, relative to that of its channel, below which the window counts as flat.
 const FLAT: f64 = 1e-9;
-/// Steps of a correlation's unit that answers are rounded to.
+/// Number of steps per unit of correlation. Results are rounded to these steps.
 const STEPS: f64 = (1 << 20) as f64;
 
-/// The channels of an image, made ready to be compared with many templates.
+/// The channels of an image, prepared for correlation with many templates.
 pub struct Correlation {
     shape: [usize; 2],
     plan: Images<f64>,
@@ -35,7 +38,7 @@ struct Channel {
 }
 
 impl Correlation {
-    /// Of `image`, planar: one channel of `shape` after the other.
+    /// Prepares a planar `image`, whose channels of `shape` follow each other.
     pub fn new(image: &[f32], shape: [usize; 2]) -> Result<Self> {
         let points = shape[0] * shape[1];
         if points == 0 || image.is_empty() || !image.len().is_multiple_of(points) {
@@ -47,12 +50,14 @@ impl Correlation {
         }
         finite(image, "image")?;
         memory::room("the correlation", image.len(), 48)?;
-        // Windows that lie inside the image meet nothing of what comes round, so its own size is enough.
+        // A transform of the image's own size is enough, because windows inside the image do not
+        // reach wrapped samples.
         let plan = Images::new(shape.map(quick));
         let channels = par::map(image.len() / points, |c| {
             let values = &image[c * points..][..points];
             let mean = mean(values);
-            // All the same: no rounding of the mean may look like a pattern.
+            // Subtract the exact value from a constant channel, so that rounding of the mean cannot
+            // look like a signal.
             let same = values.iter().all(|&x| x == values[0]);
             let centre = if same { f64::from(values[0]) } else { mean };
             let centred: Vec<f64> = values.iter().map(|&x| f64::from(x) - centre).collect();
@@ -74,9 +79,11 @@ impl Correlation {
         self.channels.len()
     }
 
-    /// Correlation of each channel's windows with its part of `template`, planar, of `shape`.
+    /// Returns the correlation of the windows of each channel with the same channel of a planar
+    /// `template` of `shape`.
     ///
-    /// Planar too: for each channel one value for each of the template's positions inside the image, -1 to 1.
+    /// The result is planar: for each channel, one value from -1 to 1 for each position of the
+    /// template inside the image.
     pub fn maps(&self, template: &[f32], shape: [usize; 2], monitor: &Monitor) -> Result<Vec<f32>> {
         let points = shape[0] * shape[1];
         if points == 0 || template.len() != points * self.channels.len() {
@@ -95,6 +102,7 @@ impl Correlation {
         finite(template, "template")?;
         let image = self.shape[0] * self.shape[1] * self.channels.len();
         memory::room("the correlation", image, 40)?;
+        // Correlate the channels in parallel.
         monitor.expect(self.channels.len() as u64);
         let maps = par::map(self.channels.len(), |c| {
             monitor.check()?;
@@ -120,6 +128,7 @@ impl Correlation {
         if energy <= flat * points {
             return vec![0.0; valid[0] * valid[1]];
         }
+        // The product of the spectra gives the numerators of all windows.
         let mut scratch = Scratch::default();
         let mut product = spectrum(&self.plan, template, shape[1], &mut scratch);
         for (t, s) in product.iter_mut().zip(&channel.spectrum) {
@@ -131,6 +140,7 @@ impl Correlation {
         let take = |row: usize, line: &[f64]| {
             let [above, below] = [row, row + shape[0]].map(|r| &channel.sums[r * width..][..width]);
             for (column, &numerator) in line[..valid[1]].iter().enumerate() {
+                // Running sums give the variance of each window.
                 let end = column + shape[1];
                 let [sum, squares] = [0, 1]
                     .map(|k| below[end][k] - below[column][k] - above[end][k] + above[column][k]);
@@ -160,7 +170,8 @@ fn mean(values: &[f32]) -> f64 {
     values.iter().map(|&x| f64::from(x)).sum::<f64>() / values.len() as f64
 }
 
-/// One line and one column more than the values: sums over all that lies before.
+/// Returns sums over all values above and left of each corner: one row and one column more than the
+/// values.
 fn running(values: &[f64], shape: [usize; 2]) -> Vec<[f64; 2]> {
     let width = shape[1] + 1;
     let mut sums = vec![[0.0; 2]; (shape[0] + 1) * width];
@@ -191,7 +202,7 @@ fn spectrum(
     spectrum
 }
 
-/// The next even length of factors 2, 3 and 5.
+/// Returns the next even length whose prime factors are 2, 3 and 5.
 fn quick(n: usize) -> usize {
     let mut length = n.next_multiple_of(2);
     loop {
@@ -220,7 +231,7 @@ mod tests {
             .collect()
     }
 
-    /// By definition: the correlation coefficient of a window and the template.
+    /// Correlation coefficient of a window and the template, by definition.
     fn direct(
         image: &[f32],
         width: usize,

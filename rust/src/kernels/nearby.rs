@@ -1,7 +1,8 @@
-//! Sums over what lies near by, of values at few points of an image: under a separable window, and without a pass over the
-//! image as a whole.
+//! Windowed sums of values that are given at a few points of an image, under a separable window,
+//! without a pass over the whole image.
 //!
-//! Each point adds to those above and below it, and takes what was added beside it. Sums run in `f64`, the farthest first.
+//! Each point adds its value to the pixels above and below it, and then sums the pixels left and
+//! right of it. Sums run in `f64`, the farthest values first.
 
 use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
@@ -9,14 +10,16 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Points that a task takes at a time.
+/// Number of points of a task.
 const CHUNK: usize = 4096;
 
-/// For each point (row, column), the sum of the values of all, weighed by `window` by how far their rows and columns are
-/// from its own: `window[k]` is what those count that are `k` away, and none does that is further.
+/// Returns a sum of the values of all points for each point (row, column). The weight of a value is
+/// the product of `window[k]` for the distance k in rows and the same for columns. Distances beyond
+/// the window have weight 0.
 ///
 /// # Errors
-/// Other than one value a point, points outside of the image, images too large to be counted, or a monitor that was cancelled.
+/// `points` and `values` differ in number, a point is outside the image, the number of pixels
+/// overflows, or the monitor was cancelled.
 pub fn sums(
     points: &[[i64; 2]],
     values: &[f32],
@@ -34,7 +37,7 @@ pub fn sums(
             format!("all must lie in an image of {shape:?} pixels"),
         ));
     }
-    // What reaches beyond an edge lands on the other side, or on a margin that nothing lies in.
+    // Pixels beyond an edge are on the other side if the image wraps, else in an empty margin.
     let reach = window.len().saturating_sub(1);
     let margin = if cyclic { 0 } else { reach };
     let [height, width] = image.shape().map(|n| n + 2 * margin);
@@ -46,6 +49,7 @@ pub fn sums(
         return memory::filled("sums", 0.0, points.len());
     }
 
+    // Add the values along columns.
     let mut added = memory::filled("sums", 0.0f64, size)?;
     for (far, step) in steps(reach) {
         monitor.check()?;
@@ -54,11 +58,12 @@ pub fn sums(
             added[at] += window[far] * f64::from(value);
         }
     }
+    // Sum along rows, in parallel over the points.
     let mut found = memory::filled("sums", 0.0f32, points.len())?;
     par::chunks_mut(&mut found, CHUNK, |chunk, sums| {
         for (sum, &[row, column]) in sums.iter_mut().zip(&points[chunk * CHUNK..]) {
             let line = around(row, 0, height) * width;
-            // As many digits as what is summed up has.
+            // Round to the precision of the summed values.
             let look = |step| f64::from(added[line + around(column, step, width)] as f32);
             let beside = |far: usize| (look(-(far as i64)) + look(far as i64)) * window[far];
             *sum = (1..=reach)
@@ -69,7 +74,8 @@ pub fn sums(
     Ok(found)
 }
 
-/// Distances and the steps that go so far: none first, then the farthest both ways.
+/// Returns distances and steps: zero first, then from the farthest to the nearest in both
+/// directions.
 fn steps(reach: usize) -> impl Iterator<Item = (usize, i64)> {
     let both = |far: usize| [(far, -(far as i64)), (far, far as i64)];
     std::iter::once((0, 0)).chain((1..=reach).rev().flat_map(both))
@@ -90,7 +96,7 @@ mod tests {
             let points: Vec<_> = (0..rows * columns).filter(|&i| marks[i] > 0).map(at).collect();
             let values: Vec<f32> = (0..points.len()).map(|k| k as f32 - 3.0).collect();
             let got = sums(&points, &values, [rows, columns], cyclic, &window, &Monitor::default()).unwrap();
-            // However often around a small image that goes on.
+            // A small image is counted as often as the window wraps around it.
             let weight = |a: i64, b: i64, n: usize| -> f64 {
                 let turns = if cyclic { -3..=3 } else { 0..=0 };
                 let far = turns.map(|turn| (a - b + turn * n as i64).unsigned_abs() as usize);

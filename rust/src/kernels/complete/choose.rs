@@ -1,8 +1,10 @@
-//! Which matches are worth a cut: those that fit, dearer where they would repeat or mirror what lies near.
+//! Choice of the matches that are cut into a window. Matches that would repeat or mirror their
+//! neighbourhood cost more.
 //!
-//! A greedy choice likes what it has just pasted, and the mirror image of what it continues: both fit well, and both show at
-//! once. So a match pays for the share of it that the neighbourhood shows already, elsewhere or mirrored. What fits
-//! perfectly costs nothing and pays nothing: a regular pattern may repeat.
+//! A greedy choice prefers what it has just pasted and the mirror image of its neighbourhood. Both
+//! fit well, and both are visible. So the cost of a match is increased by the share of it that the
+//! neighbourhood already shows, elsewhere or mirrored. A perfect match has cost 0 and stays at 0,
+//! because a regular texture may repeat.
 
 use super::window::Window;
 use super::{Options, Patch};
@@ -12,25 +14,28 @@ use crate::foundation::par::Monitor;
 use crate::kernels::patch_search::{Index, Match, Pick};
 use crate::{Error, Result};
 
-/// How many patches away a repetition counts.
+/// Distance, in patches, up to which a repetition is charged.
 const REACH: usize = 2;
-/// Pixels by which a copy may be off before it counts as a repetition: less is a stretch.
+/// A copy whose offset from an earlier patch is at most this number of pixels continues that patch.
+/// With a larger offset it is a repetition.
 const STRETCH: isize = 2;
-/// What a match pays, in its own costs, for repeating all that it shows.
+/// Charge, relative to the cost of a match, if its whole area is repeated.
 const REPEATED: f64 = 1.0;
-/// The same for mirroring it.
+/// Charge, relative to the cost of a match, if its whole area is mirrored.
 const MIRRORED: f64 = 3.0;
-/// Matches looked at for each one that is asked for.
+/// Number of matches that are searched for each requested match.
 const SPARE: usize = 2;
-/// Matches that are cut: a cut costs more than a search, and those that fit worse are seldom cut better.
+/// Maximum number of matches that are cut. A cut takes longer than a search, and a worse match
+/// seldom gives a better cut.
 const TRIED: usize = 3;
 
-/// Chooses among the places of exemplars.
+/// Chooses among the positions of the exemplars.
 pub(super) struct Chooser<'a> {
     index: &'a Index,
     options: &'a Options,
     grid: Grid<2>,
-    /// For each exemplar the first one that it is a mirror image of (or is itself), and along which axes.
+    /// For each exemplar, the first exemplar that it mirrors (itself if there is none), and the
+    /// mirrored axes.
     turned: &'a [(usize, [bool; 2])],
 }
 
@@ -44,7 +49,7 @@ impl<'a> Chooser<'a> {
         }
     }
 
-    /// The matches to cut into a window; at least one.
+    /// Returns the matches to cut into a window, at least one.
     pub(super) fn matches(
         &self,
         window: &Window,
@@ -64,7 +69,7 @@ impl<'a> Chooser<'a> {
                 let found = self.index.good(&query, &wider, monitor)?;
                 let price = |m: &Match| m.cost * (1.0 + self.charge(m, to, pasted));
                 let mut priced: Vec<_> = found.into_iter().map(|m| (price(&m), m)).collect();
-                // Stable: ties stay in the order of the search.
+                // The sort is stable, so ties stay in the order of the search.
                 priced.sort_by(|a, b| a.0.total_cmp(&b.0));
                 priced.truncate(pick.count.min(TRIED));
                 priced.into_iter().map(|(_, m)| m).collect()
@@ -76,13 +81,14 @@ impl<'a> Chooser<'a> {
         Ok(found)
     }
 
-    /// How much of a match its neighbourhood shows already, elsewhere or mirrored, at the price of each.
+    /// Returns the charge for the share of a match that its neighbourhood already shows, elsewhere
+    /// or mirrored.
     fn charge(&self, found: &Match, to: [usize; 2], pasted: &[Patch]) -> f64 {
         let patch = self.options.patch;
         let (of, flip) = self.turned[found.exemplar];
         let from = [found.row, found.column];
         let here = self.unturned(found.exemplar, from);
-        // The canvas around a hole is a copy too, in place.
+        // The canvas around the hole counts as a copy of the exemplar at the same position.
         let shown = self.options.shown.map(|exemplar| Patch {
             exemplar,
             from: to,
@@ -90,6 +96,8 @@ impl<'a> Chooser<'a> {
         });
         let mut charge = 0.0f64;
         for old in pasted.iter().chain(&shown) {
+            // Only patches nearby that come from the same exemplar, or from its mirror image, are
+            // compared.
             let apart = [0, 1].map(|axis| self.apart(axis, to[axis], old.to[axis]));
             let near = |axis: usize| apart[axis].unsigned_abs() <= REACH * patch[axis];
             if !(near(0) && near(1)) || self.turned[old.exemplar].0 != of {
@@ -106,7 +114,7 @@ impl<'a> Chooser<'a> {
         charge
     }
 
-    /// The corner of a patch of an exemplar, in the one that it is a mirror image of.
+    /// Returns the corner of a patch in the exemplar whose mirror image the given exemplar is.
     fn unturned(&self, exemplar: usize, at: [usize; 2]) -> [isize; 2] {
         let shape = self.index.exemplars()[exemplar].shape;
         let flip = self.turned[exemplar].1;
@@ -120,7 +128,7 @@ impl<'a> Chooser<'a> {
         })
     }
 
-    /// How far `a` is behind `b`, the shorter way where the axis wraps.
+    /// Returns `a - b` along an axis, by the shorter way if the axis wraps.
     fn apart(&self, axis: usize, a: usize, b: usize) -> isize {
         let (n, d) = (self.grid.shape()[axis] as isize, a as isize - b as isize);
         if self.grid.wrap()[axis] {
@@ -131,7 +139,8 @@ impl<'a> Chooser<'a> {
     }
 }
 
-/// Share of a patch that another one of the same size covers, by their corners.
+/// Returns the share of a patch that another patch of the same size covers. Both are given by their
+/// corners.
 fn overlap(a: [isize; 2], b: [isize; 2], patch: [usize; 2]) -> f64 {
     let along = |axis: usize| {
         let left = patch[axis].saturating_sub(a[axis].abs_diff(b[axis]));
@@ -140,7 +149,7 @@ fn overlap(a: [isize; 2], b: [isize; 2], patch: [usize; 2]) -> f64 {
     along(0) * along(1)
 }
 
-/// Any allowed place, drawn: nothing is known that could match.
+/// Draws any allowed position, because no pixel of the window is known.
 fn anywhere(index: &Index, shape: [usize; 2], seed: u64, step: usize) -> Result<Vec<Match>> {
     let places = || {
         index

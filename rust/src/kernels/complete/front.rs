@@ -1,25 +1,28 @@
-//! Which hole is filled next: from the rim inwards, so that what was pasted on all sides meets in the middle.
+//! The order of filling holes: from the rim inwards, so that patches from all sides meet in the
+//! middle.
 //!
-//! In scan order the last patches of a hole would have to fit pixels that may not change; from the rim inwards they meet
-//! other patches, which a cut may still take away from.
+//! In scan order the last patches of a hole would have to fit pixels that may not change. From the
+//! rim inwards, patches meet other patches, and a cut may still remove parts of those.
 
 use crate::foundation::grid::Grid;
 
-/// Pixels along a side of a block.
+/// Side of a block of the canvas, in pixels.
 const BLOCK: usize = 32;
-/// No hole.
+/// Value for a block without holes.
 const NONE: (u32, usize) = (u32::MAX, usize::MAX);
 
-/// How much is unknown in each window of the canvas, and the holes that have most around them.
+/// Number of unknown pixels in each window of the canvas, and the holes with the most known pixels
+/// around them.
 pub(super) struct Front {
     grid: Grid<2>,
     patch: [usize; 2],
-    /// Unknown pixels of the window at each corner.
+    /// Number of unknown pixels of the window at each corner.
     unknown: Vec<u32>,
-    /// Where the window centred on each row, and on each column, begins.
+    /// First row, or column, of the window that is centred on each row, or column.
     centred: [Vec<usize>; 2],
-    /// The hole of each block of the canvas that has the fewest unknown pixels in the window over it, the first of equals in
-    /// scan order: (unknown pixels, hole). A step changes a few blocks, which are looked through anew.
+    /// Best hole of each block of the canvas, as (unknown pixels, hole). It has the fewest unknown
+    /// pixels in its window; ties go to the first hole in scan order. A step changes only a few
+    /// blocks, which are then searched again.
     best: Vec<(u32, usize)>,
 }
 
@@ -36,6 +39,7 @@ impl Front {
             }),
             best: vec![NONE; blocks[0] * blocks[1]],
         };
+        // Count only windows around the bounding box of the holes.
         let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
         for at in (0..known.len()).filter(|&at| !known[at]) {
             let point = grid.point(at);
@@ -52,22 +56,22 @@ impl Front {
         front
     }
 
-    /// The hole that has most around it.
+    /// Returns the hole with the most known pixels around it.
     pub(super) fn next(&self) -> Option<usize> {
         let best = self.best.iter().min()?;
         (*best != NONE).then_some(best.1)
     }
 
-    /// Unknown pixels of the window at a corner.
+    /// Number of unknown pixels of the window at a corner.
     pub(super) fn unknown(&self, to: [usize; 2]) -> usize {
         self.unknown[self.grid.index(to)] as usize
     }
 
-    /// Takes note that pixels of the window at `to` are no longer unknown.
+    /// Updates the counts after pixels of the window at `to` have become known.
     pub(super) fn filled(&mut self, to: [usize; 2], known: &[bool]) {
         let last = std::array::from_fn(|axis| to[axis] + self.patch[axis] - 1);
         self.recount(to, last, known);
-        // Windows that reach into this one belong to holes at most a window away.
+        // Windows that overlap this one belong to holes at most one window away.
         let grid = self.grid;
         let before: [usize; 2] = std::array::from_fn(|axis| self.patch[axis]);
         let after = std::array::from_fn(|axis| to[axis] + 2 * self.patch[axis] - 1);
@@ -75,12 +79,13 @@ impl Front {
         self.look(start, extent, known);
     }
 
-    /// The corner of a window that shows a hole at `share` of its sides, as far as the canvas allows.
+    /// Returns the corner of a window that contains a hole at the fraction `share` of its sides,
+    /// clamped to the canvas.
     pub(super) fn corner(&self, hole: [usize; 2], share: [f64; 2]) -> [usize; 2] {
         corner(&self.grid, self.patch, hole, share)
     }
 
-    /// Finds the best holes of the blocks of a rectangle anew.
+    /// Finds the best holes of the blocks in a rectangle again.
     fn look(&mut self, start: [usize; 2], extent: [usize; 2], known: &[bool]) {
         let [height, width] = self.grid.shape();
         let across = width.div_ceil(BLOCK);
@@ -110,12 +115,13 @@ impl Front {
         }
     }
 
-    /// Counts anew what is unknown in all windows that show a pixel of the rectangle from `low` to `high`.
+    /// Counts the unknown pixels again, in all windows that contain a pixel of the rectangle from
+    /// `low` to `high`.
     fn recount(&mut self, low: [usize; 2], high: [usize; 2], known: &[bool]) {
         let grid = self.grid;
         let [rows, columns] = self.patch;
         let (start, extent) = around(&grid, low, high, [rows - 1, columns - 1]);
-        // Positions of the pixels that these windows show; none beyond the edges.
+        // Positions of the pixels in these windows, or `None` beyond the edges.
         let [lines, places]: [Vec<Option<usize>>; 2] = std::array::from_fn(|axis| {
             let end = start[axis] + extent[axis] + self.patch[axis] - 1;
             (start[axis]..end)
@@ -123,7 +129,7 @@ impl Front {
                 .collect()
         });
         let width = grid.shape()[1];
-        // Unknown pixels of each column within the windows of a row.
+        // Number of unknown pixels in each column, within the rows of the current window.
         let mut sums = vec![0u32; places.len()];
         let add = |sums: &mut [u32], line: Option<usize>, one: u32| {
             let Some(line) = line else { return };
@@ -136,6 +142,8 @@ impl Front {
         for &line in &lines[..rows - 1] {
             add(&mut sums, line, 1);
         }
+        // Slide the window: add the row that enters, sum along the row, and subtract the row that
+        // leaves.
         for r in 0..extent[0] {
             add(&mut sums, lines[r + rows - 1], 1);
             let row = lines[r].map_or(0, |line| line * width);
@@ -150,8 +158,8 @@ impl Front {
     }
 }
 
-/// The first position and the extent of what is in the rectangle from `low` to `high` or up to `before` before it, as far
-/// as the grid has it.
+/// Returns the first position and the extent of a rectangle from `low` to `high`, extended
+/// backwards by `before` and clipped to the grid.
 fn around(
     grid: &Grid<2>,
     low: [usize; 2],
@@ -172,7 +180,8 @@ fn around(
     (start, extent)
 }
 
-/// The corner of a window that shows a point at `share` of its sides, as far as the canvas allows.
+/// Returns the corner of a window that contains a point at the fraction `share` of its sides,
+/// clamped to the canvas.
 pub(super) fn corner(
     grid: &Grid<2>,
     patch: [usize; 2],

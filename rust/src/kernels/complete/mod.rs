@@ -1,18 +1,20 @@
-//! Filling holes by example: from the rim inwards, the best matching patch, cut into what is known.
+//! Exemplar-based filling of holes: from the rim inwards, the best matching patch is cut into the known pixels.
 //!
-//! After Criminisi, Perez and Toyama (*Region filling and object removal by exemplar-based inpainting*, IEEE TIP 2004) with the
-//! graph-cut paste of Kwatra et al. (*Graphcut textures*, SIGGRAPH 2003), as Shen et al. 2006, section 3.4, combine them:
+//! After Criminisi, Perez and Toyama (*Region filling and object removal by exemplar-based inpainting*, IEEE TIP 2004)
+//! with the graph-cut paste of Kwatra et al. (*Graphcut textures*, SIGGRAPH 2003), combined as in Shen et al. 2006,
+//! section 3.4:
 //!
-//! 1. take the hole that has most around it, and the window over it whose known share is nearest to 0.6;
-//! 2. find good matches of what is known in it, near pixels of the hole counting most;
-//! 3. drop those that would repeat or mirror what lies near; cut the best of the others into the known part, and take the one
-//!    whose cut is the cheapest;
-//! 4. paste it, and go on until no hole is left.
+//! 1. take the hole with the most known pixels around it, and the window over it whose known fraction is nearest to
+//!    0.6;
+//! 2. find good matches of the known pixels in the window, with the largest weights near the hole;
+//! 3. drop matches that would repeat or mirror their neighbourhood, and take the one of the others whose cut into the
+//!    known pixels is cheapest;
+//! 4. paste this match, and repeat until no hole is left.
 //!
-//! The literal method goes in scan order, centres the window and takes the best match at once. In scan order the last rows
-//! meet the far border of a hole with no choice left, which tears what is large; from the rim inwards patches meet patches,
-//! between which a cut may run. Offering several windows, and judging matches by the cut that they really get, leaves fewer
-//! visible seams.
+//! The literal method goes in scan order, centres the window and takes the best match at once. Its last rows must meet
+//! the far border of a hole without a choice, which tears large elements. From the rim inwards patches meet other
+//! patches, and a cut may run between them. Trying several windows and judging matches by their actual cuts leaves
+//! fewer visible seams.
 
 mod choose;
 mod front;
@@ -31,65 +33,69 @@ use choose::Chooser;
 use front::{Front, corner};
 use window::Window;
 
-/// Where the hole may sit in the window, as a share of its side.
+/// Positions of the hole in the tried windows, as fractions of the side.
 const ANCHORS: [f64; 5] = [0.25, 0.4, 0.5, 0.6, 0.75];
-/// The share of a window that is best known already.
+/// Preferred fraction of known pixels in a window.
 const KNOWN_SHARE: f64 = 0.6;
-/// Weight of a known pixel far from the hole; next to it the weight is one more.
+/// Weight of a known pixel far from the hole. Next to the hole the weight is larger by 1.
 const FAR_WEIGHT: f32 = 0.05;
-/// How many times more a pixel that must stay weighs beside the hole, half as far: a cut cannot move away from it.
+/// Weight factor of a pixel next to the hole that must stay, because a cut cannot move away from
+/// it. The weight falls off at half the distance.
 const KEPT_WEIGHT: f32 = 10.0;
-/// Half of what cuts add to the gradients by which they divide.
+/// Half of the constant that cuts add to the gradients in their denominators.
 const FLAT: f32 = 0.025;
 
-/// How holes are filled.
+/// Parameters of the filling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Rows and columns of a patch.
     pub patch: [usize; 2],
-    /// Which matches are considered; the literal method cuts them all, the other one the three most promising.
+    /// Choice of the considered matches. The literal method cuts all of them, the default method
+    /// cuts the three most promising.
     pub pick: Pick,
-    /// Seed of the patches that have nothing to match.
+    /// Seed for the patches of windows without known pixels.
     pub seed: u64,
-    /// As Shen et al. (2006) print it: scan order, windows centred on the hole, all known pixels of one weight, the exact
-    /// best matches, plain differences as the cost of a cut.
+    /// If true, use the method of Shen et al. (2006) as printed. It has scan order, windows centred
+    /// on the hole and equal weights of all known pixels. It takes the exact best matches, and the
+    /// cost of a cut is the plain difference.
     pub paper: bool,
-    /// The exemplar that the known part of the canvas shows in place, if it does: then what lies beside a hole is not
-    /// repeated in it.
+    /// Index of the exemplar that equals the known part of the canvas, if there is one. The
+    /// surroundings of a hole are then not repeated in it.
     pub shown: Option<usize>,
 }
 
-/// One pasted patch.
+/// A pasted patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patch {
-    /// The exemplar it was copied from.
+    /// Index of the exemplar that the patch was copied from.
     pub exemplar: usize,
-    /// Its top-left corner there.
+    /// Top-left corner in the exemplar.
     pub from: [usize; 2],
-    /// Its top-left corner on the canvas.
+    /// Top-left corner on the canvas.
     pub to: [usize; 2],
 }
 
-/// What was pasted where.
+/// The pasted patches and their pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Completion {
-    /// The patch that each pixel of the canvas comes from; -1 where nothing was pasted.
+    /// Number of the patch that each pixel of the canvas comes from, or -1 if no patch was pasted
+    /// there.
     pub label: Vec<i32>,
-    /// The patches, in the order in which they were pasted.
+    /// The patches, in the order of pasting.
     pub patches: Vec<Patch>,
 }
 
-/// A picture with holes.
+/// An image with holes.
 pub struct Canvas<'a> {
-    /// Shape, and which axes are cyclic.
+    /// Shape and wrapped axes.
     pub grid: Grid<2>,
-    /// Samples (rows, columns, channels); anything where unknown.
+    /// Samples (rows, columns, channels). Unknown pixels may have any value.
     pub colours: &'a mut [f32],
-    /// What is known (rows, columns).
+    /// Flags of the known pixels (rows, columns).
     pub known: &'a mut [bool],
-    /// Known pixels that nothing may be pasted over; none if absent.
+    /// Flags of the known pixels that must not be pasted over, if any.
     pub keep: Option<&'a [bool]>,
-    /// Samples a pixel.
+    /// Number of channels.
     pub channels: usize,
 }
 
@@ -102,6 +108,7 @@ pub fn complete(
 ) -> Result<Completion> {
     let [rows, columns] = canvas.grid.shape();
     let Options { patch, paper, .. } = *options;
+    // Check the arguments.
     memory::room("the completion", canvas.grid.len(), 32)?;
     if canvas.channels != index.channels() {
         let message = format!(
@@ -154,6 +161,7 @@ pub fn complete(
         );
         return Err(Error::value("shown", message));
     }
+    // Prepare the search, the stitchers and the order of holes.
     let mut result = Completion {
         label: vec![-1; canvas.grid.len()],
         patches: Vec::new(),
@@ -169,13 +177,15 @@ pub fn complete(
         Order::Inwards(Front::new(canvas.grid, patch, canvas.known))
     };
     while let Some(to) = order.next(canvas, patch) {
+        // Find matches for the next window.
         window.read(canvas, to);
         if paper {
             window.level();
         }
         let matches = chooser.matches(&window, to, &result.patches, monitor)?;
         stitchers.resize_with(matches.len().max(stitchers.len()), Mutex::default);
-        // The least cost so far; bits of numbers that are not negative are ordered as they are.
+        // Lowest cost so far, as bits: the bits of non-negative floats have the same order as the
+        // floats.
         let least = AtomicU64::new(f64::INFINITY.to_bits());
         let cuts = par::map(matches.len(), |i| {
             let bound = f64::from_bits(least.load(Ordering::Relaxed));
@@ -187,6 +197,7 @@ pub fn complete(
             }
             Ok(cut)
         });
+        // Take the cheapest cut; ties go to the better match.
         let mut best: Option<(f64, usize, Vec<bool>)> = None;
         for (i, cut) in cuts.into_iter().enumerate() {
             if let Some((value, taken)) = cut?
@@ -208,15 +219,15 @@ pub fn complete(
     Ok(result)
 }
 
-/// How holes follow each other.
+/// Order of the holes.
 enum Order {
-    /// Row by row, from this pixel on.
+    /// Row by row, starting at this pixel.
     Scan(usize),
     Inwards(Front),
 }
 
 impl Order {
-    /// The corner of the next window.
+    /// Returns the corner of the next window.
     fn next(&mut self, canvas: &Canvas<'_>, patch: [usize; 2]) -> Option<[usize; 2]> {
         match self {
             Self::Scan(cursor) => {
@@ -231,6 +242,8 @@ impl Order {
             Self::Inwards(front) => {
                 let hole = canvas.grid.point(front.next()?);
                 let pixels = (patch[0] * patch[1]) as f64;
+                // Try windows that contain the hole at several positions, and take the one whose
+                // fraction of known pixels is best.
                 let mut best = (f64::INFINITY, [0, 0]);
                 for down in ANCHORS {
                     for across in ANCHORS {

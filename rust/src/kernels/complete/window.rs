@@ -1,4 +1,4 @@
-//! The part of the canvas that is being filled: what is known of it, and how a match is cut into it.
+//! The window of the canvas that is being filled: its known pixels, and the cut of a match into it.
 
 use super::{Canvas, Completion, FAR_WEIGHT, FLAT, KEPT_WEIGHT, Patch};
 use crate::Result;
@@ -9,7 +9,7 @@ use crate::kernels::patch_search::{Index, Match, Query};
 use crate::kernels::seam::cost::Cost;
 use crate::kernels::seam::stitch::{Overlap, Stitcher};
 
-/// Calls `f(i, position)` for each pixel of a window, around the edges where the grid wraps.
+/// Calls `f(i, position)` for each pixel of a window. Positions wrap around if the grid does.
 pub(super) fn for_each(
     grid: &Grid<2>,
     to: [usize; 2],
@@ -28,7 +28,7 @@ pub(super) fn for_each(
     }
 }
 
-/// The samples of a match.
+/// Returns the samples of a match.
 fn copy(index: &Index, found: &Match, shape: [usize; 2]) -> Vec<f32> {
     let exemplar = &index.exemplars()[found.exemplar];
     let n = index.channels();
@@ -40,7 +40,7 @@ fn copy(index: &Index, found: &Match, shape: [usize; 2]) -> Vec<f32> {
     out
 }
 
-/// The part of the canvas that is being filled.
+/// The window of the canvas that is being filled.
 pub(super) struct Window {
     pub(super) shape: [usize; 2],
     channels: usize,
@@ -48,9 +48,9 @@ pub(super) struct Window {
     known: Vec<bool>,
     keep: Vec<bool>,
     weight: Vec<f32>,
-    /// What a cut leaves as it is.
+    /// Pixels that a cut must not change.
     core: Vec<bool>,
-    /// Neighbours of which the first one must stay and the second one is a hole.
+    /// Pairs of neighbours: a pixel that must stay, and a hole.
     ends: Vec<[usize; 2]>,
 }
 
@@ -77,6 +77,7 @@ impl Window {
             self.colours[i * n..][..n].copy_from_slice(&canvas.colours[at * n..][..n]);
         });
         self.tie(canvas, to);
+        // Pixels near the hole weigh most. Known pixels far away keep a small weight.
         let distance = chamfer(&self.known, self.shape);
         let reach = self.shape[0].min(self.shape[1]) as f32 / 4.0;
         for (i, weight) in self.weight.iter_mut().enumerate() {
@@ -90,7 +91,7 @@ impl Window {
         }
     }
 
-    /// What is looked for; none where nothing is known.
+    /// Returns the query for the search, or `None` if no pixel is known.
     pub(super) fn query(&self) -> Option<Query<'_>> {
         self.known.contains(&true).then_some(Query {
             patch: &self.colours,
@@ -99,14 +100,15 @@ impl Window {
         })
     }
 
-    /// Sets all known pixels to the same weight.
+    /// Gives all known pixels the same weight.
     pub(super) fn level(&mut self) {
         for (weight, &known) in self.weight.iter_mut().zip(&self.known) {
             *weight = f32::from(u8::from(known));
         }
     }
 
-    /// The cost of cutting a match in, and the pixels that it would take; none where it would cost more than `bound`.
+    /// Returns the cost of cutting a match in and the pixels that take it, or `None` if it costs
+    /// more than `bound`.
     pub(super) fn cut(
         &self,
         index: &Index,
@@ -116,6 +118,7 @@ impl Window {
         stitcher: &mut Stitcher<2>,
         monitor: &Monitor,
     ) -> Result<Option<(f64, Vec<bool>)>> {
+        // Without known pixels, the match is pasted without a seam.
         if self.known.iter().all(|k| !k) {
             return Ok(Some((0.0, vec![true; self.known.len()])));
         }
@@ -124,6 +127,7 @@ impl Window {
         if border > bound {
             return Ok(None);
         }
+        // If all known pixels must stay, the only seam is along the border of the hole.
         if self.core.iter().zip(&self.known).all(|(c, k)| c == k) {
             return Ok(Some((border, self.known.iter().map(|k| !k).collect())));
         }
@@ -141,14 +145,15 @@ impl Window {
         if paper {
             overlap.cost = Cost::Difference;
         }
-        // No less than what is left of the bound, however that is rounded.
+        // Round the remaining bound up, so that rounding never excludes a cut.
         let left = (bound - border).next_up();
         let cut = stitcher.cut_within(&overlap, left, monitor)?;
         Ok(cut.map(|cut| (cut.value + border, cut.b)))
     }
 
-    /// What a cut leaves as it is: pixels to keep, and the rim, which is tied to what is there, except at the edges of the
-    /// canvas and beside the hole.
+    /// Marks the pixels that a cut must not change: pixels to keep, and the known rim of the
+    /// window, which is connected to the canvas. The rim is free at the edges of the canvas and
+    /// next to the hole.
     fn tie(&mut self, canvas: &Canvas<'_>, to: [usize; 2]) {
         let [rows, columns] = self.shape;
         let [height, width] = canvas.grid.shape();
@@ -186,8 +191,9 @@ impl Window {
         }
     }
 
-    /// What the seam between pixels to keep and the hole costs, which is in no overlap: beyond it nothing is known, so the
-    /// difference is taken to be the same on both of its sides, and the new patch to show the gradient.
+    /// Returns the cost of the seam between pixels to keep and the hole, which is outside every
+    /// overlap. No pixels are known beyond the seam. The difference is therefore assumed to be
+    /// equal on both sides, and the gradient is that of the new patch.
     fn border(&self, new: &[f32]) -> f64 {
         let n = self.channels;
         let apart = |a: &[f32], i: usize, b: &[f32], j: usize| -> f32 {
@@ -200,7 +206,7 @@ impl Window {
         self.ends.iter().fold(0.0, |sum, pair| sum + cost(pair))
     }
 
-    /// Pastes the pixels taken; returns those that were holes.
+    /// Pastes the taken pixels and returns those that were holes.
     pub(super) fn paste(
         &self,
         canvas: &mut Canvas<'_>,
@@ -234,7 +240,8 @@ impl Window {
     }
 }
 
-/// Distance of each pixel to the nearest unknown one of the window, by the 3-4 chamfer; large where there is none.
+/// Returns the distance of each pixel to the nearest unknown pixel of the window, by the 3-4
+/// chamfer. It is large if no pixel is unknown.
 fn chamfer(known: &[bool], [rows, columns]: [usize; 2]) -> Vec<f32> {
     const SIDE: u32 = 3;
     const CORNER: u32 = 4;
@@ -243,6 +250,7 @@ fn chamfer(known: &[bool], [rows, columns]: [usize; 2]) -> Vec<f32> {
         .map(|&k| if k { u32::MAX / 2 } else { 0 })
         .collect();
     let at = |r: usize, c: usize| r * columns + c;
+    // Propagate distances from the top left, then from the bottom right.
     for r in 0..rows {
         for c in 0..columns {
             let mut least = d[at(r, c)];

@@ -1,11 +1,12 @@
-//! Mean-shift filtering: every pixel climbs to the mode of its joint spatial and range density.
+//! Mean-shift filtering: every pixel moves to the mode of its joint density in space and colour.
 //!
-//! Comaniciu and Meer, *Mean shift: a robust approach toward feature space analysis*, IEEE PAMI 2002, section 4.1, with flat
-//! kernels: the square window of `radius` and the ball of `range` colour units. Departure: positions are rounded to whole
-//! pixels after each step, as OpenCV does, so that a window is a block of samples.
+//! Comaniciu and Meer, *Mean shift: a robust approach toward feature space analysis*, IEEE PAMI
+//! 2002, section 4.1. Kernels are flat: the square window of `radius` and the ball of `range`
+//! colour units. Departure from the paper: positions are rounded to whole pixels after each step,
+//! as in OpenCV, so that a window is a block of samples.
 //!
-//! Sums run in eight fixed lanes without fused operations, since a comparison decides what is summed: the result is the
-//! same on all CPUs.
+//! Sums run in eight fixed lanes without fused operations, because a comparison selects the summed
+//! samples. The result is therefore the same on all CPUs.
 
 mod window;
 
@@ -18,40 +19,42 @@ use crate::foundation::wide::{V3, wide_fn};
 use crate::{Error, Result};
 use window::{Planes, Sums, window, window_any};
 
-/// The largest radius: windows of four million samples.
+/// Maximum radius in pixels. Its windows contain four million samples.
 pub const MAX_RADIUS: usize = 1024;
 
-/// The largest sample and range, so that what lies beyond an edge is always outside.
+/// Maximum absolute sample value and maximum range. Values beyond an edge are then always outside
+/// the range.
 pub const MAX_VALUE: f32 = 1e15;
 
-/// The filter's parameters.
+/// Parameters of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Half the side of the window, in pixels, without the middle.
+    /// Half the side of the window in pixels, without the central pixel.
     pub radius: usize,
-    /// Radius of the ball of colours.
+    /// Radius of the ball of colours, in colour units.
     pub range: f32,
-    /// A pixel takes at most this many steps.
+    /// Maximum number of steps of a pixel.
     pub max_iterations: usize,
-    /// A pixel has arrived when its position stays and its colour moves by at most this.
+    /// A pixel has converged if its position stays and its colour changes by at most this distance.
     pub tolerance: f32,
-    /// Which axes are cyclic.
+    /// Flags of the axes that wrap.
     pub wrap: [bool; 2],
 }
 
-/// Where a pixel has come to.
+/// Current position and colour of a pixel.
 struct State<'a> {
     at: [usize; 2],
     colour: &'a mut [f32],
 }
 
-/// The colours at the modes, of the image's shape (rows, columns, channels).
+/// Returns the colours at the modes, in the shape of the image (rows, columns, channels).
 pub fn filter(
     image: &[f32],
     shape: [usize; 3],
     options: &Options,
     monitor: &Monitor,
 ) -> Result<Vec<f32>> {
+    // Check the arguments.
     let [rows, columns, channels] = shape;
     let grid = Grid::new([rows, columns], options.wrap)?;
     check_shape("image", &shape, image.len())?;
@@ -75,6 +78,7 @@ pub fn filter(
         let message = format!("values up to {MAX_VALUE:e} are allowed, got {bad}");
         return Err(Error::value("image", message));
     }
+    // Filter the rows in parallel.
     let planes = Planes::new(image, &grid, channels, options.radius)?;
     let mut out = image.to_vec();
     monitor.expect(rows as u64);
@@ -89,7 +93,7 @@ pub fn filter(
     Ok(out)
 }
 
-/// One step; whether the pixel has arrived.
+/// Moves a pixel by one step, and returns whether it has converged.
 #[inline(always)]
 fn step(
     planes: &Planes,
@@ -102,14 +106,15 @@ fn step(
     let limit = options.range * options.range;
     let sums = window(planes, state.at, state.colour, limit);
     if sums.count == 0.0 {
-        // The mean of colours may be near none of them.
+        // The mean of several colours may be farther than the range from all samples. Keep the
+        // colour then.
         state.colour.copy_from_slice(before);
         return true;
     }
     let mut stayed = true;
     for axis in 0..2 {
         let n = planes.shape[axis] as isize;
-        // From the middle, so that the rounding is the same wherever the pixel is.
+        // Measure offsets from the central pixel, so that rounding does not depend on the position.
         let count = f64::from(sums.count);
         let offset = f64::from(sums.offset[axis]) - count * planes.margin[axis] as f64;
         let moved = (offset / count).round_ties_even() as isize;
@@ -124,7 +129,7 @@ fn step(
     stayed && distance <= options.tolerance * options.tolerance
 }
 
-/// The pixels of a row, by the fastest way to sum a window on this CPU.
+/// Filters the pixels of a row with the fastest window sum for this CPU.
 fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, out: &mut [f32]) {
     #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
     if let Some(simd) = V3::try_new() {
@@ -145,7 +150,7 @@ fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, o
 
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 wide_fn! {
-    /// [`climb`] with windows that are summed in wide registers.
+    /// [`climb`] with windows that are summed in SIMD registers.
     fn climb_wide<const C: usize>(simd: V3, planes: &Planes, options: &Options, row: usize, out: &mut [f32]) {
         climb(planes, options, C, row, out, #[inline(always)] |planes, at, colour, limit| {
             window::v3::window::<C>(simd, planes, at, colour, limit)
@@ -153,8 +158,8 @@ wide_fn! {
     }
 }
 
-/// Moves the pixels of a row to their modes. A window is summed around a place; the colour that goes in comes out as the
-/// sum of the colours within the limit.
+/// Moves the pixels of a row to their modes. `window` sums a window around a position and replaces
+/// the given colour by the sum of the colours within the limit.
 #[inline(always)]
 fn climb(
     planes: &Planes,

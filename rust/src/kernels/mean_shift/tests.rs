@@ -2,7 +2,7 @@ use super::*;
 use crate::foundation::hash::Noise;
 use proptest::prelude::*;
 
-/// Pixel by pixel, in whole numbers as far as they go.
+/// Filters pixel by pixel, with integer offsets.
 fn naive(image: &[f32], shape: [usize; 3], options: &Options) -> Vec<f32> {
     let [rows, columns, channels] = shape;
     let grid = Grid::new([rows, columns], options.wrap).unwrap();

@@ -1,24 +1,27 @@
-//! Sums over a window of samples near a colour.
+//! Sums over the samples of a window that are near a colour.
 
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::{Error, Result};
 
-/// Samples side by side.
+/// Number of samples that are processed together.
 const LANES: usize = 8;
 type Lanes = [f32; LANES];
 
-/// Farther from every colour than any range, and its square is still finite.
+/// Sample value beyond the edges. It is farther from every colour than any range, and its square is
+/// finite.
 const NOWHERE: f32 = 1e18;
-/// Planes of one channel each, with a margin for windows: what lies across a cyclic axis, or [`NOWHERE`].
+/// Planes of one channel each, with a margin for windows. The margin contains the samples across a
+/// wrapped axis, or else [`NOWHERE`].
 pub(super) struct Planes {
     data: Vec<f32>,
-    /// Samples of a plane and of a row.
+    /// Number of samples of a plane, and of a row.
     plane: usize,
     stride: usize,
     pub(super) margin: [usize; 2],
     pub(super) shape: [usize; 2],
-    /// Window of sizes 2 margin + 1; which lanes of its last block count.
+    /// Mask of the lanes that are inside the window in its last block. A window has 2 margin + 1
+    /// samples along an axis.
     last: [u32; LANES],
 }
 
@@ -30,7 +33,7 @@ impl Planes {
         radius: usize,
     ) -> Result<Self> {
         let shape = grid.shape();
-        // A window that covers an axis which ends gains nothing from being larger.
+        // Along an axis that does not wrap, a larger window than the axis adds no samples.
         let margin: [usize; 2] = std::array::from_fn(|axis| {
             if grid.wrap()[axis] {
                 radius
@@ -78,14 +81,14 @@ impl Planes {
     }
 }
 
-/// What a window holds: sums of the offsets from its corner, and how many samples.
+/// Sums over a window: offsets from its corner, and the number of samples.
 pub(super) struct Sums {
     pub(super) offset: [f32; 2],
     pub(super) count: f32,
 }
 
-/// Sums of a window around `at` for a number of channels known in advance.
-#[allow(clippy::needless_range_loop)] // channels side by side, of the same block
+/// Sums over a window around `at`. The number of channels is a constant.
+#[allow(clippy::needless_range_loop)] // one lane of each channel of the same block
 pub(super) fn window<const C: usize>(
     planes: &Planes,
     at: [usize; 2],
@@ -100,6 +103,7 @@ pub(super) fn window<const C: usize>(
     let mut count = [0.0f32; LANES];
     let mut down = [0.0f32; LANES];
     let mut passed = [0u32; LANES];
+    // Sum row by row, in blocks of [`LANES`] samples.
     for y in 0..height {
         let start = (at[0] + y) * planes.stride + at[1];
         let mut rows: [&[Lanes]; C] = [&[]; C];
@@ -117,7 +121,7 @@ pub(super) fn window<const C: usize>(
                     distance[l] += d * d;
                 }
             }
-            // All bits where a sample counts, so that counting is an "and".
+            // A mask has all bits set for samples that count, so that a bitwise "and" selects them.
             let kept = if block + 1 == blocks {
                 &planes.last
             } else {
@@ -153,8 +157,9 @@ pub(super) fn window<const C: usize>(
     }
 }
 
-/// Sum of the offsets along the row. `passed` is the sum, block after block, of how many were counted so far in a row: one
-/// counted in block b adds to the blocks from b on, which is `blocks - b` times.
+/// Returns the sum of the offsets along the rows. `passed` sums, over all blocks, the number of
+/// samples counted so far in the row. A sample in block b is counted in the blocks from b on, which
+/// is `blocks - b` times.
 fn across(count: &Lanes, passed: &[u32; LANES], blocks: usize) -> f32 {
     let mut offset = [0.0f32; LANES];
     for l in 0..LANES {
@@ -170,6 +175,7 @@ pub(super) fn window_any(planes: &Planes, at: [usize; 2], colour: &mut [f32], li
     let mut sums = vec![[0.0f32; LANES]; colour.len()];
     let mut count = [0.0f32; LANES];
     let mut offset = [[0.0f32; LANES]; 2];
+    // Sum row by row, in blocks of [`LANES`] samples.
     for y in 0..height {
         for block in 0..width.div_ceil(LANES) {
             let start = (at[0] + y) * planes.stride + at[1] + block * LANES;
@@ -215,8 +221,9 @@ fn fold(lanes: &Lanes) -> f32 {
         + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
 }
 
-/// [`window`] in the registers that nearly every x86-64 has: the same lanes, the same operations in the same order.
-/// Measured: five times as fast as what the compiler makes of it.
+/// [`window`] in AVX2 registers, which nearly all x86-64 processors have. It uses the same lanes
+/// and the same order of operations. It is 5x as fast as the code that the compiler generates, as
+/// measured.
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 pub(super) mod v3 {
     use std::arch::x86_64::_CMP_LE_OQ;
@@ -245,6 +252,7 @@ pub(super) mod v3 {
         let mut sums = [zero; C];
         let (mut count, mut down) = (zero, zero);
         let mut passed = avx._mm256_setzero_si256();
+        // Sum row by row, as in the plain version.
         for y in 0..height {
             let start = (at[0] + y) * planes.stride + at[1];
             let mut rows: [&[Lanes]; C] = [&[]; C];

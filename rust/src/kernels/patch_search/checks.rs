@@ -1,10 +1,10 @@
-//! What is refused: exemplars, sizes and choices that cannot be.
+//! Checks of exemplars, sizes and choices of matches.
 
 use super::{Exemplar, Pick};
 use crate::foundation::error::check_shape;
 use crate::{Error, Result};
 
-/// More samples than this in one exemplar cannot be addressed by a candidate.
+/// Maximum number of positions of an exemplar, because a candidate has 32-bit coordinates.
 const LONGEST: usize = u32::MAX as usize;
 
 pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
@@ -14,7 +14,7 @@ pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()>
         let message = format!("1 to {LONGEST} positions are allowed, got {rows} x {columns}");
         return Err(Error::value("exemplars", message));
     }
-    // Block by block, within which nothing has to be decided.
+    // Check block by block, without branches inside a block.
     let sound = |block: &[f32]| block.iter().fold(true, |all, x| all & x.is_finite());
     let block = exemplar.data.chunks(4096).find(|block| !sound(block));
     if let Some(bad) = block.and_then(|block| block.iter().find(|x| !x.is_finite())) {

@@ -1,17 +1,18 @@
-//! The filtered costs of one block, whose least is always known.
+//! The filtered costs of one block, and their minimum.
 
 use std::ops::Range;
 
-/// The filtered costs of one block; infinite where not allowed.
+/// The filtered costs of one block. Forbidden positions are infinite.
 #[derive(Default)]
 pub(super) struct Map {
     pub(super) costs: Vec<f32>,
     /// Rows and columns.
     pub(super) valid: [usize; 2],
-    /// The least of each row, and of all.
+    /// Minimum of each row, and of all rows.
     lows: Vec<f32>,
     pub(super) least: f32,
-    /// Filtered costs are within this of the true ones (in the filter's unit), but for their own rounding.
+    /// Bound of the error of the filtered costs, in the unit of the filter, except for the rounding
+    /// of each cost.
     pub(super) absolute: f64,
 }
 
@@ -20,12 +21,13 @@ impl Map {
         self.costs.chunks_exact(self.valid[1].max(1))
     }
 
-    /// How far a filtered cost may be from the true one.
+    /// Returns the bound of the error of a filtered cost.
     pub(super) fn error(&self, cost: f32) -> f64 {
         self.absolute + f64::from(f32::EPSILON) * f64::from(cost).abs()
     }
 
-    /// Calls `f` for each position that costs at most `limit`; few do, so rows and strides that have none are passed over.
+    /// Calls `f` for each position that costs at most `limit`. Few positions do, so rows and chunks
+    /// without any are skipped.
     pub(super) fn within(&self, limit: f32, mut f: impl FnMut(usize, usize)) {
         for (r, row) in self
             .rows()
@@ -42,14 +44,14 @@ impl Map {
         }
     }
 
-    /// Looks for the least of all rows.
+    /// Computes the minima of all rows.
     pub(super) fn update(&mut self) {
         self.lows.clear();
         self.lows.resize(self.valid[0], f32::INFINITY);
         self.update_rows(0..self.valid[0]);
     }
 
-    /// Looks for the least of rows that have changed.
+    /// Computes the minima of rows that have changed.
     pub(super) fn update_rows(&mut self, rows: Range<usize>) {
         let width = self.valid[1];
         for r in rows {
@@ -59,7 +61,7 @@ impl Map {
     }
 }
 
-/// The least of costs, none of which is NaN.
+/// Returns the minimum of costs that are not NaN.
 fn lowest(costs: &[f32]) -> f32 {
     let mut lanes = [f32::INFINITY; 16];
     let (chunks, rest) = costs.as_chunks::<16>();

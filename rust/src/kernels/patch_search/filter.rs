@@ -1,12 +1,13 @@
-//! The fast filter: cost maps by blocked Fourier correlation, with a bound on their error.
+//! The fast filter: cost maps by blocked Fourier correlation, with a bound of their error.
 //!
-//! An exemplar is cut into overlapping blocks whose spectra are kept (overlap-save: Oppenheim and Schafer,
-//! *Discrete-Time Signal Processing*, 8.7.3). Blocks stay in the second-level cache and are the grain of parallelism.
+//! An exemplar is divided into overlapping blocks whose spectra are kept (overlap-save: Oppenheim
+//! and Schafer, *Discrete-Time Signal Processing*, 8.7.3). Blocks fit the second-level cache and
+//! are the unit of parallel work.
 
 use crate::foundation::fft::{self, Complex, Images};
 use crate::foundation::wide::wide_fn;
 
-/// Values multiplied at a time.
+/// Number of values that are multiplied together.
 const LANES: usize = 16;
 
 /// Transforms of one block size.
@@ -15,20 +16,20 @@ pub(super) struct Plan {
     pub(super) size: [usize; 2],
     /// Distance between the corners of neighbouring blocks.
     step: [usize; 2],
-    /// Arithmetic of a search, in rough units of one multiplication and addition.
+    /// Work of a search, in rough units of one multiplication and addition.
     pub(super) work: f64,
     images: Images<f32>,
 }
 
-/// What one task needs besides its input and output.
+/// Scratch memory of a task.
 #[derive(Default)]
 pub(super) struct Scratch {
     spectrum: Vec<Complex<f32>>,
     images: fft::Scratch<f32>,
 }
 
-/// A spectrum that multiplies others: real parts doubled up, imaginary parts with alternating sign, so that
-/// `(s * a + swap(s) * b)` is a complex product over interleaved numbers.
+/// A spectrum prepared for multiplication: real parts repeated, imaginary parts with alternating
+/// signs. `(s * a + swap(s) * b)` is then a complex product of interleaved numbers.
 #[derive(Default)]
 pub(super) struct Multiplier {
     a: Vec<f32>,
@@ -36,9 +37,11 @@ pub(super) struct Multiplier {
 }
 
 impl Plan {
-    /// The cheapest block size for exemplars of `shapes` searched for patches up to `patch`.
+    /// Chooses the cheapest block size for exemplars of `shapes` that are searched for patches up
+    /// to `patch`.
     pub(super) fn new(shapes: &[[usize; 2]], patch: [usize; 2], layers: usize) -> Self {
         let longest = |axis: usize| shapes.iter().map(|s| s[axis]).max().unwrap_or(1);
+        // Candidates are even lengths 2^a and 3 * 2^b, up to the first that covers the whole axis.
         let lengths = |axis: usize| {
             let (least, most) = (patch[axis], longest(axis).max(patch[axis]));
             let mut all: Vec<usize> = (2..40)
@@ -50,6 +53,8 @@ impl Plan {
             all.truncate(enough + 1);
             all
         };
+        // Estimate the work of each size from the number of blocks and the cost of their
+        // transforms.
         let (mut best, mut size) = (f64::INFINITY, [2, 2]);
         for &rows in &lengths(0) {
             for &columns in &lengths(1) {
@@ -77,7 +82,8 @@ impl Plan {
         }
     }
 
-    /// Corners of the blocks that cover an exemplar. The last of an axis reaches its end.
+    /// Returns the corners of the blocks that cover an exemplar. The last block of an axis reaches
+    /// its end.
     pub(super) fn corners(&self, shape: [usize; 2]) -> Vec<[usize; 2]> {
         let patch = [
             self.size[0] + 1 - self.step[0],
@@ -90,7 +96,8 @@ impl Plan {
             .collect()
     }
 
-    /// How many positions of a patch of `patch` the block at `corner` answers for, per axis.
+    /// Returns the number of positions of a patch, along each axis, that the block at `corner`
+    /// covers.
     pub(super) fn valid(
         &self,
         shape: [usize; 2],
@@ -107,21 +114,23 @@ impl Plan {
         })
     }
 
-    /// Complex numbers in a spectrum.
+    /// Number of complex values of a spectrum.
     pub(super) fn len(&self) -> usize {
         self.images.len()
     }
 
-    /// Bound of the error of a correlation, relative to the norms that [`Self::correlate`] and its caller give.
+    /// Returns the bound of the error of a correlation, relative to the norms from
+    /// [`Self::correlate`] and its caller.
     ///
-    /// Higham, *Accuracy and Stability of Numerical Algorithms*, theorem 24.2: a transform of 2^t points errs by at
-    /// most t (1 + 4 sqrt 2) u in the 2-norm; 8 u is used for 6.7 u. The rest is for products and rounded inputs.
+    /// See Higham, *Accuracy and Stability of Numerical Algorithms*, theorem 24.2. The error of a
+    /// transform of 2^t points is at most t (1 + 4 sqrt 2) u in the 2-norm. The code uses 8 u for
+    /// 6.7 u. The rest covers products and rounded inputs.
     pub(super) fn epsilon(&self, layers: usize) -> f64 {
         let log = ((self.size[0] * self.size[1]) as f64).log2();
         f64::from(f32::EPSILON) * 0.5 * (8.0 * log.ceil() + 16.0 + layers as f64)
     }
 
-    /// The spectrum of a block, interleaved into `out`.
+    /// Writes the interleaved spectrum of a block to `out`.
     pub(super) fn spectrum(
         &self,
         rows: usize,
@@ -137,7 +146,7 @@ impl Plan {
         }
     }
 
-    /// The multiplier that correlates with a kernel of `rows` rows.
+    /// Writes the multiplier that correlates with a kernel of `rows` rows.
     pub(super) fn multiplier(
         &self,
         rows: usize,
@@ -161,9 +170,10 @@ impl Plan {
         }
     }
 
-    /// The first `valid` rows and columns of the sum of correlations; returns a bound of the 2-norm of the whole block.
+    /// Writes the first `valid` rows and columns of the sum of correlations. Returns a bound of the
+    /// 2-norm of the whole block.
     ///
-    /// `spectra` holds the block's layers one after the other.
+    /// `spectra` contains the layers of the block one after the other.
     pub(super) fn correlate(
         &self,
         spectra: &[f32],
@@ -180,12 +190,14 @@ impl Plan {
             out[r * valid[1]..][..valid[1]].copy_from_slice(&row[..valid[1]])
         };
         self.images.inverse(spectrum, valid[0], take, images);
-        // Parseval; the half spectrum counts twice. The multiplier carries 1 / points.
+        // Parseval's theorem. The half spectrum counts twice, and the multiplier contains the
+        // factor 1 / points.
         (2.02 * squares * (height * width) as f64).sqrt()
     }
 }
 
-/// First positions of the blocks of an axis: blocks of `size` share `patch - 1` samples.
+/// Returns the first positions of the blocks of an axis. Neighbouring blocks of `size` samples
+/// share `patch - 1` samples.
 fn starts(length: usize, size: usize, patch: usize) -> Vec<usize> {
     let step = size - patch + 1;
     let blocks = 1 + length.saturating_sub(size).div_ceil(step);
@@ -200,15 +212,17 @@ fn fit<T: Clone + Default>(buffer: &mut Vec<T>, len: usize) {
 }
 
 wide_fn! {
-    /// Sum over layers of spectrum times multiplier; returns the sum of the squares of the result.
+    /// Sums spectrum times multiplier over all layers. Returns the sum of the squares of the
+    /// result.
     ///
-    /// It only filters (every match is scored again, exactly), so each CPU may round its own way. Measured: wide registers make
-    /// the block search a third faster.
+    /// This only filters, because every match is scored again exactly. Rounding may therefore
+    /// differ between CPUs. SIMD registers make the block search 33 % faster, as measured.
     fn multiply(spectra: &[f32], multipliers: &[Multiplier], out: &mut [Complex<f32>]) -> f64 {
         let values = 2 * out.len();
         let mut squares = [0.0f64; 4];
         let mut chunks = out.chunks_exact_mut(LANES / 2);
         let mut at = 0;
+        // Multiply chunks of `LANES` values, then the remaining values.
         for chunk in &mut chunks {
             let mut sum = [0.0f32; LANES];
             for (layer, m) in multipliers.iter().enumerate() {

@@ -1,7 +1,9 @@
-//! Good matches by way of half the resolution: a quarter of the positions, each of a quarter of the samples, at each step.
+//! Good matches by a search at half the resolution. Each step has a quarter of the positions and a
+//! quarter of the samples.
 //!
-//! What is half as large proposes positions, and those around them are scored exactly. The best match at the full
-//! resolution is nearly always among them; where a patch is chosen for other merits too, any good one will do.
+//! The search at half the resolution proposes positions, and the positions around them are scored
+//! exactly. The best match at full resolution is nearly always among them. A patch that is also
+//! chosen by other criteria needs only a good match.
 
 use std::ops::RangeInclusive;
 
@@ -10,18 +12,19 @@ use super::{Exemplar, Index, Match, Pick, Query, once};
 use crate::Result;
 use crate::foundation::par::{self, Monitor};
 
-/// Patches of fewer rows or columns than this say too little.
+/// Minimum side of a patch at half the resolution. Smaller patches are not distinctive enough.
 const LEAST: usize = 8;
-/// Proposals for each match that is asked for.
+/// Number of proposals for each requested match.
 const PROPOSALS: usize = 2;
 
 impl Index {
-    /// Good matches by rising (cost, exemplar, row, column), with their exact costs: as [`Self::best`], much sooner, but
-    /// not certainly the best ones.
+    /// Returns good matches by rising (cost, exemplar, row, column), with exact costs. This is much
+    /// faster than [`Self::best`], but the result need not contain the best match.
     pub fn good(&self, query: &Query<'_>, pick: &Pick, monitor: &Monitor) -> Result<Vec<Match>> {
         check_pick(pick)?;
         let fits = |e: &Exemplar| (0..2).all(|axis| query.shape[axis] <= e.shape[axis]);
-        // What is wrong with a query is for the full search to say. The order matters: sides that fit can be multiplied.
+        // An invalid query goes to the full search, which reports the error. The order of the tests
+        // matters: the product is computed only for sides that fit.
         let sound = query.shape.iter().all(|&n| n >= 2 * LEAST)
             && self.exemplars.iter().any(fits)
             && query.weight.len() == query.shape[0] * query.shape[1]
@@ -40,7 +43,8 @@ impl Index {
             separation: (pick.separation / 2).max(1),
             ratio: f64::INFINITY,
         };
-        // No place comes twice: proposals are more than a pixel apart. The most promising come first, which bounds the others.
+        // Proposals are more than a pixel apart, so no position occurs twice. The most promising
+        // positions come first, because their costs bound the others.
         let mut places = Vec::new();
         for m in half.good(&smaller, &proposals, monitor)? {
             let of = &self.exemplars[m.exemplar];
@@ -85,12 +89,12 @@ impl Index {
     }
 }
 
-/// The positions along an axis that one at half the resolution stands for.
+/// Returns the positions along an axis that a position at half the resolution stands for.
 fn stands_for(whole: &Exemplar, axis: usize, at: usize) -> RangeInclusive<usize> {
     (2 * at).saturating_sub(1)..=(2 * at + 1).min(whole.shape[axis] - 1)
 }
 
-/// The samples of an exemplar at half the resolution.
+/// Returns the samples of an exemplar at half the resolution.
 pub(super) fn halve(whole: &Exemplar, channels: usize) -> Vec<f32> {
     let [rows, columns] = whole.shape.map(|n| n / 2);
     let width = whole.shape[1] * channels;
@@ -107,7 +111,7 @@ pub(super) fn halve(whole: &Exemplar, channels: usize) -> Vec<f32> {
     data
 }
 
-/// The positions there that stand for one that is allowed.
+/// Returns the positions at half the resolution that stand for at least one allowed position.
 fn halve_allowed(whole: &Exemplar) -> Option<Vec<bool>> {
     let [rows, columns] = whole.shape.map(|n| n / 2);
     whole.allowed.as_ref().map(|allowed| {
@@ -129,19 +133,20 @@ fn halve_allowed(whole: &Exemplar) -> Option<Vec<bool>> {
     })
 }
 
-/// The means of two by two samples of two lines; of `C` channels where that is known, so that loops over them unroll.
+/// Computes the means of 2 x 2 samples of two lines. `C` is the number of channels if it is a known
+/// constant, so that the loop unrolls, else 0.
 fn halve_line<const C: usize>(up: &[f32], down: &[f32], channels: usize, out: &mut [f32]) {
     let n = if C == 0 { channels } else { C };
     let places = up.chunks_exact(2 * n).zip(down.chunks_exact(2 * n));
     for (out, (up, down)) in out.chunks_exact_mut(n).zip(places) {
         for k in 0..n {
-            // Each is divided first: the sum of four finite numbers may not be finite.
+            // Multiply each sample first, because the sum of four finite numbers may overflow.
             out[k] = 0.25 * up[k] + 0.25 * up[k + n] + (0.25 * down[k] + 0.25 * down[k + n]);
         }
     }
 }
 
-/// Samples become the mean of the known ones, by their weights.
+/// Returns a query at half the resolution. Its samples are the weighted means of the known samples.
 fn halve_query(query: &Query<'_>, channels: usize) -> (Vec<f32>, Vec<f32>) {
     let [rows, columns] = query.shape.map(|n| n / 2);
     let mut patch = vec![0.0f32; rows * columns * channels];

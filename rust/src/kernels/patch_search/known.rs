@@ -1,4 +1,4 @@
-//! What is known of exemplars whatever is looked for in them: shared by indices for patches of several sizes.
+//! Data that depend only on the exemplars. Indices for patches of several sizes share them.
 
 use std::sync::{Arc, OnceLock};
 
@@ -10,23 +10,23 @@ use crate::Result;
 use crate::foundation::error::check_shape;
 use crate::foundation::par;
 
-/// What hangs on the samples of exemplars alone.
+/// Data that depend only on the samples of the exemplars.
 pub(super) struct Known {
     /// Mean of each channel.
     pub(super) mean: Vec<f64>,
-    /// A power of two above all distances from it.
+    /// A power of two that is at least the largest distance from the mean.
     pub(super) scale: f64,
     halves: OnceLock<Halves>,
     turned: OnceLock<Vec<Turned>>,
 }
 
-/// Samples at half the resolution, and what is known of these.
+/// The exemplars at half the resolution, and the data that depend on them.
 pub(super) struct Halves {
     pub(super) data: Vec<Arc<Vec<f32>>>,
     pub(super) known: Arc<Known>,
 }
 
-/// The first exemplar that one is a mirror image of (or is itself), and along which axes.
+/// The first exemplar that an exemplar mirrors (itself if there is none), and the mirrored axes.
 type Turned = (usize, [bool; 2]);
 
 impl Known {
@@ -40,7 +40,7 @@ impl Known {
         }
     }
 
-    /// The exemplars at half the resolution, made when they are first asked for.
+    /// Returns the exemplars at half the resolution, which are computed at the first call.
     pub(super) fn halves(&self, exemplars: &[Exemplar], channels: usize) -> &Halves {
         once(&self.halves, || {
             let data = par::map(exemplars.len(), |i| {
@@ -54,8 +54,8 @@ impl Known {
 }
 
 impl Index {
-    /// The same exemplars, of which other positions are allowed, for patches of up to another size. What hangs on their
-    /// samples alone is worked out once for all.
+    /// Returns an index of the same exemplars with other allowed positions, for patches up to
+    /// another size. Data that depend only on the samples are shared.
     pub fn again(&self, allowed: Vec<Option<Vec<bool>>>, max_patch: [usize; 2]) -> Result<Self> {
         check_side(max_patch)?;
         check_shape("allowed", &[self.exemplars.len()], allowed.len())?;
@@ -73,7 +73,8 @@ impl Index {
         Self::with(exemplars, self.channels, max_patch, self.known.clone())
     }
 
-    /// For each exemplar the first one that it is a mirror image of (or is itself), and along which axes.
+    /// Returns the first exemplar that each exemplar mirrors (itself if there is none), and the
+    /// mirrored axes.
     pub(crate) fn turned(&self) -> &[Turned] {
         let turned: &Vec<_> = once(&self.known.turned, || {
             let all = &self.exemplars;
@@ -91,7 +92,7 @@ impl Index {
     }
 }
 
-/// Whether one exemplar is the other one mirrored.
+/// Whether one exemplar is the mirror image of the other.
 fn mirrors(one: &Exemplar, other: &Exemplar, channels: usize, flip: [bool; 2]) -> bool {
     one.shape == other.shape
         && match channels {
@@ -101,7 +102,8 @@ fn mirrors(one: &Exemplar, other: &Exemplar, channels: usize, flip: [bool; 2]) -
         }
 }
 
-/// [`mirrors`] for two of the same shape, with `C` channels where that is known, so that pixels are compared at once.
+/// [`mirrors`] for exemplars of the same shape. `C` is the number of channels if it is a known
+/// constant, so that pixels are compared at once, else 0.
 fn turned<const C: usize>(
     one: &Exemplar,
     other: &Exemplar,
@@ -118,7 +120,7 @@ fn turned<const C: usize>(
             return a == b;
         }
         let pairs = a.chunks_exact(n).zip(b.chunks_exact(n).rev());
-        // No early end within a row, nor within a pixel: a mirror has to be seen to its end anyway.
+        // Compare whole rows without an early exit, which is faster for the mirror images.
         pairs.fold(true, |same, (a, b)| {
             (0..n).fold(same, |same, k| same & (a[k] == b[k]))
         })

@@ -1,4 +1,4 @@
-//! The maps of filtered costs of one search, and how the true minimum is taken from them.
+//! The filtered cost maps of one search, and the search of the exact minimum in them.
 
 use super::costs::Map;
 use super::filter::Multiplier;
@@ -7,13 +7,14 @@ use super::{Block, Index, Match, Pick, Query, too_dear};
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Below this many multiplications for one of the filter's units of work, positions are scored one by one.
+/// If scoring a position takes fewer multiplications than this per unit of the filter's work,
+/// positions are scored directly.
 const DIRECT: f64 = 1.0;
 
-/// Candidates that are scored before the best is looked at again.
+/// Number of candidates that are scored before the best cost is checked again.
 const ROUND: usize = 4096;
 
-/// Candidates that a task scores.
+/// Number of candidates of a task.
 const CHUNK: usize = 16;
 
 /// Buffers of one search.
@@ -23,7 +24,7 @@ pub(super) struct Workspace {
     multipliers: Vec<Multiplier>,
     maps: Vec<Map>,
     candidates: Vec<Candidate>,
-    /// Those scored in earlier rounds.
+    /// Candidates that were scored in earlier rounds.
     scored: Vec<Candidate>,
 }
 
@@ -54,7 +55,8 @@ impl Index {
         Ok(())
     }
 
-    /// Fills the maps of some blocks. A true cost is the filtered one times the first number, plus the second.
+    /// Fills the maps of some blocks. Returns factor and offset: an exact cost is the filtered cost
+    /// times the factor, plus the offset.
     pub(super) fn filter(
         &self,
         query: &Query<'_>,
@@ -62,6 +64,7 @@ impl Index {
         monitor: &Monitor,
         workspace: &mut Workspace,
     ) -> Result<(f64, f64)> {
+        // Compute the spectra of the kernels, one for each layer.
         self.check_size(query)?;
         workspace.prepared.fill(query, self.channels)?;
         workspace
@@ -80,6 +83,7 @@ impl Index {
             self.scratch.give(scratch);
         });
 
+        // Correlate each block with the kernels.
         let multipliers = &workspace.multipliers;
         let spectra = self.spectra();
         let stride = 2 * self.plan.len() * layers;
@@ -105,6 +109,8 @@ impl Index {
                 &mut scratch,
             );
             self.scratch.give(scratch);
+            // Bound the error of this block, and add the means that were removed before the
+            // transform.
             let (mut correlated, mut rounded, mut level) = (0.0, 0.0, 0.0);
             for (layer, of) in spectra.levels[b * layers..][..layers].iter().enumerate() {
                 let kernel = prepared.kernel(layer);
@@ -120,6 +126,7 @@ impl Index {
             for cost in &mut map.costs {
                 *cost += level as f32;
             }
+            // Exclude forbidden positions.
             if let Some(allowed) = &of.allowed {
                 for (r, row) in map.costs.chunks_exact_mut(map.valid[1]).enumerate() {
                     let start = (corner[0] + r) * of.shape[1] + corner[1];
@@ -136,7 +143,7 @@ impl Index {
         Ok((unit, offset))
     }
 
-    /// Fills the maps with scores instead: cheaper where there are few samples or positions.
+    /// Fills the maps with exact scores instead, which is faster for few samples or positions.
     fn evaluate(
         &self,
         query: &Query<'_>,
@@ -161,6 +168,7 @@ impl Index {
             if monitor.check().is_err() {
                 return;
             }
+            // If few positions are allowed, score only those.
             if let Some(open) = &self.open[exemplar] {
                 map.costs.resize(map.valid[0] * map.valid[1], f32::INFINITY);
                 let columns = of.shape[1];
@@ -200,6 +208,7 @@ impl Index {
         monitor: &Monitor,
         workspace: &mut Workspace,
     ) -> Result<Vec<Match>> {
+        // Reject a patch that is larger than all exemplars.
         self.check_size(query)?;
         let [p, q] = query.shape;
         let along = |length: usize, patch: usize| (length + 1).saturating_sub(patch);
@@ -214,7 +223,7 @@ impl Index {
             return Err(Error::value("patch", message));
         }
         let samples = (p * q * self.channels) as f64;
-        // Of those that are listed no others are scored.
+        // An exemplar with a list of allowed positions is scored only at these.
         let open = self.exemplars.iter().zip(&self.open).map(|(e, open)| {
             let all = along(e.shape[0], p) * along(e.shape[1], q);
             open.as_ref().map_or(all, |open| open.len().min(all))
@@ -225,6 +234,7 @@ impl Index {
         } else {
             self.filter(query, 0..self.blocks.len(), monitor, workspace)?;
         }
+        // Take the best match repeatedly, and forbid the positions around it.
         workspace.scored.clear();
         let mut found: Vec<Match> = Vec::new();
         while found.len() < pick.count {
@@ -240,7 +250,7 @@ impl Index {
         Ok(found)
     }
 
-    /// The true best of the positions that are still allowed.
+    /// Returns the exact best of the positions that are still allowed.
     fn next(&self, monitor: &Monitor, workspace: &mut Workspace) -> Result<Option<Match>> {
         let Workspace {
             prepared,
@@ -250,7 +260,8 @@ impl Index {
             ..
         } = workspace;
         let prepared = &*prepared;
-        // One position costs at most `limit`; what costs more for certain is not the best.
+        // At least one position costs at most `limit`. Positions whose cost is certainly above it
+        // are not the best.
         let least = maps.iter().filter(|m| m.least < f32::INFINITY);
         let limit = least
             .map(|m| f64::from(m.least) + m.error(m.least))
@@ -273,6 +284,7 @@ impl Index {
                 });
             });
         }
+        // Reuse the exact costs of candidates from earlier rounds.
         candidates.sort_unstable_by_key(|c| c.at);
         let mut known = scored.iter().peekable();
         for c in candidates.iter_mut() {
@@ -281,8 +293,8 @@ impl Index {
                 c.cost = k.cost;
             }
         }
-        // In order of position, and only a lower cost replaces the best: ties go to the first. A cost of nothing cannot
-        // be improved on.
+        // Candidates are in order of position, and only a lower cost replaces the best, so ties go
+        // to the first. The search stops at cost 0, which cannot be improved.
         let mut best = Candidate {
             cost: f64::INFINITY,
             ..Candidate::default()

@@ -1,13 +1,16 @@
 //! Exact best matches of a masked, weighted patch over all positions of one or several exemplars.
 //!
-//! The cost of a position is the weighted sum of squared differences, `sum w (T - S)^2`. As in Kwatra et al.,
-//! *Graphcut textures*, SIGGRAPH 2003, section 3.1, all positions are evaluated at once by Fourier correlation:
-//! `sum w T^2 - 2 sum (w T) S + sum w S^2`.
+//! The cost of a position is the weighted sum of squared differences, `sum w (T - S)^2`. As in
+//! Kwatra et al., *Graphcut textures*, SIGGRAPH 2003, section 3.1, all positions are evaluated at
+//! once by Fourier correlation: `sum w T^2 - 2 sum (w T) S + sum w S^2`.
 //!
-//! The correlation, in `f32`, is only a filter. Every position whose filtered cost is within twice the error bound of the
-//! least is scored again, in `f64` and in a fixed order, so the answer is the true minimum: the same for any
-//! number of threads, any block size and any CPU, with ties to the lowest (exemplar, row, column). Means are removed before
-//! the transforms, which is what makes the bound tight: on photographs it lets a handful of positions through.
+//! The correlation in `f32` is only a filter. Every position whose filtered cost is within twice
+//! the error bound of the minimum is scored again, in `f64` and in a fixed order. The result is
+//! therefore the exact minimum. It does not depend on the number of threads, the block size or the
+//! CPU. Ties go to the lowest (exemplar, row, column).
+//!
+//! Means are removed before the transforms, which makes the bound tight: on photographs only a
+//! handful of positions remain.
 
 mod checks;
 mod costs;
@@ -31,41 +34,44 @@ use maps::Workspace;
 use score::Prepared;
 use spectra::Spectra;
 
-/// What is searched: samples in row-major order, channels last.
+/// The searched image: samples in row-major order, channels last.
 #[derive(Debug, Clone, Default)]
 pub struct Exemplar {
-    /// `rows * columns * channels` finite samples; several indices may look into them.
+    /// `rows * columns * channels` finite samples. Several indices may share them.
     pub data: Arc<Vec<f32>>,
     /// Rows and columns.
     pub shape: [usize; 2],
-    /// Which positions (top-left corners) may be used, `rows * columns`; all if absent.
+    /// Flags of the allowed positions (top-left corners), `rows * columns`. All positions are
+    /// allowed if absent.
     pub allowed: Option<Vec<bool>>,
 }
 
-/// What is looked for.
+/// The patch to search for.
 #[derive(Debug, Clone, Copy)]
 pub struct Query<'a> {
-    /// `rows * columns * channels` samples; where the weight is zero anything, NaN too.
+    /// `rows * columns * channels` samples. Samples of weight 0 may have any value, including NaN.
     pub patch: &'a [f32],
-    /// `rows * columns` weights, not negative; zero where the patch is unknown. All zero: every position costs nothing.
+    /// `rows * columns` non-negative weights. The weight is 0 where the patch is unknown. If all
+    /// weights are 0, every position has cost 0.
     pub weight: &'a [f32],
     /// Rows and columns.
     pub shape: [usize; 2],
 }
 
-/// How many matches, and which.
+/// Number and choice of the matches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pick {
-    /// At most this many.
+    /// Maximum number of matches.
     pub count: usize,
-    /// Matches in one exemplar are more than this many pixels apart, along rows or along columns.
+    /// Matches in the same exemplar are more than this number of pixels apart, along rows or along
+    /// columns.
     pub separation: usize,
-    /// No match costs more than this times the least.
+    /// Maximum cost of a match, as a multiple of the lowest cost.
     pub ratio: f64,
 }
 
 impl Default for Pick {
-    /// The best one.
+    /// Returns the choice of only the best match.
     fn default() -> Self {
         Self {
             count: 1,
@@ -80,28 +86,28 @@ impl Default for Pick {
 pub struct Match {
     /// Weighted sum of squared differences.
     pub cost: f64,
-    /// Which exemplar.
+    /// Index of the exemplar.
     pub exemplar: usize,
-    /// Row of the patch's top-left corner.
+    /// Row of the top-left corner of the patch.
     pub row: usize,
-    /// Column of the patch's top-left corner.
+    /// Column of the top-left corner of the patch.
     pub column: usize,
 }
 
-/// Exemplars made ready for many searches.
+/// Exemplars prepared for many searches.
 pub struct Index {
     exemplars: Vec<Exemplar>,
     channels: usize,
     max_patch: [usize; 2],
     plan: Plan,
     blocks: Vec<Block>,
-    /// Made by the first search that needs them.
+    /// Spectra of the blocks, computed by the first search that needs them.
     spectra: OnceLock<Spectra>,
-    /// The same exemplars at half the resolution, if patches bear it.
+    /// The same exemplars at half the resolution, if patches are large enough.
     half: OnceLock<Option<Box<Index>>>,
-    /// Of exemplars in which few positions are allowed: these, in their order.
+    /// List of the allowed positions, in order, of each exemplar that has only few.
     open: Vec<Option<Vec<u32>>>,
-    /// What hangs on the samples alone.
+    /// Data that depend only on the samples.
     known: Arc<Known>,
     workspaces: Pool<Workspace>,
     scratch: Pool<Scratch>,
@@ -113,7 +119,8 @@ struct Block {
     corner: [usize; 2],
 }
 
-/// Buffers kept for the next taker. Never waits: a lock held elsewhere (or in the parent of a fork) means a new buffer.
+/// Buffers that are kept for reuse. It never waits: if the lock is held elsewhere, or in the parent
+/// of a fork, the caller gets a new buffer.
 struct Pool<T>(Mutex<Vec<T>>);
 
 impl<T: Default> Pool<T> {
@@ -132,8 +139,11 @@ impl<T: Default> Pool<T> {
     }
 }
 
-/// What a cell holds, made now if it is empty. Made before the cell is locked: a thread of the pool that waited for the lock
-/// might be the one that has to make it. Two that come at once make the same, and the first is kept.
+/// Returns the value of a cell, and computes it if the cell is empty.
+///
+/// The value is computed before the cell is locked. Otherwise a pool thread might wait for the lock
+/// although it has to compute the value itself. Two threads that come at the same time compute the
+/// same value, and the first one is kept.
 fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     if let Some(made) = cell.get() {
         return made;
@@ -143,7 +153,7 @@ fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
 }
 
 impl Index {
-    /// Makes exemplars ready to be searched for patches of up to `max_patch` rows and columns.
+    /// Prepares exemplars to be searched for patches of up to `max_patch` rows and columns.
     pub fn new(exemplars: Vec<Exemplar>, channels: usize, max_patch: [usize; 2]) -> Result<Self> {
         if exemplars.is_empty() || channels == 0 {
             let message = format!(
@@ -161,13 +171,14 @@ impl Index {
         Self::with(exemplars, channels, max_patch, known)
     }
 
-    /// Makes exemplars ready of which all is known but where they are looked into, and for what.
+    /// Prepares exemplars whose sample data `known` are already computed.
     fn with(
         exemplars: Vec<Exemplar>,
         channels: usize,
         max_patch: [usize; 2],
         known: Arc<Known>,
     ) -> Result<Self> {
+        // Check the memory, then plan blocks for the largest patch that fits.
         let samples = exemplars.iter().map(|e| e.data.len()).sum();
         memory::room("what patches are searched in", samples, 24)?;
         let longest = |axis: usize| exemplars.iter().map(|e| e.shape[axis]).max().unwrap_or(1);
@@ -200,7 +211,7 @@ impl Index {
         })
     }
 
-    /// Channels of the exemplars.
+    /// Number of channels of the exemplars.
     pub fn channels(&self) -> usize {
         self.channels
     }
@@ -210,20 +221,21 @@ impl Index {
         self.exemplars.iter().map(|e| e.shape).collect()
     }
 
-    /// The exemplars, in the order in which they came.
+    /// The exemplars, in their given order.
     pub fn exemplars(&self) -> &[Exemplar] {
         &self.exemplars
     }
 
-    /// The largest patch that can be looked for.
+    /// Largest patch that can be searched for.
     pub fn max_patch(&self) -> [usize; 2] {
         self.max_patch
     }
 
-    /// The best matches, by rising (cost, exemplar, row, column).
+    /// Returns the best matches by rising (cost, exemplar, row, column).
     ///
-    /// Greedy: the best position of all, then the best of those far enough from the ones taken, and so on. Fewer than
-    /// `count` come back where separation, ratio or the allowed positions leave no more.
+    /// The choice is greedy: the best of all positions, then the best of those far enough from the
+    /// chosen ones, and so on. Fewer than `count` matches are returned if separation, ratio or
+    /// allowed positions leave no more.
     pub fn best(&self, query: &Query<'_>, pick: &Pick, monitor: &Monitor) -> Result<Vec<Match>> {
         check_pick(pick)?;
         let mut workspace = self.workspaces.take();
@@ -232,13 +244,13 @@ impl Index {
         found
     }
 
-    /// The cost of one position.
+    /// Returns the cost of one position.
     pub fn at(&self, query: &Query<'_>, exemplar: usize, row: usize, column: usize) -> Result<f64> {
         let found = self.best_among(query, &[[exemplar, row, column]], &Pick::default())?;
         Ok(found[0].cost)
     }
 
-    /// [`Self::best`] among the given (exemplar, row, column); the `allowed` positions play no part.
+    /// [`Self::best`] among given (exemplar, row, column). The `allowed` positions are ignored.
     pub fn best_among(
         &self,
         query: &Query<'_>,
@@ -246,6 +258,7 @@ impl Index {
         pick: &Pick,
     ) -> Result<Vec<Match>> {
         check_pick(pick)?;
+        // Check that the patch fits at all candidates.
         let mut prepared = Prepared::default();
         prepared.fill(query, self.channels)?;
         for &[exemplar, row, column] in candidates {
@@ -267,8 +280,9 @@ impl Index {
                 return Err(Error::value("candidates", message));
             }
         }
-        // What is too dear next to any other is none of the matches, however dear. Bits of numbers that are not negative
-        // are ordered as they are.
+        // A candidate that is too costly compared with any other is not a match, so its exact cost
+        // is not needed. The minimum is kept as bits, because the bits of non-negative floats have
+        // the same order as the floats.
         let least = AtomicU64::new(f64::INFINITY.to_bits());
         let mut all = par::map(candidates.len(), |i| {
             let [exemplar, row, column] = candidates[i];
@@ -287,6 +301,7 @@ impl Index {
                 column,
             }
         });
+        // Choose greedily from the sorted candidates.
         all.sort_by(order);
         let mut found: Vec<Match> = Vec::new();
         for m in all {
@@ -304,8 +319,8 @@ impl Index {
         Ok(found)
     }
 
-    /// The costs of all positions of one exemplar as the filter sees them, (rows - p + 1) x (columns - q + 1), and how far
-    /// they may be from the true ones. Forbidden positions are infinite.
+    /// Returns the filtered costs of all positions of one exemplar, and the bound of their error.
+    /// There are (rows - p + 1) x (columns - q + 1) positions. Forbidden positions are infinite.
     pub fn cost_map(
         &self,
         query: &Query<'_>,
@@ -324,6 +339,7 @@ impl Index {
             );
             return Err(Error::value("patch", message));
         }
+        // Filter only the blocks of this exemplar, and convert their costs.
         let mut workspace = self.workspaces.take();
         let first = self.blocks.partition_point(|b| b.exemplar < exemplar);
         let last = self.blocks.partition_point(|b| b.exemplar <= exemplar);
@@ -348,7 +364,7 @@ impl Index {
 }
 
 fn too_dear(first: &Match, next: &Match, pick: &Pick) -> bool {
-    // No product where the ratio is infinite: it would be NaN for a perfect match.
+    // Avoid the product for an infinite ratio, because it would be NaN for a perfect match.
     pick.ratio.is_finite() && next.cost > pick.ratio * first.cost
 }
 
@@ -358,10 +374,10 @@ fn order(a: &Match, b: &Match) -> std::cmp::Ordering {
         .then_with(|| (a.exemplar, a.row, a.column).cmp(&(b.exemplar, b.row, b.column)))
 }
 
-/// One position of so many, at most, is allowed where these are listed.
+/// Positions are listed if at most one in this number is allowed.
 const FEW: usize = 4;
 
-/// The positions that are allowed in an exemplar, if few are.
+/// Returns the allowed positions of an exemplar, if there are few.
 fn list_open(exemplar: &Exemplar) -> Option<Vec<u32>> {
     let allowed = exemplar.allowed.as_ref()?;
     let count = allowed.iter().filter(|&&open| open).count();

@@ -1,4 +1,4 @@
-//! A query made ready, and the exact score of one position.
+//! A prepared query, and the exact score of one position.
 
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use std::arch::x86_64::{__m128, __m256d};
@@ -9,9 +9,9 @@ use crate::foundation::error::check_shape;
 use crate::foundation::wide::{V3, cast};
 use crate::{Error, Result};
 
-/// Sums of a score. Fixed, so that every CPU adds in the same order.
+/// Number of partial sums of a score. It is fixed, so that every CPU adds in the same order.
 const LANES: usize = 8;
-/// Rows between two looks at a bound.
+/// Number of rows between comparisons with the bound.
 const LOOK: usize = 4;
 
 /// A query in the forms that scores and kernels need.
@@ -20,11 +20,12 @@ pub(super) struct Prepared {
     shape: [usize; 2],
     channels: usize,
     patch: Vec<f32>,
-    /// A weight for each sample of the patch.
+    /// One weight for each sample of the patch.
     weight: Vec<f32>,
-    /// The samples of each row outside of which all weights are zero, in whole lanes.
+    /// Range of samples in each row that contains all non-zero weights, rounded to whole lanes.
     weighed: Vec<[usize; 2]>,
-    /// Distances from the exemplars' mean, in units of the largest, where the weight is not zero.
+    /// Differences from the mean of the exemplars, divided by the largest difference. Samples of
+    /// weight 0 have 0.
     centred: Vec<f32>,
     largest_weight: f64,
     largest: f64,
@@ -42,7 +43,7 @@ pub(super) struct Kernel {
 }
 
 impl Prepared {
-    /// Takes over a query after checking it.
+    /// Checks a query and copies it.
     pub(super) fn fill(&mut self, query: &Query<'_>, channels: usize) -> Result<()> {
         let [rows, columns] = query.shape;
         check_shape("patch", &[rows, columns, channels], query.patch.len())?;
@@ -54,6 +55,7 @@ impl Prepared {
             let message = format!("must be finite and not negative, got {bad}");
             return Err(Error::value("weight", message));
         }
+        // Replace samples of weight 0, which may be NaN, by 0.
         self.shape = query.shape;
         self.channels = channels;
         self.patch.clear();
@@ -68,6 +70,7 @@ impl Prepared {
                 self.weight.push(w);
             }
         }
+        // Find the range of non-zero weights of each row.
         let lines = query.weight.chunks_exact(columns);
         self.weighed.clear();
         self.weighed.extend(lines.map(|line| {
@@ -82,7 +85,7 @@ impl Prepared {
         Ok(())
     }
 
-    /// Makes the kernels of the filter, for exemplars of this mean and scale.
+    /// Computes the kernels of the filter, for exemplars of this mean and scale.
     pub(super) fn normalise(&mut self, mean: &[f64], scale: f64) {
         let distance = |i: usize, x: f32| f64::from(x) - mean[i % self.channels];
         let positive = |x: f64| if x > 0.0 { x } else { 1.0 };
@@ -95,6 +98,7 @@ impl Prepared {
                 .map(|(i, (&x, _))| distance(i, x).abs())
                 .fold(0.0, f64::max),
         );
+        // Centre the patch and normalise it by its largest difference.
         self.centred.clear();
         self.offset = 0.0;
         for (i, (&x, &w)) in self.patch.iter().zip(&self.weight).enumerate() {
@@ -106,6 +110,7 @@ impl Prepared {
                 0.0
             });
         }
+        // Measure sum and norm of the kernel of each layer.
         self.row.resize(self.shape[1], 0.0);
         let mut row = std::mem::take(&mut self.row);
         self.kernels.clear();
@@ -122,14 +127,16 @@ impl Prepared {
         self.row = row;
     }
 
-    /// How the filter divides between the patch and the weights, so that neither overflows: (patch, weights).
+    /// Returns the factors (patch, weights) that scale the patch and the weights in the filter, so
+    /// that neither overflows.
     fn factors(&self) -> (f64, f64) {
         let ratio = self.largest / self.scale;
         let most = ratio.max(1.0);
         (ratio / most, 1.0 / most)
     }
 
-    /// Row `r` of the kernel that is correlated with a layer: the channels' `-2 w T`, then the weights.
+    /// Writes row `r` of the kernel that is correlated with a layer: `-2 w T` for a channel, and
+    /// the weights for the last layer.
     pub(super) fn kernel_row(&self, layer: usize, r: usize, out: &mut [f32]) {
         let (patch, weights) = self.factors();
         let width = self.shape[1] * self.channels;
@@ -145,12 +152,12 @@ impl Prepared {
         }
     }
 
-    /// Sum and norm of the kernel of a layer.
+    /// Returns sum and norm of the kernel of a layer.
     pub(super) fn kernel(&self, layer: usize) -> Kernel {
         self.kernels[layer]
     }
 
-    /// Sum of the weights.
+    /// Returns the sum of the weights.
     pub(super) fn total_weight(&self) -> f64 {
         self.weight
             .iter()
@@ -159,7 +166,7 @@ impl Prepared {
             .sum()
     }
 
-    /// Cost of one unit of the filter, and the cost that it leaves out.
+    /// Returns the cost of one unit of the filter, and the cost that the filter omits.
     pub(super) fn unit(&self) -> (f64, f64) {
         let most = (self.largest / self.scale).max(1.0);
         (
@@ -168,20 +175,20 @@ impl Prepared {
         )
     }
 
-    /// No position costs more.
+    /// Returns a cost that no position exceeds.
     pub(super) fn largest_cost(&self, scale: f64) -> f64 {
         let total = self.total_weight() * self.channels as f64;
         (total * (scale + self.largest).powi(2)).max(f64::MIN_POSITIVE)
     }
 
-    /// The cost of a position.
+    /// Returns the cost of a position.
     pub(super) fn cost(&self, data: &[f32], shape: [usize; 2], at: [usize; 2]) -> f64 {
         self.cost_within(data, shape, at, f64::INFINITY)
     }
 
-    /// The cost of a position; infinite where it is more than `bound`, as soon as that is seen.
+    /// Returns the cost of a position, or infinity as soon as it is known to exceed `bound`.
     ///
-    /// Lanes, their order and the absence of fused operations are part of the result.
+    /// The result depends on the lanes, their order and the absence of fused operations.
     pub(super) fn cost_within(
         &self,
         data: &[f32],
@@ -191,7 +198,8 @@ impl Prepared {
     ) -> f64 {
         #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
         if let Some(simd) = V3::try_new() {
-            // All rows in one call: of a patch that is little known they are short.
+            // Score all rows in one SIMD call, because rows of a sparsely known patch are too short
+            // for a call each.
             return simd.vectorize(
                 #[inline(always)]
                 || {
@@ -223,7 +231,7 @@ impl Prepared {
         let rows = self.patch.chunks_exact(width);
         let rows = rows.zip(self.weight.chunks_exact(width)).enumerate();
         for (r, (patch, weight)) in rows {
-            // What lies outside adds nothing to any lane.
+            // Samples outside this range have weight 0.
             let [first, end] = self.weighed[r];
             if first >= end {
                 continue;
@@ -232,7 +240,7 @@ impl Prepared {
             let samples = &data[start..][first..end];
             let (patch, weight) = (&patch[first..end], &weight[first..end]);
             add(&mut lanes, patch, weight, samples);
-            // Sums only rise, rounded or not.
+            // Sums only rise, even with rounding, so a partial sum above the bound is final.
             if r % LOOK == LOOK - 1 && total(&lanes) > bound {
                 return f64::INFINITY;
             }
@@ -242,7 +250,7 @@ impl Prepared {
     }
 }
 
-/// Adds the weighted squares of a row to the lanes.
+/// Adds the weighted squared differences of a row to the lanes.
 #[inline(always)]
 fn add(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {
     let (p, p_rest) = patch.as_chunks::<LANES>();
@@ -260,8 +268,8 @@ fn add(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32])
     }
 }
 
-/// [`add`] in wide registers, the same operations in the same order. Measured: twice as fast as what the compiler makes of
-/// it.
+/// [`add`] in SIMD registers, with the same operations in the same order. It is 2x as fast as the
+/// code that the compiler generates, as measured.
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 #[inline(always)]
 fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {
@@ -270,7 +278,7 @@ fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], sam
     let (w, w_rest) = weight.as_chunks::<LANES>();
     let (s, s_rest) = samples.as_chunks::<LANES>();
     let mut sums: [__m256d; 2] = cast(*lanes);
-    // No closures: one that is not inlined would make calls of single instructions.
+    // Avoid closures: one that is not inlined would turn single instructions into calls.
     for ((p, w), s) in p.iter().zip(w).zip(s) {
         let p: [__m128; 2] = cast(*p);
         let w: [__m128; 2] = cast(*w);
@@ -285,7 +293,7 @@ fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], sam
     add(lanes, p_rest, w_rest, s_rest);
 }
 
-/// The sum of the lanes, in a fixed order.
+/// Returns the sum of the lanes, in a fixed order.
 #[inline(always)]
 fn total(lanes: &[f64; LANES]) -> f64 {
     let half: [f64; 4] = std::array::from_fn(|l| lanes[l] + lanes[l + 4]);

@@ -1,14 +1,14 @@
-//! What the filter knows of the exemplars: spectra of their blocks, of which the means are taken out.
+//! Spectra of the blocks of the exemplars, with the means removed.
 
 use super::{Block, Exemplar, Index, once};
 use crate::foundation::functions::power_below;
 use crate::foundation::par;
 
-/// What the filter knows of the exemplars.
+/// Data of the exemplars for the filter.
 pub(super) struct Spectra {
-    /// Interleaved: of each block the channels, then the squares.
+    /// Interleaved spectra. Each block has one layer for each channel, then a layer of squares.
     pub(super) values: Vec<f32>,
-    /// Mean of each layer of each block, taken out before the transform, and the 2-norm of what is left.
+    /// Mean of each layer of each block, removed before the transform, and the 2-norm of the rest.
     pub(super) levels: Vec<Level>,
 }
 
@@ -44,7 +44,8 @@ impl Index {
         })
     }
 
-    /// Row `r` of a layer of a block: a channel less its mean, or the sum of the squares of all, in units of the scale.
+    /// Returns row `r` of a layer of a block, in units of the scale. A layer is a channel minus its
+    /// mean, or the sum of the squares of all channels.
     fn layer_row(&self, block: Block, layer: usize, r: usize) -> impl Iterator<Item = f64> {
         let Exemplar { data, shape, .. } = &self.exemplars[block.exemplar];
         let [first, left] = block.corner;
@@ -77,7 +78,7 @@ impl Index {
     }
 }
 
-/// The sum of what is made of each value, some side by side.
+/// Sums `of(x)` over all values, in eight partial sums so that the loop vectorises.
 fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
     let (chunks, rest) = values.as_chunks::<8>();
     let mut lanes = [0.0; 8];
@@ -89,7 +90,8 @@ fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
     lanes.iter().sum::<f64>() + rest.iter().map(|&x| of(x)).sum::<f64>()
 }
 
-/// Mean of each channel, and a power of two above all distances from it.
+/// Returns the mean of each channel, and a power of two that is at least the largest distance from
+/// it.
 pub(super) fn moments(all: &[&[f32]], channels: usize) -> (Vec<f64>, f64) {
     let mut mean = vec![0.0; channels];
     let mut range = vec![[f32::INFINITY, f32::NEG_INFINITY]; channels];
@@ -109,7 +111,7 @@ pub(super) fn moments(all: &[&[f32]], channels: usize) -> (Vec<f64>, f64) {
         .flat_map(|(m, r)| r.map(|x| (f64::from(x) - m).abs()));
     let far = far.fold(0.0, f64::max);
     let scale = if far > 0.0 {
-        // The smallest power of two that is no less.
+        // Round up to the next power of two.
         let below = power_below(far);
         if below < far { 2.0 * below } else { below }
     } else {
@@ -118,15 +120,17 @@ pub(super) fn moments(all: &[&[f32]], channels: usize) -> (Vec<f64>, f64) {
     (mean, scale)
 }
 
-/// Adds samples to the sum of each channel, and widens its range; `LANES` of them side by side, which are whole pixels, or a
-/// pixel at a time if 0: a sum alone would wait for each addition.
+/// Adds samples to the sum of each channel, and extends its range.
+///
+/// It processes `LANES` samples together, which are whole pixels, or one pixel at a time if `LANES`
+/// is 0. With a single sum, each addition would wait for the previous one.
 fn tally<const LANES: usize>(
     data: &[f32],
     channels: usize,
     sum: &mut [f64],
     range: &mut [[f32; 2]],
 ) {
-    // Samples are numbers, for which comparisons are less work than `min` and `max`.
+    // Samples are never NaN, so comparisons replace the costlier `min` and `max`.
     let least = |a: f32, b: f32| if b < a { b } else { a };
     let most = |a: f32, b: f32| if b > a { b } else { a };
     let mut sums = [0.0f64; LANES];
@@ -141,6 +145,7 @@ fn tally<const LANES: usize>(
             }
         }
     }
+    // Combine the lanes, then add the remaining pixels.
     for l in 0..LANES {
         let k = l % channels;
         sum[k] += sums[l];

@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-/// Every cost, one multiplication after the other, in `f64`.
+/// Returns all costs, computed one by one in `f64`.
 fn naive(exemplars: &[Exemplar], channels: usize, query: &Query<'_>) -> Vec<Match> {
     let [p, q] = query.shape;
     let mut all = Vec::new();
@@ -170,7 +170,7 @@ fn half_the_resolution_keeps_to_what_is_allowed() {
 
 #[test]
 fn few_allowed_positions_are_scored_one_by_one() {
-    // The larger ones take several blocks.
+    // The larger exemplars have several blocks.
     let mut all = vec![
         exemplar([30, 200], 2, 1, 9),
         exemplar([190, 170], 2, 2, 9),
@@ -341,7 +341,7 @@ proptest! {
                     expected.push(m);
                 }
             }
-            // Whole numbers: both sums are exact.
+            // The samples are integers, so both sums are exact.
             prop_assert_eq!(found, &expected);
         }
     }
