@@ -1,12 +1,15 @@
-//! Grey-scale reconstruction: an image dilated again and again, and each time held under another one.
+//! Grey-scale reconstruction: repeated dilation of an image, limited by another image after each
+//! step.
 //!
-//! L. Vincent, *Morphological grayscale reconstruction in image analysis: applications and efficient algorithms*, IEEE
-//! Transactions on Image Processing 2(2), 1993, section III.D (the hybrid algorithm), with eight neighbours a pixel.
+//! L. Vincent, *Morphological grayscale reconstruction in image analysis: applications and
+//! efficient algorithms*, IEEE Transactions on Image Processing 2(2), 1993, section III.D (the
+//! hybrid algorithm). Each pixel has eight neighbours.
 //!
-//! 1. A sweep each way over all rows carries most values to where they end.
-//! 2. Pixels that could still raise a neighbour go into a queue, and so does each that is raised, until there is none.
+//! 1. One sweep in each direction over all rows propagates most values to their final places.
+//! 2. Pixels that can still raise a neighbour enter a queue, and so does each raised pixel, until
+//!    the queue is empty.
 //!
-//! Values are compared and copied, nothing else: the result is the same whatever the order.
+//! Values are only compared and copied, so the result does not depend on the order.
 
 use std::collections::VecDeque;
 
@@ -17,10 +20,11 @@ use crate::foundation::par::Monitor;
 use crate::foundation::wide::wide_fn;
 use crate::{Error, Result};
 
-/// Pixels raised between two looks at the monitor.
+/// Number of processed pixels between checks of the monitor.
 const BREATH: usize = 1 << 16;
 
-/// The largest image below `mask` that is reached from `seed`, which is taken no higher than the mask.
+/// Returns the largest image below `mask` that `seed` reaches. The seed is first clamped to the
+/// mask.
 pub fn reconstruct(
     seed: &[f32],
     mask: &[f32],
@@ -43,6 +47,7 @@ pub fn reconstruct(
     memory::room("a reconstruction", grid.len(), 24)?;
     monitor.check()?;
     let mut out: Vec<f32> = seed.iter().zip(mask).map(|(&s, &m)| least(s, m)).collect();
+    // Propagate values down and then up.
     let [rows, columns] = grid.shape();
     for row in 0..rows {
         let (above, here) = out[..(row + 1) * columns].split_at_mut(row * columns);
@@ -55,6 +60,7 @@ pub fn reconstruct(
         let before = (row + 1 < rows).then(|| &below[..columns]);
         carry(before, here, &mask[row * columns..][..columns]);
     }
+    // Queue the pixels that can still raise a neighbour, then propagate from the queue.
     let around = Around::new(grid);
     let mut queue: VecDeque<u32> = VecDeque::new();
     for p in 0..out.len() {
@@ -81,7 +87,7 @@ pub fn reconstruct(
     Ok(out)
 }
 
-/// Numbers that are none of NaN, for which comparisons are less work than `min`.
+/// Returns the lesser of two numbers that are not NaN. The comparison is cheaper than `min`.
 #[inline(always)]
 fn least(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
@@ -92,7 +98,7 @@ fn most(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }
 
-/// Carries values from a row into the next one, and along this both ways.
+/// Propagates values from a row into the next one, and along the next one in both directions.
 fn carry(before: Option<&[f32]>, here: &mut [f32], mask: &[f32]) {
     if let Some(before) = before {
         lower(before, here, mask);
@@ -110,7 +116,7 @@ fn carry(before: Option<&[f32]>, here: &mut [f32], mask: &[f32]) {
 }
 
 wide_fn! {
-    /// Carries values from a row to the three next to each in another one.
+    /// Propagates values from a row to the three nearest pixels of another row.
     fn lower(before: &[f32], here: &mut [f32], mask: &[f32]) {
         let n = here.len();
         for (x, &b) in here.iter_mut().zip(before) {
@@ -143,7 +149,7 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// Calls `f` with each.
+    /// Calls `f` with each neighbour of a pixel. Near an edge, the pixel itself is included.
     #[inline(always)]
     fn of(&self, p: usize, mut f: impl FnMut(usize)) {
         let ([rows, columns], [row, column]) = (self.grid.shape(), self.grid.point(p));
@@ -171,7 +177,7 @@ mod tests {
     use crate::foundation::hash::Noise;
     use proptest::prelude::*;
 
-    /// Dilated until nothing changes.
+    /// Dilates until nothing changes.
     fn naive(seed: &[f32], mask: &[f32], grid: &Grid<2>) -> Vec<f32> {
         let mut out: Vec<f32> = seed.iter().zip(mask).map(|(&s, &m)| s.min(m)).collect();
         loop {

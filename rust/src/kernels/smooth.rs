@@ -1,7 +1,8 @@
-//! Arrays smoothed along their axes, by weights that are the same both ways, as those of a Gaussian.
+//! Smoothing of arrays along their axes with symmetric weights, such as those of a Gaussian.
 //!
-//! Sums run in double precision, from the middle on and then the farthest first, and are rounded to the array's type after each
-//! axis: as `scipy.ndimage.correlate1d` has it, byte for byte.
+//! Sums run in double precision: first the central value, then the pairs of values from the
+//! farthest to the nearest. They are rounded to the array's type after each axis. The results equal
+//! those of `scipy.ndimage.correlate1d` byte for byte.
 
 use crate::foundation::error::check_shape;
 use crate::foundation::memory;
@@ -9,26 +10,27 @@ use crate::foundation::par::{self, Monitor};
 use crate::foundation::wide::wide_fn;
 use crate::{Error, Result};
 
-/// Sums that are made at once.
+/// Number of sums that are computed together.
 const LANES: usize = 16;
-/// Rows that a task takes at a time.
+/// Number of rows of a task.
 const ROWS: usize = 64;
 
-/// What lies beyond the ends of an axis.
+/// Values beyond the ends of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {
-    /// The array once more, turned over.
+    /// The mirrored array, with the last value repeated.
     Reflect,
-    /// The last value, again and again.
+    /// The last value.
     Nearest,
-    /// The array from its other end on.
+    /// The array from its other end.
     Wrap,
-    /// Nothing.
+    /// Zero.
     Zero,
 }
 
 impl Edge {
-    /// Which of `count` values is at a place beyond, or between, the ends.
+    /// Returns the index of the value at a place that may be beyond the ends, or `None` for zero.
+    /// The axis has `count` values.
     fn find(self, place: i64, count: usize) -> Option<usize> {
         let n = count as i64;
         match self {
@@ -43,20 +45,21 @@ impl Edge {
     }
 }
 
-/// How an axis is smoothed.
+/// Smoothing of one axis.
 #[derive(Debug, Clone)]
 pub struct Axis {
-    /// What a value counts, and those 1, 2, ... away, on either side; none where the axis is left alone.
+    /// Weights of the central value and of the values at distance 1, 2, ... on either side. If
+    /// empty, the axis is not smoothed.
     pub weights: Vec<f64>,
-    /// What lies beyond its ends.
+    /// Values beyond the ends of the axis.
     pub edge: Edge,
 }
 
-/// Numbers of either precision.
+/// A value of single or double precision.
 pub trait Number: Copy + Default + Send + Sync {
-    /// In double precision.
+    /// Returns the value in double precision.
     fn wide(self) -> f64;
-    /// Rounded.
+    /// Returns a sum rounded to this type.
     fn round(sum: f64) -> Self;
 }
 
@@ -85,7 +88,8 @@ impl Number for f64 {
 /// Smooths an array of `shape` in place, one axis after the other.
 ///
 /// # Errors
-/// A shape that is not that of the values, other than one axis a side, or a monitor that was cancelled.
+/// The shape does not match the number of values, the number of `axes` does not match the shape, or
+/// the monitor was cancelled.
 pub fn smooth<T: Number>(
     values: &mut Vec<T>,
     shape: &[usize],
@@ -113,7 +117,7 @@ pub fn smooth<T: Number>(
     Ok(())
 }
 
-/// Smooths along one axis: `count` values, `inner` apart.
+/// Smooths along one axis of `count` values that are `inner` apart in memory.
 fn pass<T: Number>(
     from: &[T],
     to: &mut [T],
@@ -125,8 +129,9 @@ fn pass<T: Number>(
     let what = "the smoothed array";
     let reach = axis.weights.len() - 1;
     let length = memory::product("weights", &[2, reach])?.saturating_add(count);
-    // Room of each task, on all threads.
+    // Memory of the tasks on all threads.
     memory::room(what, length.saturating_mul(LANES), 8 * par::threads())?;
+    // Find the source of each value of the extended axis once.
     let mut source: Vec<u32> = memory::filled(what, u32::MAX, length)?;
     for (i, source) in source.iter_mut().enumerate() {
         if let Some(at) = axis.edge.find(i as i64 - reach as i64, count) {
@@ -134,6 +139,7 @@ fn pass<T: Number>(
         }
     }
     let source = &source[..];
+    // Along the last axis, extend each line and sum along it.
     if inner == 1 {
         par::chunks_mut(to, ROWS * count, |chunk, lines| {
             let mut line = vec![0.0; length + LANES];
@@ -155,6 +161,7 @@ fn pass<T: Number>(
         });
         return monitor.check();
     }
+    // Along other axes, sum blocks of adjacent columns.
     for (from, to) in from
         .chunks_exact(count * inner)
         .zip(to.chunks_exact_mut(count * inner))
@@ -192,7 +199,7 @@ fn pass<T: Number>(
 }
 
 wide_fn! {
-    /// Sums from a place on, of values `apart`.
+    /// Returns sums that start at a place, of values that are `apart` in memory.
     fn sum(values: &[f64], first: usize, apart: usize, weights: &[f64]) -> [f64; LANES] {
         let reach = weights.len() - 1;
         let mut sums = [0.0; LANES];
@@ -219,7 +226,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The slow twin.
+    /// The same sums by definition, without blocks.
     fn by_definition(values: &[f64], shape: [usize; 3], axes: &[Axis]) -> Vec<f64> {
         let mut now = values.to_vec();
         for (number, axis) in axes.iter().enumerate() {

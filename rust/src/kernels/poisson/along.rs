@@ -1,38 +1,42 @@
-//! Systems along a row whose answers die out within a few pixels: `(d - T) x = r`, where T is the sum over both neighbours.
+//! Systems along a row whose solutions decay within a few pixels: `(d - T) x = r`, where T sums
+//! both neighbours.
 //!
-//! Odd-even reduction once more, of all pixels at once: `(d - T) (d + T) = d^2 - 2 - T'`, where T' is the sum over those twice
-//! as far; so `x = (d + T) (d^2 - 2 - T')^-1 r`, and so on, until next to nothing is left of neighbours (Hockney and Jesshope,
-//! *Parallel computers*, 1981: the parallel form of cyclic reduction, cut off). Each step is a sum of three rows, whatever the
-//! channels. What lies beyond the ends is what mirroring or turning round makes of the row.
+//! The method is odd-even reduction of all pixels at once: `(d - T) (d + T) = d^2 - 2 - T'`, where
+//! T' sums the neighbours at twice the distance. So `x = (d + T) (d^2 - 2 - T')^-1 r`, and so on,
+//! until the weight of neighbours is negligible. This is the truncated parallel form of cyclic
+//! reduction (Hockney and Jesshope, *Parallel computers*, 1981).
+//!
+//! Each step is a weighted sum of three shifted rows, for any number of channels. Beyond its ends
+//! the row is mirrored or wrapped.
 
 use super::Edge;
 use crate::foundation::wide::wide_fn;
 
-/// A share of a neighbour below which it is left out.
+/// Weight of a neighbour below which it is omitted, relative to the pixel.
 const NOTHING: f64 = 1.0 / (1 << 28) as f64;
 
 /// The inverse of a product of systems along a row.
 pub(super) struct Inverse {
     channels: usize,
-    /// How far neighbours are, the weight of a pixel and that of both of them.
+    /// The steps: distance of the neighbours, weight of the pixel and weight of both neighbours.
     steps: Vec<(usize, f32, f32)>,
-    /// Pixels on either side that a row is continued by.
+    /// Number of extra pixels at each end of an extended row.
     reach: usize,
-    /// To which pixel of a continued row goes which times what.
+    /// Copies into the extended row: target pixel, source pixel and sign.
     beyond: Vec<(usize, usize, f32)>,
 }
 
-/// Working memory of an inverse.
+/// Scratch memory of an inverse.
 #[derive(Default)]
 pub(super) struct Scratch([Vec<f32>; 2]);
 
 impl Inverse {
-    /// Of rows of `len` pixels; the diagonals are above 2.
+    /// Computes the inverse for rows of `len` pixels. The diagonals must be above 2.
     pub(super) fn new(edge: Edge, len: usize, channels: usize, diagonals: &[f64]) -> Self {
         let mut scale = 1.0;
         let mut steps = Vec::new();
         for d in diagonals {
-            // d = q + 1 / q, and d^2 - 2 is the same of its square.
+            // With d = q + 1 / q, d^2 - 2 is the same expression for q^2.
             let mut q = 2.0 / (d + (d * d - 4.0).sqrt());
             let mut step = 1;
             scale *= q;
@@ -42,6 +46,7 @@ impl Inverse {
                 (q, step) = (q * q, 2 * step);
             }
         }
+        // The last step also applies the accumulated scale.
         let last = steps.pop().unwrap_or((0, 1.0, 0.0));
         steps.push((last.0, scale, scale * last.2));
         let reach = steps.iter().map(|step| step.0).sum();
@@ -61,7 +66,8 @@ impl Inverse {
         }
     }
 
-    /// Puts in place of a row of all channels the answer to what `fill` makes of it.
+    /// Fills a row of all channels by `fill`, which gets the old row, and replaces it by the
+    /// solution.
     pub(super) fn apply(
         &self,
         row: &mut [f32],
@@ -73,11 +79,13 @@ impl Inverse {
         from.resize(len, 0.0);
         to.resize(len, 0.0);
         fill(&mut from[pad..][..row.len()], row);
+        // Extend the row beyond its ends.
         for &(to, source, sign) in &self.beyond {
             for c in 0..self.channels {
                 from[to * self.channels + c] = sign * from[source * self.channels + c];
             }
         }
+        // Each step shortens the extended row, until its own length is left.
         let mut left = len;
         let last = self.steps.len() - 1;
         for &(step, own, beside) in &self.steps[..last] {
@@ -92,7 +100,8 @@ impl Inverse {
 }
 
 wide_fn! {
-    /// Each number of a row but those at its ends, and those `step` before and after it.
+    /// Writes the weighted sum of each value and of the values `step` before and after it, except
+    /// near the ends.
     fn add_beside(out: &mut [f32], row: &[f32], step: usize, own: f32, beside: f32) {
         let ends = row.iter().zip(&row[2 * step..]);
         for ((out, x), (a, b)) in out.iter_mut().zip(&row[step..]).zip(ends) {
@@ -101,7 +110,7 @@ wide_fn! {
     }
 }
 
-/// Which pixel of a row stands for one beyond it, and times what.
+/// Returns the pixel that replaces a pixel beyond the ends, and its sign.
 fn fold(edge: Edge, len: usize, at: isize) -> (usize, f32) {
     match edge {
         Edge::Wrap => (at.rem_euclid(len as isize) as usize, 1.0),
@@ -109,7 +118,8 @@ fn fold(edge: Edge, len: usize, at: isize) -> (usize, f32) {
             let at = at.rem_euclid(2 * len as isize) as usize;
             (at.min(2 * len - 1 - at), 1.0)
         }
-        // The pixels next to both ends are 0, and beyond them the row goes on upside down.
+        // The pixels next to both ends are 0, and the row continues with the opposite sign beyond
+        // them.
         Edge::Fixed => match (at + 1).rem_euclid(2 * (len as isize + 1)) as usize {
             0 => (0, 0.0),
             at if at == len + 1 => (0, 0.0),
@@ -154,7 +164,7 @@ mod tests {
                     })
                     .collect();
             }
-            // Twice 1e30 is beyond `f32`.
+            // Products above 1e38 overflow `f32`.
             let tiny = diagonals.iter().product::<f64>() > 1e38;
             for (x, y) in back.iter().zip(&row) {
                 prop_assert!(tiny || (x - f64::from(*y)).abs() < 1e-5, "{x} {y}");

@@ -1,13 +1,14 @@
-//! Screened Poisson: the image whose differences are nearest to given ones and whose values stay near a given image.
+//! Screened Poisson equation: the image whose differences are nearest to given ones and whose
+//! values stay near a given image.
 //!
-//! Minimises `sum over edges (v_q - v_p - g_pq)^2 + screening * sum (v - I)^2` (Pérez, Gangnet and Blake, *Poisson image
-//! editing*, SIGGRAPH 2003; the screening as in Bhat et al., *Fourier analysis of the 2D screened Poisson equation*, ECCV
-//! 2008). What is solved for is the correction `v - I`: it is small, so that `f32` is enough, and nothing where values
-//! are kept.
+//! It minimises `sum over edges (v_q - v_p - g_pq)^2 + screening * sum (v - I)^2` (Pérez, Gangnet
+//! and Blake, *Poisson image editing*, SIGGRAPH 2003). The screening is that of Bhat et al.,
+//! *Fourier analysis of the 2D screened Poisson equation*, ECCV 2008. The unknown is the correction
+//! `v - I`. It is small, so `f32` is enough, and 0 at pixels that keep their values.
 //!
-//! A rectangle is solved directly: of every fourth row a transform along it, then tridiagonal systems across them; the
-//! rows between follow from systems along them. Pixels under a mask are solved by conjugate gradients preconditioned with
-//! multigrid.
+//! A rectangle is solved directly: a transform along every fourth row, then tridiagonal systems
+//! across these rows. The rows between follow from systems along them. Pixels under a mask are
+//! solved by conjugate gradients preconditioned with multigrid.
 
 mod along;
 mod multigrid;
@@ -24,49 +25,50 @@ use reduce::Level;
 use sweep::{PANEL, Systems};
 use transform::Transform;
 
-/// What happens at both ends of an axis.
+/// Boundary condition at both ends of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {
     /// The first and the last pixel keep their values (Dirichlet).
     Fixed,
     /// The last pixel is next to the first.
     Wrap,
-    /// Nothing lies beyond (Neumann).
+    /// The ends have no neighbours beyond (Neumann).
     Free,
 }
 
-/// Pixels and their neighbours, and which of them keep their values.
+/// Shape, boundary conditions and mask of a problem.
 #[derive(Debug, Clone, Copy)]
 pub struct Domain<'a> {
     /// Rows, columns and channels.
     pub shape: [usize; 3],
-    /// What happens at the ends of the rows' axis and of the columns' axis.
+    /// Boundary conditions of the axis of rows and of the axis of columns.
     pub edges: [Edge; 2],
-    /// Weight of the image against the differences, not negative.
+    /// Weight of the image relative to the differences, not negative.
     pub screening: f64,
-    /// Which pixels to solve; the others keep their values.
+    /// Flags of the pixels to solve. The others keep their values.
     pub mask: Option<&'a [bool]>,
 }
 
 /// A problem: images in row-major order, channels last.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
-    /// The values to stay near.
+    /// The image whose values the solution stays near.
     pub image: &'a [f32],
-    /// The differences wanted to the next row and to the next column, each of the image's shape; at the end of an axis
-    /// they count only where it is cyclic. None: no difference anywhere.
+    /// Target differences to the next row and to the next column, each in the shape of the image.
+    /// The differences at the end of an axis count only if the axis wraps. If `None`, all target
+    /// differences are 0.
     pub gradients: Option<[&'a [f32]; 2]>,
-    /// Where.
+    /// The pixels of the problem.
     pub domain: Domain<'a>,
 }
 
-/// Screening that leaves nothing of a flow that `f32` could tell; more would be beyond its range.
+/// Maximum screening. Beyond it the solution is 0 in `f32`, and larger values would overflow.
 const STRONGEST: f64 = 1e30;
 
-/// Rows that a task takes at a time: as many as are transformed at once.
+/// Number of rows of a task: as many as are transformed together.
 const ROWS: usize = 2 * LANES;
 
-/// The solution. Without screening, and with nothing fixed, the mean of the image is kept.
+/// Returns the solution. Without screening and without fixed pixels, it has the mean of the image.
 pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
     let Domain {
         shape: [_, columns, channels],
@@ -78,6 +80,7 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
             problem.domain.check(argument, gradients[axis].len())?;
         }
     }
+    // Compute the flow into each pixel, spread it, and add the correction to the image.
     memory::room("the solution", problem.image.len(), 4)?;
     let width = columns * channels;
     let mut out = vec![0.0; problem.image.len()];
@@ -99,8 +102,8 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
     Ok(out)
 }
 
-/// Turns what flows into each pixel into the values that carry it off, in place: solves `(L + screening) v = flow`, L
-/// the sum of the differences to the neighbours; 0 where values are kept.
+/// Solves `(L + screening) v = flow` in place, where L sums the differences to the neighbours. The
+/// solution is 0 at pixels that keep their values.
 pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Result<()> {
     domain.check("flow", flow.len())?;
     let domain = &Domain {
@@ -108,9 +111,11 @@ pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Resul
         ..*domain
     };
     let [rows, columns, channels] = domain.shape;
-    // Half of the rows, half of these and their transposed copy, or levels of a pyramid.
+    // Memory for half of the rows, half of these and a transposed copy, or for the levels of the
+    // pyramid.
     memory::room("the solution", rows * columns, 12 * channels + 32)?;
     if !flow.is_empty() {
+        // A mask that is a rectangle is solved directly, other masks by multigrid.
         match domain.mask {
             Some(mask) if !mask.iter().all(|&m| m) => {
                 match inner_rectangle(mask, [rows, columns]) {
@@ -119,7 +124,7 @@ pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Resul
                 }
             }
             _ => {
-                // All but the ring that fixed edges keep.
+                // All pixels except the ring that fixed edges keep.
                 let window = [0, 1].map(|axis| {
                     let ring = usize::from(domain.edges[axis] == Edge::Fixed);
                     (ring, domain.shape[axis].saturating_sub(2 * ring))
@@ -131,7 +136,8 @@ pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Resul
     monitor.check()
 }
 
-/// The rectangle (first and number of rows, of columns) that a mask is, if it is one and fixed pixels lie all around.
+/// Returns the rectangle (first and number of rows, of columns) that a mask marks, if it is one and
+/// fixed pixels surround it.
 fn inner_rectangle(mask: &[bool], shape: [usize; 2]) -> Option<[(usize, usize); 2]> {
     let [rows, columns] = shape;
     let first = mask.iter().position(|&m| m)?;
@@ -148,7 +154,8 @@ fn inner_rectangle(mask: &[bool], shape: [usize; 2]) -> Option<[(usize, usize); 
 }
 
 impl Domain<'_> {
-    /// An error unless `samples` is the size of the domain, the mask fits and the screening is a weight.
+    /// Returns an error unless `samples` is the size of the domain, the mask fits, and the
+    /// screening is valid.
     fn check(&self, argument: &'static str, samples: usize) -> Result<()> {
         let [rows, columns, channels] = self.shape;
         let pixels = rows.checked_mul(columns);
@@ -176,7 +183,7 @@ impl Domain<'_> {
     }
 }
 
-/// Adds what flows into row `y`, channels last, by the differences that the image lacks.
+/// Adds the flow into row `y`: the differences that the image lacks, channels last.
 #[inline(always)]
 fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
     let Domain {
@@ -200,7 +207,7 @@ fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
     if y + 1 < rows || cyclic {
         lack(out, wanted(0, y), here, row(y + 1), -1.0);
     }
-    // Each pixel once as the start and once as the end of a difference.
+    // Each pixel is once the start and once the end of a difference.
     let beside = &here[channels..];
     lack(out, wanted(1, y), here, beside, -1.0);
     lack(&mut out[channels..], wanted(1, y), here, beside, 1.0);
@@ -212,7 +219,7 @@ fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
     }
 }
 
-/// Adds by how much the differences wanted exceed those from `from` to `to`.
+/// Adds the excess of the target differences over the differences from `from` to `to`.
 #[inline(always)]
 fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign: f32) {
     let pairs = out.iter_mut().zip(from.iter().zip(to));
@@ -224,7 +231,7 @@ fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign:
     }
 }
 
-/// Solves a window (first and number of rows, of columns); 0 around it.
+/// Solves a window (first and number of rows, of columns), and sets the pixels around it to 0.
 fn rectangle(
     domain: &Domain<'_>,
     edges: [Edge; 2],
@@ -241,6 +248,7 @@ fn rectangle(
     if rows == 0 || layout.len == 0 {
         return flow.fill(0.0);
     }
+    // The pixels around the window are fixed.
     let (above, rest) = flow.split_at_mut(top * layout.width);
     let (inner, below) = rest.split_at_mut(rows * layout.width);
     above.fill(0.0);
@@ -266,16 +274,16 @@ fn rectangle(
     reduce::solve(&field, &level, inner, monitor);
 }
 
-/// What hangs on the columns alone.
+/// Data that depend only on the columns.
 struct Field {
     channels: usize,
-    /// Of the columns.
+    /// Boundary condition of the axis of columns.
     edge: Edge,
     screening: f64,
     transform: Transform,
 }
 
-/// Where what is solved lies in an array: so many samples of each row, from one on.
+/// Position of the unknowns in an array: `len` samples of each row, starting at `first`.
 #[derive(Clone, Copy)]
 struct Layout {
     width: usize,
@@ -284,7 +292,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// What is solved of a row.
+    /// Returns the unknowns of a row.
     fn row<'a>(&self, rows: &'a [f32], r: usize) -> &'a [f32] {
         self.of(&rows[r * self.width..])
     }
@@ -298,15 +306,15 @@ impl Layout {
     }
 }
 
-/// Solves rows in place by transforms along them, and adds to them what they are based on. Coefficients take the place of
-/// the rows that they are of, one channel after another.
+/// Solves rows in place by transforms along them, and adds the base solution. Coefficients replace
+/// the samples of their rows, one channel after another.
 fn transformed(field: &Field, level: &Level<'_>, inner: &mut [f32], monitor: &Monitor) {
     let (transform, channels) = (&field.transform, field.channels);
     let (layout, width) = (level.layout, level.layout.width);
     let (rows, slots) = (inner.len() / width, layout.len / channels);
     monitor.expect((2 * rows + slots) as u64 + level.ahead);
 
-    // 1. Transformed along the rows: pairs of them side by side, of which those that lack are nothing.
+    // Step 1: transform along the rows, several pairs of rows together. Missing rows are 0.
     par::chunks_mut(inner, ROWS * width, |_, out| {
         if monitor.check().is_err() {
             return;
@@ -332,7 +340,7 @@ fn transformed(field: &Field, level: &Level<'_>, inner: &mut [f32], monitor: &Mo
         let _ = monitor.advance((out.len() / width) as u64);
     });
 
-    // 2. Systems across the rows: panel, channel, row.
+    // Step 2: solve the systems across the rows. Memory order is panel, channel, row.
     let spectrum = &*inner;
     let mut panels = vec![0.0f32; slots.div_ceil(PANEL) * channels * rows * PANEL];
     let panels = panels.as_chunks_mut::<PANEL>().0;
@@ -359,7 +367,7 @@ fn transformed(field: &Field, level: &Level<'_>, inner: &mut [f32], monitor: &Mo
         let _ = monitor.advance(present as u64);
     });
 
-    // 3. Back.
+    // Step 3: transform back.
     let panels = &*panels;
     par::chunks_mut(inner, ROWS * width, |chunk, out| {
         if monitor.check().is_err() {

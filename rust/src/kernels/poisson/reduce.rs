@@ -1,30 +1,36 @@
-//! Odd-even reduction: before anything is transformed, every second row is taken out, and of those left every second again.
+//! Odd-even reduction: before any transform, every second row is eliminated, then every second of
+//! the remaining rows.
 //!
-//! Rows hang together by `A u[r] - u[r-1] - u[r+1] = f[r]`, where A acts along a row. In the rows that stay let
-//! `p[r] = A^-1 f[r]` and `u[r] = p[r] + w[r]`. Twice the step, the same kind of system is left:
+//! Rows are coupled by `A u[r] - u[r-1] - u[r+1] = f[r]`, where A acts along a row. For the rows
+//! that stay, let `p[r] = A^-1 f[r]` and `u[r] = p[r] + w[r]`. At twice the step, a system of the
+//! same kind remains:
 //!
-//! `(A^2 - 2) w[r] - w[r-2] - w[r+2] = f[r-1] + f[r+1] + 2 p[r] + p[r-2] + p[r+2]`,
+//! `(A^2 - 2) w[r] - w[r-2] - w[r+2] = f[r-1] + f[r+1] + 2 p[r] + p[r-2] + p[r+2]`.
 //!
-//! then `u[r] = A^-1 (f[r] + u[r-1] + u[r+1])` in between (Hockney, *A fast direct solution of Poisson's equation using
-//! Fourier analysis*, JACM 1965; with p, where nothing is multiplied by A and so no error grows: Buneman, in Buzbee, Golub
-//! and Nielson, *On direct methods for solving Poisson's equations*, SIAM Journal on Numerical Analysis 1970). To transform
-//! a row takes many times what a system along it does, for the answers of A die out within a few pixels.
+//! The eliminated rows are `u[r] = A^-1 (f[r] + u[r-1] + u[r+1])` (Hockney, *A fast direct solution
+//! of Poisson's equation using Fourier analysis*, JACM 1965). The use of p avoids multiplications
+//! by A, so errors do not grow. This is Buneman's variant (Buzbee, Golub and Nielson, *On direct
+//! methods for solving Poisson's equations*, SIAM Journal on Numerical Analysis 1970). A transform
+//! of a row takes many times as long as a system along it, because solutions of A decay within a
+//! few pixels.
 //!
-//! The last row may have a B of its own. If it stays, `B p[r] = f[r]` and `(A B - 1) w[r] - w[r-2] = f[r-1] + p[r] +
-//! p[r-2]`; so there it has one, and stays again: to take it out would multiply its neighbour's system by B.
+//! The last row may have its own operator B. If it stays, `B p[r] = f[r]` and `(A B - 1) w[r] -
+//! w[r-2] = f[r-1] + p[r] + p[r-2]`. The reduced system then also has its own operator in this row,
+//! which stays again. Eliminating it would multiply the system of its neighbour by B.
 
 use super::along::{Inverse, Scratch};
 use super::{Edge, Field, Layout, ROWS, sweep::Systems, transformed};
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::wide::wide_fn;
 
-/// How often rows are taken out. Each time saves half as much, and takes twice as many systems a row.
+/// Maximum number of reductions. Each reduction saves half as much as the previous one, and needs
+/// twice as many systems for each row.
 const DEPTH: usize = 2;
 
-/// Fewer rows are not worth it.
+/// Minimum number of rows for a reduction to be worthwhile.
 const FEW: usize = 4;
 
-/// What is added to a solution: rows of the array that it is every second of.
+/// Rows that are added to a solution: every second row of an array.
 #[derive(Clone, Copy)]
 pub(super) struct Base<'a> {
     rows: &'a [f32],
@@ -33,23 +39,23 @@ pub(super) struct Base<'a> {
 }
 
 impl Base<'_> {
-    /// Adds what belongs to row `r`.
+    /// Adds the base row of row `r`.
     pub(super) fn add_to(&self, row: &mut [f32], r: usize) {
         let base = self.layout.row(self.rows, self.first + 2 * r);
         row.iter_mut().zip(base).for_each(|(x, b)| *x += b);
     }
 }
 
-/// Rows to be solved: all of them, or what is left of them.
+/// Rows to solve: all rows, or the rows that remain after a reduction.
 pub(super) struct Level<'a> {
     pub(super) systems: Systems,
     pub(super) layout: Layout,
     pub(super) base: Option<Base<'a>>,
-    /// Steps to be done after these rows.
+    /// Number of progress steps that follow after these rows.
     pub(super) ahead: u64,
 }
 
-/// Solves all rows in place, and adds to them what they are based on.
+/// Solves all rows in place and adds their base rows.
 pub(super) fn solve(field: &Field, level: &Level<'_>, rows: &mut [f32], monitor: &Monitor) {
     let Level {
         systems,
@@ -62,6 +68,7 @@ pub(super) fn solve(field: &Field, level: &Level<'_>, rows: &mut [f32], monitor:
     let Some(first) = first_to_stay(systems, count) else {
         return transformed(field, level, rows, monitor);
     };
+    // Prepare the inverse of A for inner rows, and of B for the ends.
     let inverses = [false, true].map(|end| {
         let roots = roots(systems, end);
         let diagonals: Vec<f64> = roots.iter().map(|r| 4.0 + field.screening - r).collect();
@@ -80,7 +87,7 @@ pub(super) fn solve(field: &Field, level: &Level<'_>, rows: &mut [f32], monitor:
     };
     let nothing = vec![0.0; len];
 
-    // 1. p, in the rows that stay.
+    // Step 1: compute p for the rows that stay.
     par::chunks_mut(rows, ROWS * width, |chunk, out| {
         let mut scratch = Scratch::default();
         for (r, row) in (chunk * ROWS..).zip(out.chunks_exact_mut(width)) {
@@ -91,7 +98,7 @@ pub(super) fn solve(field: &Field, level: &Level<'_>, rows: &mut [f32], monitor:
         }
     });
 
-    // 2. What they are left to solve.
+    // Step 2: compute the right-hand sides of the reduced system.
     let whole = &*rows;
     let row = |r: Option<usize>| r.map_or(&nothing[..], |r| layout.row(whole, r));
     let mut half = vec![0.0; (count - first).div_ceil(2) * len];
@@ -108,7 +115,7 @@ pub(super) fn solve(field: &Field, level: &Level<'_>, rows: &mut [f32], monitor:
         }
     });
 
-    // 3. That, with p added.
+    // Step 3: solve the reduced system, and add p.
     let kept = [first == 0, (count - 1 - first).is_multiple_of(2)];
     let below = Base {
         rows: whole,
@@ -128,7 +135,7 @@ pub(super) fn solve(field: &Field, level: &Level<'_>, rows: &mut [f32], monitor:
     };
     solve(field, &next, &mut half, monitor);
 
-    // 4. The rows between.
+    // Step 4: solve the eliminated rows between.
     let solved = |r: Option<usize>| r.map_or(&nothing[..], |r| compact.row(&half, (r - first) / 2));
     par::chunks_mut(rows, ROWS * width, |chunk, out| {
         if monitor.check().is_err() {
@@ -152,8 +159,9 @@ pub(super) fn solve(field: &Field, level: &Level<'_>, rows: &mut [f32], monitor:
     });
 }
 
-/// The first row to stay, 0 or 1; none where no choice leaves the same kind of system. Ends that are systems of their own
-/// stay, and next to each that goes one stays.
+/// Returns the first row to stay, 0 or 1, or `None` if neither choice leaves a system of the same
+/// kind. Ends with their own operator stay, and an end that is eliminated must have a neighbour
+/// that stays.
 fn first_to_stay(systems: &Systems, count: usize) -> Option<usize> {
     let [top, bottom] = systems.ends.each_ref().map(Option::is_some);
     let even = count.is_multiple_of(2);
@@ -165,14 +173,15 @@ fn first_to_stay(systems: &Systems, count: usize) -> Option<usize> {
     }
 }
 
-/// What A or B is made of the first and the second time: the product of `A - root`, with A of the first.
+/// Returns the roots of A or B after some reductions: the operator is the product of `A - root`,
+/// where A is the first operator.
 fn roots(systems: &Systems, end: bool) -> Vec<f64> {
     let pair = |middle: f64, apart: f64| vec![middle - apart, middle + apart];
     match (systems.times, end, systems.edge) {
         (0, false, _) => vec![0.0],
         (0, true, _) => vec![1.0],
         (_, false, _) => pair(0.0, 2f64.sqrt()),
-        // A (A - 1) - 1 and A^2 - 1.
+        // The polynomials are A (A - 1) - 1 and A^2 - 1.
         (_, true, Edge::Free) => pair(0.5, 1.25f64.sqrt()),
         (_, true, _) => pair(0.0, 1.0),
     }

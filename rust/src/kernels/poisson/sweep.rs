@@ -1,10 +1,10 @@
-//! Tridiagonal systems across the rows, a panel of coefficients at a time.
+//! Tridiagonal systems across the rows, solved for a panel of coefficients at a time.
 
 use std::ops::{Add, Div, Mul, Sub};
 
 use super::Edge;
 
-/// Coefficients side by side in a panel.
+/// Number of coefficients of a panel.
 pub(super) const PANEL: usize = 32;
 
 trait Real:
@@ -35,7 +35,7 @@ macro_rules! reals {
 }
 reals!(f32, f64);
 
-/// Working memory of a sweep.
+/// Scratch memory of a sweep.
 #[derive(Default)]
 pub(super) struct Scratch {
     single: Lines<f32>,
@@ -46,26 +46,26 @@ pub(super) struct Scratch {
 struct Lines<T> {
     /// Reciprocal pivots.
     pivots: Vec<[T; PANEL]>,
-    /// The answer to the corners of a cyclic system.
+    /// Solution for the corner entries of a cyclic system.
     corner: Vec<[T; PANEL]>,
     values: Vec<[T; PANEL]>,
 }
 
-/// `(2 + shift) x[r] - x[r-1] - x[r+1]` across the rows, for each of the coefficients.
+/// The systems `(2 + shift) x[r] - x[r-1] - x[r+1]` across the rows, one for each coefficient.
 pub(super) struct Systems {
     pub(super) edge: Edge,
     pub(super) shifts: Vec<f64>,
-    /// What the first and the last row have more of themselves, where they do.
+    /// Additional diagonal entries of the first and the last row, if any.
     pub(super) ends: [Option<Vec<f64>>; 2],
-    /// How often they have been squared.
+    /// Number of times that the systems have been squared.
     pub(super) times: usize,
-    /// Below this shift the condition of a system is beyond what `f32` carries.
+    /// Systems with a smaller shift are too ill-conditioned for `f32`.
     stiff: f64,
 }
 
 impl Systems {
     pub(super) fn new(edge: Edge, shifts: Vec<f64>) -> Self {
-        // Of each neighbour that lacks one less.
+        // Each missing neighbour reduces the diagonal by 1.
         let end = (edge == Edge::Free).then(|| vec![-1.0; shifts.len()]);
         Self {
             edge,
@@ -76,16 +76,18 @@ impl Systems {
         }
     }
 
-    /// Whether those of every second row tell the rest: not where one has a solution but for a constant, which is chosen by
-    /// the mean of all rows, nor beyond what `f32` holds.
+    /// Whether the systems of every second row determine the solution. A system whose solution is
+    /// unique only up to a constant is excluded, because the mean of all rows selects the constant.
+    /// Shifts beyond the range of `f32` are excluded too.
     pub(super) fn can_be_squared(&self) -> bool {
         let fixed = self.edge == Edge::Fixed;
         let unique = |&shift: &f64| fixed || shift > f64::EPSILON;
         self.shifts.iter().all(|s| unique(s) && *s < 1e9)
     }
 
-    /// Those of every second row, of which the first and last row may be ends: with a = 2 + shift, a^2 - 2, and a b - 1
-    /// for an end whose own was b.
+    /// Returns the systems of every second row. `kept` states whether the first and the last row
+    /// are among them. With a = 2 + shift, the diagonal is a^2 - 2, and a b - 1 for an end with its
+    /// own diagonal b.
     pub(super) fn squared(&self, kept: [bool; 2]) -> Self {
         let end = |k: usize| {
             let own = |i: usize| self.ends[k].as_ref().map_or(0.0, |own| own[i]);
@@ -103,7 +105,8 @@ impl Systems {
         }
     }
 
-    /// Shifts and ends of the coefficients from `first`; those that lack are no matter.
+    /// Returns the shifts and ends of the coefficients from `first`. Missing coefficients have
+    /// arbitrary values.
     pub(super) fn panel(&self, first: usize) -> Panel {
         let own = &self.shifts[first..];
         let of = |all: &[f64], lacking: f64| {
@@ -121,7 +124,7 @@ impl Systems {
     }
 }
 
-/// Systems side by side.
+/// Systems of one panel.
 pub(super) struct Panel {
     edge: Edge,
     stiff: bool,
@@ -129,13 +132,13 @@ pub(super) struct Panel {
     ends: [[f64; PANEL]; 2],
 }
 
-/// What is too small a shift of a system for `f32`, before it is squared.
+/// Shift below which a system needs `f64`, before it is squared.
 const STIFF: f64 = 4e-3;
 
 /// Solves the systems in place for each channel of a panel.
 ///
-/// `panel` holds for each channel its rows of [`PANEL`] coefficients. A singular system (free or cyclic, no shift) gets
-/// the solution whose mean is zero.
+/// `panel` contains the rows of [`PANEL`] coefficients for each channel. For a singular system
+/// (free or cyclic, without shift) the solution with mean zero is returned.
 #[inline(always)]
 pub(super) fn solve(
     systems: &Panel,
@@ -175,7 +178,8 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
                 own += ends[1][l];
             }
             own += shifts[l];
-            // Sherman and Morrison: the corners of a cyclic system are a product of two vectors.
+            // Sherman-Morrison formula: the corner entries of a cyclic system are the product of
+            // two vectors.
             out[l] = T::of(match (cyclic, row == 0, row + 1 == rows) {
                 (true, true, _) => 2.0 * own,
                 (true, _, true) => own + 1.0 / own,
@@ -184,7 +188,8 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
         }
         out
     };
-    // 1. Pivots, the same for all channels. A singular system is pinned: its last value is 0.
+    // Step 1: compute the pivots, which are the same for all channels. A singular system is pinned:
+    // its last value is 0.
     lines.pivots.resize(rows, zero);
     let middle = diagonal(1.min(rows.saturating_sub(2)));
     let mut last = zero;
@@ -203,7 +208,7 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
         }
         lines.pivots[row] = last;
     }
-    // 2. The corner's own solution.
+    // Step 2: solve for the corner entries.
     let first = diagonal(0);
     let gamma: [T; PANEL] = std::array::from_fn(|l| zero[l] - first[l] * T::of(0.5));
     if cyclic {
@@ -214,7 +219,7 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
         *end = std::array::from_fn(|l| end[l] - one[l]);
         substitute(&lines.pivots, &mut lines.corner);
     }
-    // 3. Each channel.
+    // Step 3: solve each channel.
     for channel in panel.chunks_exact_mut(rows) {
         lines.values.resize(rows, zero);
         for (to, from) in lines.values.iter_mut().zip(channel.iter()) {
@@ -255,7 +260,7 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
     }
 }
 
-/// Forward elimination and back substitution with neighbours of weight -1.
+/// Performs forward elimination and back substitution with neighbours of weight -1.
 #[inline(always)]
 fn substitute<T: Real>(pivots: &[[T; PANEL]], values: &mut [[T; PANEL]]) {
     let mut last = [T::default(); PANEL];

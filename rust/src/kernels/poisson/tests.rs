@@ -45,7 +45,8 @@ impl Owned {
         }
     }
 
-    /// The gradient of what is minimised, at each unknown: nothing at the solution.
+    /// Returns the largest gradient of the minimised energy over the unknowns. It is zero at the
+    /// solution.
     fn slope(&self, v: &[f32]) -> f64 {
         let [rows, columns, channels] = self.shape;
         let mut slope = vec![0.0f64; v.len()];
@@ -106,7 +107,8 @@ proptest! {
             .collect();
         prop_assert!(solutions.iter().all(|s| *s == solutions[0]));
         let slope = owned.slope(&solutions[0]);
-        // Values fill 0..=255; the solver stops at a share of the first residual, so large pictures keep a little more.
+        // Values range from 0 to 255. The solver stops at a fraction of the first residual, so
+        // large images keep a larger gradient.
         prop_assert!(slope < 0.1, "{}", slope);
         if screening == 0.0 && !masked && !edges.contains(&Edge::Fixed) {
             let mean = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / v.len() as f64;
@@ -115,7 +117,8 @@ proptest! {
     }
 }
 
-/// Unit vectors that the second difference along an axis multiplies, by what, and where they start.
+/// Returns the unit eigenvectors of the second difference along an axis with their eigenvalues, and
+/// the first pixel.
 fn modes(edge: Edge, pixels: usize) -> (Vec<(f64, Vec<f64>)>, usize) {
     let ring = usize::from(edge == Edge::Fixed);
     let n = pixels.saturating_sub(2 * ring);
@@ -155,7 +158,7 @@ proptest! {
             .map(|i| noise.uniform([i, 0, 0, 0]) as f32 - 0.5)
             .collect();
         if screening == 0.0 && !edges.contains(&Edge::Fixed) {
-            // Where nothing is fixed, as much flows out as in.
+            // Without fixed pixels, the total flow must be zero.
             let mean = flow.iter().sum::<f32>() / flow.len() as f32;
             flow.iter_mut().for_each(|x| *x -= mean);
         }
@@ -163,7 +166,8 @@ proptest! {
         let [height, width] = [down.len(), across.len()];
         let at = |y: usize, x: usize| (top + y) * columns + left + x;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        // Coefficients along the rows, then of these across them; divided, and back in the other order.
+        // Compute coefficients along the rows, then across them, divide by the eigenvalues, and
+        // transform back in the opposite order.
         let along: Vec<Vec<f64>> = across.iter().map(|(_, mode)| {
             (0..height).map(|y| (0..width).map(|x| mode[x] * f64::from(flow[at(y, x)])).sum()).collect()
         }).collect();

@@ -1,8 +1,9 @@
-//! Transforms along one axis that turn its second difference into a multiplication.
+//! Transforms along one axis that diagonalise its second difference.
 //!
-//! Sines for fixed ends, cosines for free ends, the real Fourier series for a cyclic axis; each by one complex transform
-//! of the axis's own length for two rows at a time, and several such pairs side by side (Press et al., *Numerical Recipes*, 12.4; Makhoul, *A fast cosine
-//! transform in one and two dimensions*, IEEE ASSP 1980).
+//! They are sine transforms for fixed ends, cosine transforms for free ends, and real Fourier
+//! series for a wrapped axis. One complex transform of the axis's own length serves two rows, and
+//! several such pairs are transformed together. See Press et al., *Numerical Recipes*, 12.4, and
+//! Makhoul, *A fast cosine transform in one and two dimensions*, IEEE ASSP 1980.
 
 use std::f64::consts::PI;
 
@@ -15,13 +16,13 @@ pub(super) struct Transform {
     edge: Edge,
     len: usize,
     lines: Lines<Lanes>,
-    /// Sines of the folding, or half-sample rotations.
+    /// Sines of the folding, or rotations by half a sample.
     twiddles: Vec<Complex<f32>>,
     /// Eigenvalue of each coefficient.
     pub(super) eigenvalues: Vec<f64>,
 }
 
-/// Working memory of a transform.
+/// Scratch memory of a transform.
 #[derive(Default)]
 pub(super) struct Scratch {
     line: Vec<Complex<Lanes>>,
@@ -30,7 +31,7 @@ pub(super) struct Scratch {
 
 impl Transform {
     pub(super) fn new(edge: Edge, len: usize) -> Self {
-        // Sines of n unknowns live on n + 1 steps.
+        // Sines of n unknowns have a period of n + 1 steps.
         let size = if edge == Edge::Fixed { len + 1 } else { len };
         let n = size as f64;
         let twiddles = match edge {
@@ -64,7 +65,8 @@ impl Transform {
         }
     }
 
-    /// Coefficients of pairs of rows, in place: the first of each in `a`, the second in `b`.
+    /// Replaces pairs of rows by their coefficients. `a` contains the first row of each pair, `b`
+    /// the second.
     pub(super) fn forward(&self, a: &mut [Lanes], b: &mut [Lanes], scratch: &mut Scratch) {
         let Scratch { line, work } = scratch;
         match self.edge {
@@ -88,18 +90,18 @@ impl Transform {
         }
     }
 
-    /// Rows of pairs of sets of coefficients, in place.
+    /// Replaces the coefficients of pairs of rows by the rows.
     pub(super) fn inverse(&self, a: &mut [Lanes], b: &mut [Lanes], scratch: &mut Scratch) {
         let Scratch { line, work } = scratch;
         let n = self.len;
         match self.edge {
-            // The sine transform is its own inverse but for a factor.
+            // The sine transform is its own inverse, except for a factor.
             Edge::Fixed => self.sines(a, b, 2.0 / (n + 1) as f32, line, work),
             Edge::Free => {
                 line.clear();
                 let norm = Lanes::all(1.0 / n as f32);
                 line.push(Complex::new(a[0], b[0]) * norm);
-                // (a - i a2) + i (b - i b2), turned by half a sample.
+                // Combine (a - i a2) + i (b - i b2), and rotate by half a sample.
                 let ends = a[1..].iter().zip(a[1..].iter().rev());
                 let others = b[1..].iter().zip(b[1..].iter().rev());
                 let turned = ends.zip(others).zip(&self.twiddles[1..]);
@@ -158,7 +160,7 @@ impl Transform {
             )
         }));
         self.lines.forward(line, work);
-        // Odd coefficients are a running sum, kept in f64 so that it does not drift.
+        // Odd coefficients are a running sum, in f64 so that errors do not accumulate.
         let (mut sum_a, mut sum_b) = ([0.0; LANES], [0.0; LANES]);
         let run = |sum: &mut [f64; LANES], part: f64, next: Lanes| {
             for (sum, next) in sum.iter_mut().zip(next.0) {
@@ -209,7 +211,7 @@ impl Transform {
     }
 }
 
-/// The same number for all pairs.
+/// Returns the same complex number for all lanes.
 #[inline(always)]
 fn spread(z: &Complex<f32>) -> Complex<Lanes> {
     Complex::new(Lanes::all(z.re), Lanes::all(z.im))
@@ -220,7 +222,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What the second difference makes of a row.
+    /// Returns the second difference of a row.
     fn difference(row: &[f32], edge: Edge) -> Vec<f32> {
         let n = row.len();
         let at = |i: isize, own: f32| match edge {

@@ -1,25 +1,30 @@
-//! Edges that need not be sorted: they are heavier than the two others of a triangle, and lie dormant until one of these has
-//! parted two regions.
+//! Edges that need not be sorted: they are heavier than the two other edges of a triangle. They lie
+//! dormant until one of these edges has separated two regions.
 //!
-//! A region is *full* once an edge was too heavy for it: all that come later are heavier, so it stays as it is. Let u-v be the
-//! heaviest edge of a triangle u, v, y.
+//! A region is *full* after an edge was too heavy for it. All later edges are heavier, so the
+//! region does not change any more. Let u-v be the heaviest edge of a triangle u, v, y. There are
+//! two cases:
 //!
-//! - Where it would join two regions, neither of which is full, u-y and y-v have come before and have not joined theirs, or else u
-//!   and v were in one region: so y is in a third one, which was full when the first of them came. To take u-v into account then,
-//!   when an edge parts a full region from one that is not, is early enough, and either of u-y and y-v is enough to tell.
-//! - Where it would join a small region, of v, to that of u: y-v, which came before, has joined v and y, so both have the area of
-//!   their union; and u-y, which is lighter, has joined u and y, or parted two regions that are large enough. No such edge does.
+//! - u-v would join two regions that are not full. Then u-y and y-v came before, and did not both
+//!   join their regions, because otherwise u and v would be in one region. So y is in a third
+//!   region, which was full when the first of the two edges came. It is early enough to consider
+//!   u-v at that time: when an edge separates a full region from one that is not full. Either of
+//!   u-y and y-v is enough to detect this.
+//! - u-v would join the small region of v to that of u. Then y-v, which came before, has joined v
+//!   and y, so both have the area of their union. The lighter edge u-y has joined u and y, or has
+//!   separated two regions that are large enough. So u-v never does this.
 //!
-//! So the heaviest edges of triangles are left out of the list of edges, those excepted in whose triangles both others are such
-//! edges themselves, for these might tell nobody. `Forest` wakes them. Of a photograph's edges two of five are sorted, and one in
-//! eighty of the others wakes.
+//! The heaviest edges of triangles are therefore left out of the list of edges. An edge stays in
+//! the list if in all its triangles both other edges are such edges themselves, because these might
+//! not wake it. `Forest` wakes dormant edges. For photographs, 40 % of the edges are sorted, and 1
+//! in 80 of the others wakes.
 
 use super::{DIRECTIONS, Edge, Frame, pack};
 use crate::Result;
 use crate::foundation::memory;
 use crate::foundation::wide::wide_fn;
 
-/// Gives the heaviest edges of triangles the sign of a negative number.
+/// Marks the heaviest edges of triangles by a negative sign of their weights.
 pub(super) fn mark(weights: &mut [f32], frame: &Frame) {
     let ([rows, columns], row) = (frame.shape, DIRECTIONS * frame.stride);
     let mut bounds = vec![0.0; DIRECTIONS * columns];
@@ -44,7 +49,7 @@ wide_fn! {
     }
 }
 
-/// The edges that do not lie dormant, in the order of their numbers.
+/// Returns the edges that do not lie dormant, in the order of their numbers.
 pub(super) fn list_others(weights: &[f32], frame: &Frame) -> Result<Vec<Edge>> {
     let ([rows, columns], stride) = (frame.shape, frame.stride);
     let row = DIRECTIONS * stride;
@@ -64,7 +69,8 @@ pub(super) fn list_others(weights: &[f32], frame: &Frame) -> Result<Vec<Edge>> {
             for direction in 0..DIRECTIONS {
                 let weight = lines[direction][x].abs();
                 let awake = weight <= bounds[direction][x] && weight < f32::INFINITY;
-                // Written in any case, and over what is not kept: a branch would be taken by chance.
+                // Write without a branch, which would be unpredictable. Rejected edges are
+                // overwritten by the next edge.
                 list[count] = pack(weight, r * stride + x + 1, direction);
                 count += usize::from(awake);
             }
@@ -76,11 +82,13 @@ pub(super) fn list_others(weights: &[f32], frame: &Frame) -> Result<Vec<Edge>> {
 }
 
 wide_fn! {
-    /// The weights beyond which the edges of a row lie dormant, a line a direction: of the heavier of the two other edges of each
-    /// of their triangles the least. With `WITNESS` those triangles count for nothing of which both others are marked.
+    /// Computes the weights beyond which the edges of a row lie dormant, one line for each
+    /// direction. The bound is the minimum over the triangles of an edge of the heavier of their
+    /// two other edges. With `WITNESS`, triangles whose two other edges are both marked are
+    /// ignored.
     fn bound<const WITNESS: bool>(rows: [&[f32]; 3], stride: usize, out: &mut [f32]) {
         let n = stride - 2;
-        // A line of one of the three rows, from the first pixel on, or from one beside it.
+        // A line of one of the three rows that starts at the first pixel or at a neighbour of it.
         let line = |row: usize, direction: usize, shift: usize| {
             &rows[row][direction * stride + shift..][..n]
         };
@@ -112,7 +120,7 @@ wide_fn! {
 #[inline(always)]
 fn least<const WITNESS: bool>(out: &mut [f32], [a, b, c, d]: [[&[f32]; 2]; 4]) {
     for (i, out) in out.iter_mut().enumerate() {
-        // Named one by one: a closure over the four is not compiled for wide registers.
+        // No closure over the four lines, because it would not be compiled for SIMD registers.
         let (a, b) = (heavier::<WITNESS>(a, i), heavier::<WITNESS>(b, i));
         let (c, d) = (heavier::<WITNESS>(c, i), heavier::<WITNESS>(d, i));
         *out = lesser(lesser(a, b), lesser(c, d));

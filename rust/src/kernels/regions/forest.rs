@@ -8,34 +8,36 @@ use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// Edges whose ends are looked up together: one after the other, each would wait for what the one before it joined.
+/// Number of edges whose ends are looked up together. One by one, each lookup would wait for the
+/// previous join.
 const BATCH: usize = 64;
 
-/// Batches after which the caller is asked whether to go on.
+/// Number of batches between checks whether the caller wants to stop.
 const ASK: usize = 1024;
 
-/// What the root of a tree knows.
+/// Data of a region, stored at the root of its tree.
 #[derive(Clone, Copy)]
 struct Tree {
     area: u32,
-    /// An edge of this weight or more does not join it.
+    /// Limit of the weights: only lighter edges join the region.
     bears: f32,
 }
 
 pub(super) struct Forest {
     scale: f64,
-    /// Of each pixel of the frame; roots are their own. Those in the margin of a cyclic axis are of what they are copies of.
+    /// Parent of each pixel of the frame. Roots are their own parents. Pixels in the margin of a
+    /// wrapped axis belong to the pixels that they are copies of.
     parents: Vec<u32>,
     trees: Vec<Tree>,
-    /// From the first end of an edge to the second, by its direction.
+    /// Step from the first end of an edge of each direction to the second end.
     steps: [u32; DIRECTIONS],
     triangles: [Vec<Triangle>; DIRECTIONS],
     /// Dormant edges that have woken, the lightest first.
     woken: BinaryHeap<Reverse<Edge>>,
 }
 
-/// A triangle that an edge belongs to: from the edge's pixel to its third corner, and to the two other edges' lines, of which the
-/// one goes from the edge's first end to that corner.
+/// A triangle that an edge belongs to. It contains the step from the edge's pixel to the third
+/// corner, and the two other sides. Side `one` goes from the first end of the edge to that corner.
 struct Triangle {
     corner: isize,
     one: Side,
@@ -44,14 +46,15 @@ struct Triangle {
 
 #[derive(Clone, Copy)]
 struct Side {
-    /// To its pixel.
+    /// Step to the pixel of the side.
     pixel: isize,
     direction: usize,
-    /// To its weight, from that of the edge's pixel along the row.
+    /// Step to the weight of the side, from the weight of the edge's pixel along the row.
     weight: isize,
 }
 
-/// For each direction the triangles: (row, column) of the third corner; direction, row and column of the two sides.
+/// A triangle of an edge: (row, column) of the third corner, then direction, row and column of the
+/// two sides.
 type Corner = ((isize, isize), [(usize, isize, isize); 2]);
 const ALONG: [Corner; 4] = [
     ((1, 0), [(1, 0, 0), (3, 0, 0)]),
@@ -75,7 +78,7 @@ const RISING: [Corner; 2] = [
 ];
 
 impl Forest {
-    /// Each pixel a tree.
+    /// Returns a forest whose trees are single pixels.
     pub(super) fn new(frame: &Frame, scale: f64) -> Result<Self> {
         let mut parents = memory::filled("regions of pixels", 0, frame.len())?;
         (0..).zip(&mut parents).for_each(|(i, parent)| *parent = i);
@@ -107,8 +110,8 @@ impl Forest {
         })
     }
 
-    /// Joins what is alike over all edges, of which those are given that do not lie dormant; returns the roots between which these
-    /// have found a step.
+    /// Joins similar regions over all edges. `edges` contains those that do not lie dormant.
+    /// Returns the pairs of roots that these edges did not join.
     pub(super) fn join_alike(
         &mut self,
         edges: &[Edge],
@@ -124,7 +127,7 @@ impl Forest {
             let mut count = 0;
             for &edge in batch {
                 let ends = self.ends(edge).map(|end| self.shorten(end));
-                // Written in any case, and over what is within a tree.
+                // Write without a branch. Edges inside one tree are overwritten by the next edge.
                 apart[count] = (edge, ends);
                 count += usize::from(ends[0] != ends[1]);
             }
@@ -137,7 +140,7 @@ impl Forest {
         Ok(left)
     }
 
-    /// The pixels that an edge is between.
+    /// Returns the two pixels of an edge.
     #[inline(always)]
     fn ends(&self, edge: Edge) -> [u32; 2] {
         let number = edge as u32;
@@ -146,7 +149,7 @@ impl Forest {
         [first, first + self.steps[direction]]
     }
 
-    /// What is three steps nearer to the root, which becomes the pixel's parent.
+    /// Returns the ancestor three steps nearer to the root, and makes it the parent of the pixel.
     #[inline(always)]
     fn shorten(&mut self, pixel: u32) -> u32 {
         let parents = &mut self.parents;
@@ -169,7 +172,7 @@ impl Forest {
         }
     }
 
-    /// Joins two trees: the larger one becomes both.
+    /// Joins two trees. The root of the larger tree becomes the root of both.
     #[inline(always)]
     fn unite(&mut self, roots: [u32; 2]) -> &mut Tree {
         let [one, other] = roots.map(|root| self.trees[root as usize].area);
@@ -184,7 +187,7 @@ impl Forest {
         tree
     }
 
-    /// Whether each of two trees is too full for an edge.
+    /// Whether an edge is too heavy for each of two trees.
     #[inline(always)]
     fn are_full(&self, roots: [u32; 2], weight: f32) -> [bool; 2] {
         roots.map(|root| weight >= self.trees[root as usize].bears)
@@ -224,7 +227,7 @@ impl Forest {
         Ok(())
     }
 
-    /// Joins over edges that have woken and are lighter than one.
+    /// Joins regions over woken edges that are lighter than the given edge.
     #[inline(always)]
     fn join_woken(&mut self, before: Edge) {
         while let Some(&Reverse(edge)) = self.woken.peek()
@@ -238,7 +241,8 @@ impl Forest {
         }
     }
 
-    /// Wakes the heaviest sides of an edge's triangles that go from its end in a tree that is not full to another such tree.
+    /// Wakes the heaviest sides of an edge's triangles. Only sides from the end of the edge whose
+    /// tree is not full to another tree that is not full are woken.
     fn wake(&mut self, edge: Edge, end: usize, roots: [u32; 2], weights: &[f32]) -> Result<()> {
         let (pixel, direction) = (
             edge as u32 as usize / DIRECTIONS,
@@ -247,6 +251,7 @@ impl Forest {
         let stride = self.steps[1] as usize;
         let own = pixel + (DIRECTIONS - 1) * (pixel / stride) * stride;
         let at = |from: usize, by: isize| from.wrapping_add_signed(by);
+        // The weights of a row are stored in one line for each direction.
         for triangle in &self.triangles[direction] {
             let sides = [triangle.one, triangle.other];
             let (side, other) = (sides[end], sides[1 - end]);
@@ -264,7 +269,8 @@ impl Forest {
         Ok(())
     }
 
-    /// Joins trees below an area to those beside them, in the order in which steps between them were found.
+    /// Joins trees below an area to their neighbours. `left` contains the edges between them, in
+    /// the order of their weights.
     pub(super) fn join_small(&mut self, left: &[[u32; 2]], least: usize) {
         for roots in left {
             let roots = roots.map(|root| self.root(root));
@@ -275,7 +281,8 @@ impl Forest {
         }
     }
 
-    /// The number of each pixel's tree, in the order of their first pixels.
+    /// Returns the number of the tree of each pixel. Trees are numbered in the order of their first
+    /// pixels.
     pub(super) fn number(mut self, frame: &Frame) -> Result<Vec<i32>> {
         let [rows, columns] = frame.shape;
         memory::check::<i32>("regions", rows * columns)?;
@@ -287,7 +294,7 @@ impl Forest {
                 self.parents[pixel] = root;
                 let tree = &mut self.trees[root as usize];
                 if tree.bears >= 0.0 {
-                    // Seen for the first time: from here on its area is its number.
+                    // This is the first pixel of the tree, so its area is replaced by its number.
                     *tree = Tree {
                         area: next,
                         bears: -1.0,

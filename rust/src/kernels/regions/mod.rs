@@ -1,15 +1,19 @@
-//! Regions of one colour: the graph-based merge of Felzenszwalb and Huttenlocher, *Efficient graph-based image segmentation*,
-//! IJCV 59(2), 2004, section 3, with eight neighbours a pixel.
+//! Regions of similar colour by graph-based segmentation. Felzenszwalb and Huttenlocher, *Efficient
+//! graph-based image segmentation*, IJCV 59(2), 2004, section 3. Each pixel has eight neighbours.
 //!
-//! 1. `weights`: the image is smoothed, and each edge between neighbours weighs as much as their colours differ (section 5.1).
-//! 2. Edges are taken from the lightest on. One joins its two regions where it is lighter than what either bears: the heaviest
-//!    edge within, and the scale over the area (equation 4).
-//! 3. What is smaller than the least area joins its neighbour over the lightest edge (section 5).
+//! 1. `weights`: the image is smoothed, and the weight of an edge is the colour difference of its
+//!    two pixels (section 5.1).
+//! 2. Edges are taken in the order of their weights. An edge joins its two regions if it is lighter
+//!    than the limits of both. The limit of a region is its heaviest inner edge, plus the scale
+//!    divided by the area (equation 4).
+//! 3. Regions below the minimum area join their neighbour over the lightest edge (section 5).
 //!
-//! Weights are worked out in double precision and rounded to single; of equal ones the first pixel's goes first, and of its own
-//! those along the row, along the column, and the two diagonals, in this order. Regions are numbered by their first pixels.
+//! Weights are computed in double precision and rounded to single. Ties go to the first pixel. For
+//! one pixel the order is along the row, along the column, and the two diagonals. Regions are
+//! numbered by their first pixels.
 //!
-//! Departure: three of five edges are never sorted, and the result is the same. See `dormant`.
+//! Departure from the paper: 60 % of the edges are never sorted, and the result is the same. See
+//! `dormant`.
 
 mod dormant;
 mod forest;
@@ -22,37 +26,40 @@ use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 use forest::Forest;
 
-/// The largest standard deviation of the smoothing, in pixels.
+/// Maximum standard deviation of the smoothing, in pixels.
 pub const MAX_BLUR: f64 = 64.0;
 
-/// The largest sample and scale.
+/// Maximum absolute sample value, and maximum scale.
 pub const MAX_VALUE: f64 = 1e15;
 
-/// Bytes that are taken for a pixel, and for a sample of a row that is smoothed: measured.
+/// Measured bytes of memory for a pixel, and for a sample of a row that is smoothed.
 const PIXEL: usize = 128;
 const SAMPLE: usize = 64;
 
-/// The merge's parameters.
+/// Parameters of the segmentation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// How much a region of one pixel bears beyond its heaviest edge, in the units of the image (k in the paper); one of n
-    /// pixels bears an n-th of it. More makes larger regions.
+    /// Limit of a region of one pixel, in the units of the image (k in the paper). A region of n
+    /// pixels has 1 / n of it, added to its heaviest inner edge. A larger scale gives larger
+    /// regions.
     pub scale: f64,
     /// Standard deviation of the Gaussian that smooths the image, in pixels.
     pub blur: f64,
-    /// The least area, in pixels.
+    /// Minimum area of a region, in pixels.
     pub least: usize,
-    /// Which axes are cyclic.
+    /// Flags of the axes that wrap.
     pub wrap: [bool; 2],
 }
 
-/// The region of each pixel of an image of `shape` (rows, columns, channels), from 0.
+/// Returns the number of the region of each pixel, from 0. The image has the given `shape` (rows,
+/// columns, channels).
 pub fn merge(
     image: &[f32],
     shape: [usize; 3],
     options: &Options,
     monitor: &Monitor,
 ) -> Result<Vec<i32>> {
+    // Check the arguments and the memory.
     let [rows, columns, channels] = shape;
     let grid = Grid::new([rows, columns], options.wrap)?;
     check_shape("image", &shape, image.len())?;
@@ -67,6 +74,7 @@ pub fn merge(
         frame.len() + rows_in_work,
         PIXEL,
     )?;
+    // Measure the edges, and list and sort those that are not dormant.
     monitor.expect(STEPS);
     let mut weights = weights::measure(image, channels, &frame, options.blur, monitor)?;
     monitor.advance(STEPS / 4)?;
@@ -75,6 +83,7 @@ pub fn merge(
     monitor.advance(STEPS / 8)?;
     let awake = sort(awake)?;
     monitor.advance(STEPS / 8)?;
+    // Join similar regions, then small ones.
     let mut forest = Forest::new(&frame, options.scale)?;
     let left = forest.join_alike(&awake, &weights, monitor)?;
     monitor.advance(STEPS / 4)?;
@@ -82,7 +91,7 @@ pub fn merge(
     forest.number(&frame)
 }
 
-/// What the whole is, for those who watch it.
+/// Total number of progress steps.
 const STEPS: u64 = 16;
 
 fn check(image: &[f32], options: &Options) -> Result<()> {
@@ -104,17 +113,20 @@ fn check(image: &[f32], options: &Options) -> Result<()> {
     }
 }
 
-/// The pixels with a margin of one around them: what is over an edge there, where an axis is cyclic, and nothing otherwise. No
-/// loop over neighbours then asks where it is.
+/// The pixels with a margin of one around them. If an axis wraps, the margin contains copies of the
+/// pixels across the edge. Loops over neighbours then need no test of the position.
 struct Frame {
     shape: [usize; 2],
     wrap: [bool; 2],
-    /// From a row to the next.
+    /// Distance in memory between rows.
     stride: usize,
 }
 
 impl Frame {
-    /// Of as many pixels as edges can be numbered of by 32 bits.
+    /// Returns the frame of a grid.
+    ///
+    /// # Errors
+    /// The grid has more pixels than the number of edges that 32 bits can index.
     fn new(grid: &Grid<2>) -> Result<Self> {
         let shape = grid.shape();
         let all = shape.map(|n| n as u128 + 2).iter().product::<u128>();
@@ -132,13 +144,12 @@ impl Frame {
         })
     }
 
-    /// Pixels, the margin included.
+    /// Number of pixels, including the margin.
     fn len(&self) -> usize {
         (self.shape[0] + 2) * self.stride
     }
 
-    /// Copies into the margin what is over the edges of `lines`, each of which is a row: `each` of them belong to one row of
-    /// pixels.
+    /// Copies the pixels across the edges into the margin. Each row of pixels has `each` lines.
     fn wrap_lines<T: Copy>(&self, lines: &mut [T], each: usize) {
         let [rows, columns] = self.shape;
         if self.wrap[1] {
@@ -155,12 +166,12 @@ impl Frame {
     }
 }
 
-/// An edge: its weight in the high half, as bits that are in the order of the numbers, and in the low half four times the pixel
-/// that it is counted with and its direction.
+/// An edge. The high half contains the weight, as bits that have the order of the numbers. The low
+/// half contains four times the pixel of the edge, plus the direction.
 type Edge = u64;
 
-/// Directions of edges from their pixel: along the row, along the column, along both; the last one goes from the pixel's
-/// neighbour in the row to that in the column.
+/// Number of directions of edges from their pixel: along the row, along the column, and the falling
+/// diagonal. The fourth goes from the pixel's neighbour in the row to its neighbour in the column.
 const DIRECTIONS: usize = 4;
 
 fn pack(weight: f32, pixel: usize, direction: usize) -> Edge {
@@ -171,13 +182,15 @@ fn weight(edge: Edge) -> f32 {
     f32::from_bits((edge >> 32) as u32)
 }
 
-/// The edges from the lightest on, equal ones in the order of their numbers, in which they must come: by digits of their weights.
+/// Sorts edges by weight with a radix sort. It is stable, so edges that are given in the order of
+/// their numbers keep this order in ties.
 fn sort(mut edges: Vec<Edge>) -> Result<Vec<Edge>> {
     const BITS: u32 = 11;
     let digit =
         |edge: Edge, pass: usize| (edge >> (32 + BITS * pass as u32)) as usize % (1 << BITS);
     let mut starts = memory::filled("digits", [[0u32; 1 << BITS]; 3], 1)?;
     let starts = &mut starts[0];
+    // Count the digits of all passes at once.
     for &edge in &edges {
         for (pass, starts) in starts.iter_mut().enumerate() {
             starts[digit(edge, pass)] += 1;
@@ -188,6 +201,7 @@ fn sort(mut edges: Vec<Edge>) -> Result<Vec<Edge>> {
         if starts.iter().any(|&n| n as usize == edges.len()) {
             continue;
         }
+        // Convert counts to positions, and distribute the edges.
         let mut next = 0;
         for start in starts.iter_mut() {
             next += std::mem::replace(start, next);

@@ -3,7 +3,7 @@ use crate::foundation::hash::Noise;
 use crate::foundation::par;
 use proptest::prelude::*;
 
-/// As the paper has it: all edges, sorted, twice.
+/// The method of the paper: all edges are sorted and visited twice.
 fn naive(image: &[f32], shape: [usize; 3], options: &Options) -> Vec<i32> {
     let [rows, columns, channels] = shape;
     let grid = Grid::new([rows, columns], options.wrap).unwrap();
@@ -30,7 +30,7 @@ fn naive(image: &[f32], shape: [usize; 3], options: &Options) -> Vec<i32> {
             edges.push((sum.sqrt() as f32, a, b));
         }
     }
-    // A stable sort: of equal ones the first.
+    // The sort is stable, so ties keep their order.
     edges.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut label: Vec<usize> = (0..rows * columns).collect();
     let mut inner = vec![0.0f32; rows * columns];
@@ -127,7 +127,7 @@ fn run(image: &[f32], shape: [usize; 3], options: &Options, threads: usize) -> V
     .unwrap()
 }
 
-/// Slow waves under noise, of few values where these shall often be equal.
+/// Slow waves with noise. A large `coarse` gives few distinct values, which are often equal.
 fn picture([rows, columns, channels]: [usize; 3], coarse: f32, grain: f32, seed: u64) -> Vec<f32> {
     let noise = Noise::new(seed);
     let phase = noise.uniform([7, 7, 7, 7]) as f32 * 6.0;

@@ -1,4 +1,4 @@
-//! What edges weigh: how much the colours of neighbours differ after smoothing.
+//! Weights of edges: the colour differences of neighbours after smoothing.
 
 use super::{DIRECTIONS, Frame};
 use crate::Result;
@@ -7,13 +7,14 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::wide::wide_fn;
 
-/// Rows that are measured at once; one more is smoothed for them.
+/// Number of rows of a task, which smooths one more row.
 const ROWS: usize = 32;
 
-/// Standard deviations after which the Gaussian ends.
+/// Radius of the truncated Gaussian, in standard deviations.
 const TRUNCATE: f64 = 4.0;
 
-/// The weights of all edges: for each row of the frame a line a direction. Where there is no edge it is infinite.
+/// Returns the weights of all edges: one line for each direction and each row of the frame. Missing
+/// edges have infinite weights.
 pub(super) fn measure(
     image: &[f32],
     channels: usize,
@@ -43,6 +44,7 @@ pub(super) fn measure(
         let (mut here, mut below) = (vec![0.0; channels * stride], vec![0.0; channels * stride]);
         let first = block * ROWS;
         smoother.smooth(first, &mut scratch, &mut here);
+        // Measure the edges along this row, then those to the next row.
         for (row, lines) in (first..).zip(lines.chunks_exact_mut(row_of_lines)) {
             let (along, rest) = lines.split_at_mut(stride);
             let sums = &mut scratch.flat[..columns];
@@ -70,7 +72,8 @@ pub(super) fn measure(
 }
 
 wide_fn! {
-    /// Distances between the colours of two rows, each from its own pixel on.
+    /// Computes the distances between the colours of two rows. `shifts` are the first pixels of the
+    /// two rows.
     fn differ(one: &[f64], other: &[f64], shifts: [usize; 2], stride: usize, sums: &mut [f64], out: &mut [f32]) {
         sums.fill(0.0);
         for (one, other) in one.chunks_exact(stride).zip(other.chunks_exact(stride)) {
@@ -85,7 +88,8 @@ wide_fn! {
     }
 }
 
-/// The Gaussian's values from the middle on, of which all together are 1.
+/// Returns the values of the Gaussian from the centre outwards, normalised so that the sum over
+/// both sides is 1.
 fn make_taps(blur: f64) -> Vec<f64> {
     let reach = (TRUNCATE * blur + 0.5) as usize;
     let value = |i: usize| exp(-0.5 / (blur * blur) * (i * i) as f64);
@@ -93,7 +97,7 @@ fn make_taps(blur: f64) -> Vec<f64> {
         return vec![1.0];
     }
     let taps: Vec<f64> = (0..=reach).map(value).collect();
-    // From one end to the other.
+    // Sum from one end to the other.
     let sum: f64 = taps.iter().rev().chain(&taps[1..]).sum();
     taps.iter().map(|tap| tap / sum).collect()
 }
@@ -105,7 +109,7 @@ struct Smoother<'a> {
     taps: Vec<f64>,
 }
 
-/// Rows between their columns' smoothing and their own.
+/// Buffers of a row: smoothed along columns and padded, and smoothed in both directions.
 struct Scratch {
     padded: Vec<f64>,
     flat: Vec<f64>,
@@ -123,7 +127,8 @@ impl Scratch {
 }
 
 impl Smoother<'_> {
-    /// A row smoothed both ways, a line a channel, each with a margin that goes around.
+    /// Smooths a row in both directions. The output has one line for each channel, each with a
+    /// wrapped margin.
     fn smooth(&self, row: usize, scratch: &mut Scratch, out: &mut [f64]) {
         let ([_, columns], channels) = (self.frame.shape, self.channels);
         let reach = self.taps.len() - 1;
@@ -135,7 +140,7 @@ impl Smoother<'_> {
         let Scratch { padded, flat } = scratch;
         let middle = &mut padded[reach * channels..][..length];
         start(line(0), self.taps[0], middle);
-        // From the ends to the middle, as others add them up.
+        // Sum from the ends to the centre, in the same order as SciPy.
         for by in (1..=reach).rev() {
             add(
                 line(-(by as isize)),
@@ -144,6 +149,7 @@ impl Smoother<'_> {
                 middle,
             );
         }
+        // Extend the row, then smooth along it.
         for i in 0..reach {
             let before = self.resolve(1, i as isize - reach as isize);
             let after = self.resolve(1, (columns + i) as isize);
@@ -157,6 +163,7 @@ impl Smoother<'_> {
         for by in (1..=reach).rev() {
             add_again(from(reach - by), from(reach + by), self.taps[by], flat);
         }
+        // Split the channels.
         for (channel, line) in out.chunks_exact_mut(self.frame.stride).enumerate() {
             for (out, value) in line[1..].iter_mut().zip(flat.chunks_exact(channels)) {
                 *out = value[channel];
@@ -166,7 +173,8 @@ impl Smoother<'_> {
         }
     }
 
-    /// Where a coordinate beyond an end lies: around the axis where that is cyclic, mirrored at the end otherwise.
+    /// Maps a coordinate onto the axis: modulo the length if the axis wraps, else mirrored at the
+    /// ends.
     fn resolve(&self, axis: usize, i: isize) -> usize {
         let n = self.frame.shape[axis] as isize;
         if (0..n).contains(&i) {

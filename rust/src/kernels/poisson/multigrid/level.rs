@@ -1,35 +1,37 @@
-//! One resolution of the grid: its operator, and the ways to the next one.
+//! One resolution of the grid: its operator, and the transfer to the next resolution.
 
 use super::CHUNK;
 use crate::foundation::par;
 use crate::foundation::wide::wide_fn;
 
-/// What lies beyond one side of a grid.
+/// Values beyond one side of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
-    /// Fixed pixels: zero.
+    /// Fixed pixels, which are zero.
     Fixed,
-    /// The outermost pixels once more, so that no difference crosses the side.
+    /// A copy of the outermost pixels, so that no difference crosses the side.
     Mirror,
-    /// The other side.
+    /// The pixels of the opposite side.
     Wrap,
 }
 
-/// One resolution. Arrays have a margin of one on each side, and memory for an even number of rows and columns.
+/// One resolution. Arrays have a margin of one on each side, and memory for an even number of rows
+/// and columns.
 ///
-/// The operator is `diagonal * x` less the four neighbours: what is not free holds 0, so that links need no weights.
+/// The operator is `diagonal * x` minus the four neighbours. Pixels that are not free are 0, so
+/// links need no weights.
 pub(super) struct Level {
     pub(super) rows: usize,
     pub(super) columns: usize,
-    /// Low and high side of the rows' and of the columns' axis.
+    /// Low and high side of the axis of rows and of the axis of columns.
     sides: [[Side; 2]; 2],
-    /// 0 at what is not free, as are the reciprocals.
+    /// Zero at pixels that are not free, like the reciprocals.
     diagonal: Vec<f32>,
     reciprocal: Vec<f32>,
-    /// Where the diagonal is the same at all that is free, as it is at the given resolution: what is free. A byte a pixel, in
-    /// place of eight, is what each pass has to read.
+    /// Flags of the free pixels, if all of them have the same diagonal, as at the finest
+    /// resolution. Each pass then reads one byte for each pixel instead of eight.
     open: Option<Vec<u8>>,
-    /// The part of the diagonal that ties a pixel to fixed ones.
+    /// Part of the diagonal that links a pixel to fixed pixels.
     tied: Vec<f32>,
     screening: f32,
 }
@@ -41,11 +43,14 @@ pub(super) struct Vectors {
     pub(super) b: Vec<f32>,
 }
 
-/// Share of the children's ties to fixed pixels that a parent has. Two links side by side make one, which is half of
-/// their sum; but a parent's middle is nearer to fixed pixels than to its neighbours. On a disc of 0.8 megapixels: 7
-/// cycles with 0.7 and 0.8, 8 with 0.6 and 1.
+/// Factor from the sum of the children's links to fixed pixels to the link of their parent.
+///
+/// Two parallel links are replaced by half of their sum. But the centre of a parent is nearer to
+/// fixed pixels than to its neighbours, so the factor is larger than 0.5. Measured on a disc of 0.8
+/// megapixels: 7 cycles with 0.7 and 0.8, 8 cycles with 0.6 and 1.
 const TIE: f32 = 0.75;
-/// Weights by which four samples in a row make one of the coarser level, and two of the coarser level one sample.
+/// Weights of the transfer: four samples in a row are combined into one of the coarser level, and
+/// two coarser samples into one sample.
 const TAPS: [f32; 2] = [0.25, 0.75];
 
 impl Level {
@@ -66,7 +71,7 @@ impl Level {
         level
     }
 
-    /// The given resolution; `free` says which pixels are solved.
+    /// Returns the finest level. `free` marks the pixels to solve.
     pub(super) fn finest(
         shape: [usize; 2],
         sides: [[Side; 2]; 2],
@@ -86,12 +91,12 @@ impl Level {
         });
         level.tied = tied;
         level.finish(&open);
-        // Links and ties are four.
+        // Each free pixel has four links, to free or to fixed pixels, so all diagonals are equal.
         level.open = Some(open.iter().map(|&o| u8::from(o > 0.0)).collect());
         level
     }
 
-    /// Half the resolution. Where a child is free its parent is.
+    /// Returns the level of half the resolution. A parent is free if any of its children is free.
     pub(super) fn coarser(&self) -> Self {
         let shape = [self.rows.div_ceil(2), self.columns.div_ceil(2)];
         let mut coarse = Self::empty(shape, self.sides, 4.0 * self.screening);
@@ -125,7 +130,7 @@ impl Level {
         coarse
     }
 
-    /// The diagonal: links, ties and screening.
+    /// Computes the diagonal: links, fixed links and screening.
     fn finish(&mut self, open: &[f32]) {
         let mut diagonal = std::mem::take(&mut self.diagonal);
         self.each_row(&mut diagonal, |r, out| {
@@ -173,12 +178,12 @@ impl Level {
         (row + 1) * self.stride() + column + 1
     }
 
-    /// Rows of a chunk.
+    /// Number of rows of a chunk.
     pub(super) fn chunk(&self) -> usize {
         (CHUNK / self.stride()).max(1)
     }
 
-    /// Calls `f(row, samples)` for each row of `data`, margins left out, then fills the margins.
+    /// Calls `f(row, samples)` for each row of `data` without its margins, then fills the margins.
     pub(super) fn each_row(&self, data: &mut [f32], f: impl Fn(usize, &mut [f32]) + Sync + Send) {
         self.each_chunk(data, |first, out| {
             for (r, row) in out.chunks_exact_mut(self.stride()).enumerate() {
@@ -187,7 +192,8 @@ impl Level {
         });
     }
 
-    /// Calls `f(first row, rows with their margins)` for each chunk of `data`, then fills the margins.
+    /// Calls `f(first row, rows with their margins)` for each chunk of `data`, then fills the
+    /// margins.
     fn each_chunk(&self, data: &mut [f32], f: impl Fn(usize, &mut [f32]) + Sync + Send) {
         let (stride, rows) = (self.stride(), self.chunk());
         let inner = &mut data[stride..][..self.rows * stride];
@@ -230,23 +236,24 @@ impl Level {
         }
     }
 
-    /// `A x`.
+    /// Computes `A x`.
     pub(super) fn apply(&self, x: &[f32], out: &mut [f32]) {
         self.each_row(out, |r, out| self.row::<PRODUCT>(r, x, x, 0.0, out));
     }
 
-    /// One relaxation.
+    /// Performs one relaxation.
     pub(super) fn relax(&self, v: &mut Vectors, step: f32) {
         let Vectors { x, other, b } = v;
         self.each_row(other, |r, out| self.row::<RELAX>(r, x, b, step, out));
         std::mem::swap(x, other);
     }
 
-    /// Two relaxations of nothing.
+    /// Performs two relaxations that start at zero.
     pub(super) fn begin(&self, v: &mut Vectors, steps: [f32; 2]) {
         let Vectors { x, b, .. } = v;
         if self.open.is_some() {
-            // The first one is a multiple of the right-hand side, which need not be kept.
+            // The result of the first relaxation is a multiple of the right-hand side, so it is not
+            // stored.
             let first = steps[0] * self.same()[1];
             return self.each_row(x, |r, out| self.second(r, b, first, steps[1], out));
         }
@@ -260,11 +267,12 @@ impl Level {
         self.relax(v, steps[1]);
     }
 
-    /// The right-hand side of the coarser level: what `x` leaves over.
+    /// Computes the right-hand side of the coarser level from the residual of `x`.
     pub(super) fn restrict(&self, v: &Vectors, next: &Level, coarse: &mut [f32]) {
         let (n, stride) = (self.columns, self.stride());
         let odd = [self.rows % 2 == 1, n % 2 == 1];
-        // Row `i - 1` of what is left over, with its margins. What lies beyond the last of an odd number counts as nothing.
+        // Computes row `i - 1` of the residual, with its margins. An odd number of rows is
+        // completed by a row of zeros.
         let lack = |i: usize, line: &mut [f32]| {
             let last = self.rows;
             let row = match (i, self.sides[0]) {
@@ -287,7 +295,7 @@ impl Level {
             }
         };
         next.each_chunk(coarse, |first, out| {
-            // Each row is used twice, and is made once.
+            // Each fine row is used twice but computed once.
             let mut lines: [Vec<f32>; 4] = std::array::from_fn(|_| vec![0.0; stride]);
             let mut joined = vec![0.0f32; stride];
             for (r, out) in out.chunks_exact_mut(next.stride()).enumerate() {
@@ -304,7 +312,7 @@ impl Level {
         });
     }
 
-    /// Adds the coarser level's solution.
+    /// Adds the solution of the coarser level.
     pub(super) fn prolong(&self, next: &Level, coarse: &[f32], x: &mut [f32]) {
         let stride = next.stride();
         self.each_chunk(x, |first, out| {
@@ -318,13 +326,14 @@ impl Level {
         });
     }
 
-    /// The diagonal of the given resolution and its reciprocal, where all of it is the same.
+    /// Returns the diagonal of the finest resolution and its reciprocal, which are the same at all
+    /// free pixels.
     fn same(&self) -> [f32; 2] {
         let diagonal = 4.0 + self.screening;
         [diagonal, 1.0 / diagonal]
     }
 
-    /// One row of the operator.
+    /// Applies the operator to one row.
     fn row<const WHAT: u8>(&self, r: usize, x: &[f32], b: &[f32], step: f32, out: &mut [f32]) {
         let (n, start) = (out.len(), self.at(r, 0));
         let (x, b) = (self.lines(r, x), &b[start..][..n]);
@@ -335,7 +344,8 @@ impl Level {
         operate::<WHAT>(x, b, coefficients, step, out);
     }
 
-    /// One row of a relaxation of `first` times the right-hand side, at the given resolution.
+    /// Relaxes one row of the finest resolution. The start value is `first` times the right-hand
+    /// side.
     fn second(&self, r: usize, b: &[f32], first: f32, step: f32, out: &mut [f32]) {
         if let Some(open) = &self.open {
             let open = &open[self.at(r, 0)..][..out.len()];
@@ -343,7 +353,7 @@ impl Level {
         }
     }
 
-    /// A row, and the pixels above, below, before and after it.
+    /// Returns a row, and the same row shifted up, down, left and right.
     fn lines<'a>(&self, r: usize, data: &'a [f32]) -> [&'a [f32]; 5] {
         let (start, stride) = (self.at(r, 0), self.stride());
         [start, start - stride, start + stride, start - 1, start + 1]
@@ -352,7 +362,7 @@ impl Level {
 }
 
 wide_fn! {
-    /// The operator where the diagonal is the same at all that is free.
+    /// Applies the operator if all free pixels have the same diagonal.
     fn operate_same<const WHAT: u8>(
         x: [&[f32]; 5], b: &[f32], same: [f32; 2], open: &[u8], step: f32, out: &mut [f32],
     ) {
@@ -368,7 +378,7 @@ wide_fn! {
 }
 
 wide_fn! {
-    /// The operator of a diagonal and its reciprocal.
+    /// Applies the operator with an array of diagonals and their reciprocals.
     fn operate<const WHAT: u8>(x: [&[f32]; 5], b: &[f32], coefficients: [&[f32]; 2], step: f32, out: &mut [f32]) {
         let n = out.len();
         let ([here, above, below, before, after], b) = (x.map(|x| &x[..n]), &b[..n]);
@@ -381,7 +391,7 @@ wide_fn! {
     }
 }
 
-/// The operator at one pixel.
+/// Applies the operator at one pixel.
 #[inline(always)]
 fn one<const WHAT: u8>(
     here: f32,
@@ -400,7 +410,7 @@ fn one<const WHAT: u8>(
 }
 
 wide_fn! {
-    /// A relaxation of `first` times the right-hand side.
+    /// Relaxes `first` times the right-hand side.
     fn relax_multiple(b: [&[f32]; 5], first: f32, reciprocal: f32, open: &[u8], step: f32, out: &mut [f32]) {
         let n = out.len();
         let ([here, above, below, before, after], open) = (b.map(|b| &b[..n]), &open[..n]);
@@ -414,7 +424,7 @@ wide_fn! {
 }
 
 wide_fn! {
-    /// Four rows of what is left over become one of the coarser level.
+    /// Combines four rows of the residual into one row of the coarser level.
     fn join(lines: [&[f32]; 4], joined: &mut [f32], out: &mut [f32]) {
         let n = joined.len();
         let [a, b, c, d] = lines.map(|line| &line[..n]);
@@ -430,7 +440,7 @@ wide_fn! {
 }
 
 wide_fn! {
-    /// Adds what two rows of the coarser level are between at a row.
+    /// Interpolates between two rows of the coarser level and adds the result.
     fn refine(near: &[f32], far: &[f32], line: &mut [f32], free: &[f32], out: &mut [f32]) {
         for (line, (n, f)) in line.iter_mut().zip(near.iter().zip(far)) {
             *line = TAPS[1] * n + TAPS[0] * f;
@@ -452,7 +462,7 @@ wide_fn! {
     }
 }
 
-/// What [`Level::row`] makes: `A x`, `b - A x`, or a relaxed x.
+/// Results of [`Level::row`]: `A x`, `b - A x`, or a relaxed x.
 const PRODUCT: u8 = 0;
 const LACK: u8 = 1;
 const RELAX: u8 = 2;

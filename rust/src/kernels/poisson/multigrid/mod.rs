@@ -1,9 +1,10 @@
-//! Pixels under a mask: conjugate gradients, preconditioned by a multigrid cycle.
+//! Solver for pixels under a mask: conjugate gradients, preconditioned by a multigrid cycle.
 //!
-//! McAdams, Sifakis and Teran, *A parallel multigrid Poisson solver for fluids simulation on large grids*, SCA 2010, for the
-//! combination. Cells of two by two are joined, values between them are bilinear, and each level has the same five-point
-//! operator. The directions are those of Polak and Ribière, which forgive a cycle that is not quite symmetric: at sides of
-//! odd length it is not.
+//! McAdams, Sifakis and Teran, *A parallel multigrid Poisson solver for fluids simulation on large
+//! grids*, SCA 2010, describe the combination. Cells of 2 x 2 pixels are merged, interpolation is
+//! bilinear, and each level has the same five-point operator. The search directions are those of
+//! Polak and Ribière, which tolerate a cycle that is not quite symmetric. Sides of odd length make
+//! it asymmetric.
 
 mod level;
 
@@ -13,16 +14,17 @@ use crate::foundation::wide::wide_fn;
 use crate::{Error, Result};
 use level::{Level, Side, Vectors};
 
-/// The right-hand side left over, relative to the first, at which the solution is good: far below a grey level.
+/// Stopping criterion: norm of the residual relative to the first right-hand side. The error is
+/// then far below a grey level.
 const TOLERANCE: f64 = 1e-5;
-/// More cycles than any mask was seen to need, by far.
+/// Maximum number of cycles, far more than any tested mask needs.
 const MAX_CYCLES: usize = 200;
-/// Steps of relaxation: the roots of the Chebyshev polynomial on [1/2, 2], the part of the spectrum that the coarser
-/// level does not see.
+/// Step lengths of the relaxation: reciprocals of the roots of the Chebyshev polynomial on [1/2,
+/// 2]. This is the part of the spectrum that the coarser level does not represent.
 const STEPS: [f32; 2] = [0.561, 1.390];
-/// Relaxations that solve the coarsest level.
+/// Number of relaxations that solve the coarsest level.
 const COARSEST: usize = 8;
-/// Samples a task takes at a time.
+/// Number of samples of a task.
 const CHUNK: usize = 1 << 14;
 
 pub(super) fn spread(
@@ -31,6 +33,7 @@ pub(super) fn spread(
     flow: &mut [f32],
     monitor: &Monitor,
 ) -> Result<()> {
+    // Find the window of the free pixels and the conditions at its sides.
     let [rows, columns, channels] = domain.shape;
     let free = |y: usize, x: usize| {
         mask[y * columns + x]
@@ -50,6 +53,7 @@ pub(super) fn spread(
             _ => Side::Fixed,
         })
     });
+    // Build the levels until the coarsest has at most 3 pixels a side.
     let screening = domain.screening as f32;
     let inside = |r: usize, c: usize| free(top + r, left + c);
     let mut levels = vec![Level::finest([height, width], sides, screening, inside)];
@@ -61,6 +65,7 @@ pub(super) fn spread(
     }
     let fine = &levels[0];
     let mut vectors: Vec<Vectors> = levels.iter().map(Level::vectors).collect();
+    // Solve the channels one after the other.
     monitor.expect(channels as u64);
     for c in 0..channels {
         fine.each_row(&mut vectors[0].b, |r, out| {
@@ -87,7 +92,8 @@ pub(super) fn spread(
     Ok(())
 }
 
-/// The rows and the columns (first, number) that hold all free pixels; a cyclic axis is kept whole.
+/// Returns the rows and the columns (first, number) that contain all free pixels. A wrapped axis is
+/// kept whole.
 fn window(domain: &Domain<'_>, free: impl Fn(usize, usize) -> bool) -> Option<[(usize, usize); 2]> {
     let [rows, columns, _] = domain.shape;
     let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
@@ -112,7 +118,7 @@ fn window(domain: &Domain<'_>, free: impl Fn(usize, usize) -> bool) -> Option<[(
     }))
 }
 
-/// One cycle: `vectors[0].x` becomes about the solution for `vectors[0].b`.
+/// Performs one cycle: `vectors[0].x` becomes an approximate solution for `vectors[0].b`.
 fn cycle(levels: &[Level], vectors: &mut [Vectors]) {
     let (Some((level, coarser)), Some((v, below))) =
         (levels.split_first(), vectors.split_first_mut())
@@ -132,7 +138,7 @@ fn cycle(levels: &[Level], vectors: &mut [Vectors]) {
     STEPS.iter().rev().for_each(|&step| level.relax(v, step));
 }
 
-/// Solves for `vectors[0].b`, which is used up. Sums run by fixed chunks, in order.
+/// Solves for `vectors[0].b`, whose contents are destroyed. Sums run by fixed chunks, in order.
 fn conjugate_gradients(
     levels: &[Level],
     vectors: &mut [Vectors],
@@ -147,6 +153,7 @@ fn conjugate_gradients(
             return Ok(x);
         }
         monitor.check()?;
+        // The cycle preconditions the residual.
         cycle(levels, vectors);
         let Vectors { x: z, b: r, .. } = &mut vectors[0];
         let [next, along] = inner(level, z, [&*r, &ap]);
@@ -159,6 +166,7 @@ fn conjugate_gradients(
         level.each_row(&mut p, |r, p| {
             turn(p, beta, &z[level.at(r, 0)..]);
         });
+        // Advance along the new direction to the minimum.
         level.apply(&p, &mut ap);
         let [curvature] = inner(level, &p, [&ap]);
         if !(curvature > 0.0 && rz.is_finite()) {
@@ -187,20 +195,20 @@ fn conjugate_gradients(
 }
 
 wide_fn! {
-    /// `p = z + beta p`.
+    /// Computes `p = z + beta p`.
     fn turn(p: &mut [f32], beta: f32, z: &[f32]) {
         p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p);
     }
 }
 
 wide_fn! {
-    /// `x += step p`.
+    /// Computes `x += step p`.
     fn advance(x: &mut [f32], step: f32, p: &[f32]) {
         x.iter_mut().zip(p).for_each(|(x, p)| *x += step * p);
     }
 }
 
-/// The dot products of one vector with others, without the margins.
+/// Returns the dot products of one vector with others, without the margins.
 fn inner<const N: usize>(level: &Level, a: &[f32], others: [&[f32]; N]) -> [f64; N] {
     let rows = level.chunk();
     let parts = par::map(level.rows.div_ceil(rows), |chunk| {
@@ -215,7 +223,7 @@ fn inner<const N: usize>(level: &Level, a: &[f32], others: [&[f32]; N]) -> [f64;
 }
 
 wide_fn! {
-    /// Adds the products of one row with others.
+    /// Adds the products of one row with others to the lanes.
     fn multiply<const N: usize>(a: &[f32], others: [&[f32]; N], lanes: &mut [[f64; 8]; N]) {
         for (lanes, b) in lanes.iter_mut().zip(others) {
             let mut sums = *lanes;
