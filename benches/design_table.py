@@ -116,7 +116,7 @@ def row(name: str, image: np.ndarray, records: dict[str, Any], results: list[Any
     cells = [
         f"{name} {image.shape[1]}x{image.shape[0]}",
         str(report["elements"]),
-        report["kind"] + (", not turned" if report.get("rotate") == 0 else ""),
+        report["segmentation"] + (", not turned" if report.get("rotate") == 0 else ""),
         *(cell(records[n]) for n in HEAD),
         "pass" if not failed else f"fails {', '.join(failed)}",
         f"{seconds:.1f}",

@@ -43,28 +43,28 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 CASES = [
-    ("rock_normal_gl.png", ["--kind", "normal", "--green", "up"], "read as normals, y up"),
-    ("rock_nor_dx.png", ["--kind", "normal", "--green", "down"], "read as normals, y down"),
-    ("rock_flow.png", ["--kind", "vector", "--green", "up"], "read as vectors, y up"),
-    ("rock_mask.png", ["--kind", "label"], "read as labels"),
-    ("rock_labels.png", ["--kind", "label"], "read as labels"),
-    ("x.png", ["--kind", "label"], "read as labels, because its integers form regions of unrelated values"),
-    ("rock_height.png", ["--kind", "colour"], ""),
-    ("y.png", ["--kind", "colour"], ""),
+    ("rock_normal_gl.png", ["--map-type", "normal", "--green", "up"], "read as normals, y up"),
+    ("rock_nor_dx.png", ["--map-type", "normal", "--green", "down"], "read as normals, y down"),
+    ("rock_flow.png", ["--map-type", "vector", "--green", "up"], "read as vectors, y up"),
+    ("rock_mask.png", ["--map-type", "label"], "read as labels"),
+    ("rock_labels.png", ["--map-type", "label"], "read as labels"),
+    ("x.png", ["--map-type", "label"], "read as labels, because its integers form regions of unrelated values"),
+    ("rock_height.png", ["--map-type", "colour"], ""),
+    ("y.png", ["--map-type", "colour"], ""),
 ]
 
 
 @pytest.mark.parametrize(
     ("names", "says", "options"),
     [
-        (["T_Rock_N"], "read as normals, y down", ["--kind", "normal", "--green", "down"]),
-        (["stone_n", "stone_h"], "read as normals, y up", ["--kind", "normal", "--green", "up"]),
+        (["T_Rock_N"], "read as normals, y down", ["--map-type", "normal", "--green", "down"]),
+        (["stone_n", "stone_h"], "read as normals, y up", ["--map-type", "normal", "--green", "up"]),
         (
             ["stone_n", "stone"],
             "stone_n.png: read as normal (the folder has other maps of stone)",
-            ["--kind", "normal", "--green", "up"],
+            ["--map-type", "normal", "--green", "up"],
         ),
-        (["stone_n", "brick"], "read as colours, because no other map in the folder", ["--kind", "colour"]),
+        (["stone_n", "brick"], "read as colours, because no other map in the folder", ["--map-type", "colour"]),
     ],
 )
 def test_short_names_count_with_their_folder(
@@ -115,7 +115,7 @@ def test_turned_normals_fit_turned_heights(places: Path) -> None:
 def test_an_option_outweighs_a_name(places: Path) -> None:
     source = texrs.SourceMap.load(places / "m.npz")
     stated = texrs.apply(source, places / "rock_nor_dx.png", green="up")
-    assert (stated == texrs.apply(source, io.read(places / "rock_nor_dx.png"), kind="normal")).all()
+    assert (stated == texrs.apply(source, io.read(places / "rock_nor_dx.png"), map_type="normal")).all()
     assert (stated != texrs.apply(source, places / "rock_nor_dx.png")).any()
 
 

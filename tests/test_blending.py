@@ -228,13 +228,13 @@ def test_normals_stay_unit_vectors(patchwork, exemplar):
     slope = exemplar[..., :2] / 255 - 0.4
     normals = np.dstack([slope, np.ones((64, 64))])
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    healed = blend(patchwork, normals.astype(np.float32), wrap=True, kind="normal")
+    healed = blend(patchwork, normals.astype(np.float32), wrap=True, map_type="normal")
     np.testing.assert_allclose(np.linalg.norm(healed, axis=-1), 1, atol=1e-5)
-    rendered = patchwork.render(normals.astype(np.float32), kind="normal")
+    rendered = patchwork.render(normals.astype(np.float32), map_type="normal")
     at, after = _seams.list_seams(patchwork, 1, True)
     assert np.abs(healed[after] - healed[at]).mean() < 0.5 * np.abs(rendered[after] - rendered[at]).mean()
     coded = np.rint((normals + 1) / 2 * 255).astype(np.uint8)
-    eight = blend(patchwork, coded, wrap=True, kind="normal")
+    eight = blend(patchwork, coded, wrap=True, map_type="normal")
     assert np.abs(eight / 255 * 2 - 1 - healed).max() < 0.03
 
 
@@ -250,10 +250,10 @@ def test_normals_of_a_turned_copy_meet_where_the_surface_does():
     label = (np.arange(16) >= 8)[np.newaxis].repeat(16, 0)
     frame = np.stack([np.eye(2), np.diag([1, -1])]).astype(np.float32)
     source = pasted(mirrored, ((16, 16),), label=label, frame=frame)
-    healed = blend(source, normals, wrap=(True, False), kind="normal", screening=0.05)
+    healed = blend(source, normals, wrap=(True, False), map_type="normal", screening=0.05)
     across = np.diff(healed[8, :, 0])
     assert np.abs(across).max() < 0.35
-    assert np.abs(np.diff(source.render(normals, kind="normal")[8, :, 0])).max() > 1
+    assert np.abs(np.diff(source.render(normals, map_type="normal")[8, :, 0])).max() > 1
 
 
 # --- strips, bands, threads ------------------------------------------------------------------------------------------
@@ -317,9 +317,9 @@ def test_strips_give_the_whole(monkeypatch, patchwork, exemplar, wrap):
 @pytest.mark.parametrize("kind", ["colour", "normal"])
 def test_without_screening_a_large_picture_is_solved_whole(monkeypatch, patchwork, exemplar, kind):
     image = exemplar.astype(np.float32) if kind == "colour" else exemplar
-    whole = blend(patchwork, image, wrap=(False, True), screening=0, kind=kind)
+    whole = blend(patchwork, image, wrap=(False, True), screening=0, map_type=kind)
     monkeypatch.setattr(_values, "STRIP", 1000)
-    np.testing.assert_array_equal(blend(patchwork, image, wrap=(False, True), screening=0, kind=kind), whole)
+    np.testing.assert_array_equal(blend(patchwork, image, wrap=(False, True), screening=0, map_type=kind), whole)
 
 
 def test_an_exemplar_of_many_rows_is_scaled_in_bands(monkeypatch, patchwork, exemplar):
@@ -431,7 +431,7 @@ def test_blending_can_be_left_out(designed):
         ({"wrap": True, "within": np.ones((3, 3), bool)}, "within"),
         ({"wrap": True, "known": np.ones((3, 3), bool)}, "known"),
         ({"wrap": True, "known": [np.ones((64, 64), bool)] * 2}, "known: needs a mask for each of 1"),
-        ({"wrap": True, "kind": "height"}, "kind"),
+        ({"wrap": True, "map_type": "height"}, "map_type"),
     ],
 )
 def test_bad_input_names_the_argument(patchwork, exemplar, options, names):

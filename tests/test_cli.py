@@ -25,7 +25,8 @@ from texrs.elements import Elements
 
 
 def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    options = "--seed 3 --wrap x --element-layers 2 --element-kind grid --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-mirror"
+    options = "--seed 3 --wrap x --element-layers 2 --element-segmentation grid"
+    options += " --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-mirror"
     more = (
         "--start 0.3 --growth-rate 1.9 --patch 12 --tiles 2 --operations 1 --stages stages --map source.npz -o out.png"
     )
@@ -35,7 +36,7 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
         (40, 56),
         seed=3,
         wrap=(False, True),
-        elements=texrs.ElementOptions(layers=2, kind="grid"),
+        elements=texrs.ElementOptions(layers=2, segmentation="grid"),
         deformation=texrs.DeformationOptions(
             operations=1, translate=0.1, rotate=20.0, scale=(0.9, 1.1), mirror=False, start=0.3, growth_rate=1.9
         ),
@@ -141,7 +142,7 @@ def test_labels_by_hand(here: Path, capsys: Capture) -> None:
     iio.imwrite("labels.png", labels.astype(np.uint8))
     assert main(["design", "in.png", "--element-labels", "labels.png", *TINY, "-o", "out.png", "--stages", "s"]) == 0
     assert iio.imread("out.png").shape == (48, 48, 3)
-    assert '"kind": "labels"' in Path("s/report.json").read_text()
+    assert '"segmentation": "labels"' in Path("s/report.json").read_text()
     before = files(here)
     capsys.readouterr()
     assert main(["design", "in.png", "--element-labels", "in.png", *TINY, "-o", "out.png"]) == 2
@@ -156,7 +157,7 @@ def test_analysed_elements_as_example(here: Path, capsys: Capture) -> None:
     made = []
     for given in (["dots.npz"], ["dots.png", "--element-labels", "dots.npz"]):
         assert main(["design", *given, *TINY, "-o", "out.png", "--stages", "s", "--force"]) == 0
-        assert '"kind": "labels"' in Path("s/report.json").read_text()
+        assert '"segmentation": "labels"' in Path("s/report.json").read_text()
         made.append(iio.imread("out.png"))
     assert (made[0] == made[1]).all()
     Path("none.npz").write_bytes(b"nothing")
@@ -224,7 +225,7 @@ def test_apply(here: Path, capsys: Capture) -> None:
     assert (iio.imread("results/in.png") == view(places, COLOURS)).all()
     np.testing.assert_allclose(np.load("results/height.npy"), view(places, height), rtol=1e-6)
     normal = [
-        "--kind",
+        "--map-type",
         "normal",
         "--green",
         "down",
@@ -237,9 +238,9 @@ def test_apply(here: Path, capsys: Capture) -> None:
         "1",
     ]
     assert main(["apply", "s.npz", "in.png", "-o", "normal.tif", *normal]) == 0
-    expected = places.render(COLOURS, kind="normal", green="down", interpolation="linear")
+    expected = places.render(COLOURS, map_type="normal", green="down", interpolation="linear")
     assert (texrs.io.read("normal.tif") == expected).all()
-    assert main(["apply", "s.npz", "in.png", "-q", "--kind", "color", "-o", "colour.png"]) == 0
+    assert main(["apply", "s.npz", "in.png", "-q", "--map-type", "color", "-o", "colour.png"]) == 0
     assert (iio.imread("colour.png") == iio.imread("out.png")).all()
 
 

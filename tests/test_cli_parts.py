@@ -205,7 +205,7 @@ def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixt
     assert np.array_equal(io.read(files / "b.zarr"), np.load(files / "b.npy"))
     assert main([*words, f"{files}/b.zarr", weave]) == 2
     assert "holds something else" in capsys.readouterr().err
-    assert main([*words, f"{files}/b.zarr", weave, "--force", "--kind", "label", "-q"]) == 0
+    assert main([*words, f"{files}/b.zarr", weave, "--force", "--map-type", "label", "-q"]) == 0
     assert np.array_equal(io.read(files / "b.zarr"), io.read(files / "a.png"))
     assert main([*words, f"{files}/c.zarr", weave, "--screening", "0.2"]) == 2
     assert "--screening 0 leaves them as they are" in capsys.readouterr().err

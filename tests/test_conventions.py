@@ -350,9 +350,9 @@ def test_normals_turn_by_x_and_y_and_the_rest_stays(held: str, dtype: str) -> No
         plain = result.source.render(np.ascontiguousarray(stored[..., channel]))
         assert (made[..., channel] == plain).all()
     # The same by the functions for arrays.
-    again = texrs.apply(result.source, stored, kind="normal", green="down")
+    again = texrs.apply(result.source, stored, map_type="normal", green="down")
     assert (again[..., :2] == made[..., :2]).all()
-    assert (result.source.render(stored, kind="normal", green="down") == again).all()
+    assert (result.source.render(stored, map_type="normal", green="down") == again).all()
 
 
 @pytest.mark.parametrize("held", ["two channels", "B = 255", "labPBR"])

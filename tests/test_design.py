@@ -106,7 +106,7 @@ def test_elements_really_move(pebbles, result):
 
 def test_an_image_without_elements_takes_the_grid_and_says_so():
     made = texrs.design(samples.grit().image, 128, tiles=1)
-    assert made.report["kind"] == "grid"
+    assert made.report["segmentation"] == "grid"
     assert made.report["reason"]
 
 
@@ -118,7 +118,7 @@ def test_a_constant_image_gives_a_constant_result():
 def test_labels_by_hand(pebbles):
     truth = samples.pebbles((128, 128)).labels
     made = texrs.design(pebbles, 128, elements=ElementOptions(labels=truth), tiles=1)
-    assert made.report["kind"] == "labels"
+    assert made.report["segmentation"] == "labels"
     assert made.report["elements"] == truth.max()
 
 
@@ -352,8 +352,8 @@ def test_bad_input_names_the_argument(arguments, options, names):
         (ElementOptions, {"layers": 0}),
         (ElementOptions, {"layers": 17}),
         (ElementOptions, {"layers": 2.5}),
-        (ElementOptions, {"kind": "cells"}),
-        (ElementOptions, {"kind": None}),
+        (ElementOptions, {"segmentation": "cells"}),
+        (ElementOptions, {"segmentation": None}),
         (ElementOptions, {"labels": np.zeros((32, 32))}),
         (ElementOptions, {"labels": np.full((32, 32), -1)}),
         (ElementOptions, {"labels": "by hand"}),

@@ -408,7 +408,7 @@ def test_d8_fails_for_elements_lost_and_for_elements_shrunk(known_labels):
 def test_d8_counts_on_a_lattice_what_the_eye_counts():
     """Halves of two threads that meet are one thread; half of the picture without threads fails all the same."""
     weave = samples.load("weave", size=(160, 160), seed=3)
-    lattice = {"kind": "components", "reason": "a lattice", "elements": 50}
+    lattice = {"segmentation": "components", "reason": "a lattice", "elements": 50}
     # Every other thread is cut in two: its right half is that of its neighbour two threads away.
     where = cycle(weave.image, 160, 160).copy()
     middles = {k: np.argwhere(weave.labels == k).mean(axis=0) for k in np.unique(weave.labels)}
@@ -439,9 +439,9 @@ def test_d8_knows_a_median_as_well_as_its_elements_say():
 
 
 def test_d8_applies_where_elements_were_found(pebbles, noise, copy):
-    none = {"kind": "grid", "reason": "components cover 1 %", "elements": 18}
+    none = {"segmentation": "grid", "reason": "components cover 1 %", "elements": 18}
     assert not checks.d8(pebbles, noise, copy[0], report=none).applies
-    few = {"kind": "components", "reason": "", "elements": 3}
+    few = {"segmentation": "components", "reason": "", "elements": 3}
     assert not checks.d8(pebbles, noise, copy[0], report=few).applies
     some = {**few, "elements": 30}
     assert not checks.d8(pebbles, noise, copy[0], report=some).passed

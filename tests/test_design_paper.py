@@ -162,7 +162,7 @@ def test_options_of_elements_play_no_part(pebbles, result):
         seed=1,
         tiles=2,
         method="paper",
-        elements=ElementOptions(kind="grid"),
+        elements=ElementOptions(segmentation="grid"),
         deformation=DeformationOptions(translate=0.0, rotate=10.0, mirror=False),
         screening=0.5,
     )

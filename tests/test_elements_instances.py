@@ -165,12 +165,14 @@ def test_design_takes_an_entry_for_exemplar_or_elements() -> None:
     marked = texrs.design(ENTRY.image, 64, tiles=1, elements=ElementOptions(labels=ENTRY.labels))
     for made in (texrs.design(ENTRY, 64, tiles=1), texrs.design(ENTRY.image, 64, tiles=1, elements=ENTRY)):
         np.testing.assert_array_equal(made.image, marked.image)
-        assert made.report["kind"] == "labels"
+        assert made.report["segmentation"] == "labels"
         assert made.report["elements"] == 6
 
 
 def test_what_is_said_of_elements_stands_above_the_entry() -> None:
-    assert texrs.design(ENTRY, 64, tiles=1, elements=ElementOptions(kind="grid")).report["kind"] == "grid"
+    assert (
+        texrs.design(ENTRY, 64, tiles=1, elements=ElementOptions(segmentation="grid")).report["segmentation"] == "grid"
+    )
 
 
 def test_entries_and_pictures_are_mixed() -> None:

@@ -74,10 +74,10 @@ def test_a_finish_comes_back_from_a_file(made: tuple[Synthesis, np.ndarray], tmp
 def test_labels_are_never_mixed() -> None:
     source = texrs.design(PEBBLES, 64).source
     labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
-    found = texrs.apply(source, labels, kind="label")
+    found = texrs.apply(source, labels, map_type="label")
     assert set(np.unique(found)) <= set(np.unique(labels))
     with pytest.raises(InvalidInput, match="kind: allowed are colour, normal, vector and label"):
-        texrs.apply(source, labels, kind="labels")  # type: ignore[arg-type]
+        texrs.apply(source, labels, map_type="labels")  # type: ignore[arg-type]
 
 
 def test_labels_are_designed_as_labels() -> None:

@@ -111,8 +111,8 @@ def test_source_maps_are_looked_up_lazily() -> None:
     assert np.array_equal(found.compute(scheduler="threads"), made.source.render(other))
     normals = np.zeros((*WEAVE.shape[:2], 3), np.float32)
     normals[..., 0], normals[..., 2] = -0.6, 0.8
-    turned = made.source.to_dask(normals, (32, 64), kind="normal", interpolation="nearest")
-    assert np.array_equal(turned.compute(), made.source.render(normals, kind="normal", interpolation="nearest"))
+    turned = made.source.to_dask(normals, (32, 64), map_type="normal", interpolation="nearest")
+    assert np.array_equal(turned.compute(), made.source.render(normals, map_type="normal", interpolation="nearest"))
     plain = texrs.design(WEAVE, 96, seed=2)
     assert np.array_equal(plain.source.to_dask(WEAVE, 50).compute(), plain.stages["composite"])
     with pytest.raises(InvalidInput, match="exemplars: number 0 needs size"):

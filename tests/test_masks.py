@@ -244,7 +244,7 @@ def test_a_feathered_filling_fades_into_the_image() -> None:
     # Other maps fade in the same way; labels do not mix.
     np.testing.assert_array_equal(texrs.apply(made.source, base), made.image)
     labels = (COLUMNS // 8).astype(np.uint8)
-    assert np.isin(texrs.apply(made.source, labels, kind="label"), labels).all()
+    assert np.isin(texrs.apply(made.source, labels, map_type="label"), labels).all()
 
 
 def test_feather_asks_for_colours_between_those_of_a_palette() -> None:
@@ -267,7 +267,7 @@ def test_feathered_normals_keep_their_length_and_the_map_its_fade(tmp_path: Path
         (normals.astype(np.float32), lambda n: n),
         (np.rint(255 * (normals + 1) / 2).astype(np.uint8), lambda n: n / 127.5 - 1),
     ):
-        turned = back(texrs.apply(again, encoded, kind="normal"))
+        turned = back(texrs.apply(again, encoded, map_type="normal"))
         np.testing.assert_allclose(np.linalg.norm(turned, axis=-1), 1, atol=0.02)
 
 

@@ -159,7 +159,7 @@ def test_normal_maps_of_the_texture_turn_with_it(weave, around):
     slope = np.dstack(np.gradient(weave.mean(axis=-1) / 255 * 3))
     normal = np.dstack([-slope[..., 1], slope[..., 0], np.ones(slope.shape[:2])])
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    shown = around.source.render(normal.astype(np.float32), kind="normal", interpolation="linear")
+    shown = around.source.render(normal.astype(np.float32), map_type="normal", interpolation="linear")
     plain = around.source.render(normal.astype(np.float32), interpolation="linear")
     # A bump that is pressed together is steeper: by the cosine, across the axis.
     cos = make_column()[..., 2]

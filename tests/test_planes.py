@@ -44,7 +44,7 @@ def test_all_ways_to_say_it_are_one_plane() -> None:
         "corners the other way round": Plane.of_corners(FLOOR.shape, corners[::-1]),
         "vanishing points": Plane.of_vanishing_points(FLOOR.shape, FLOOR.vanishing_points),
         "horizon": Plane.of_horizon(FLOOR.shape, FLOOR.horizon, fov=55),
-        "widths": Plane.of_scale_map(FLOOR.scale_map(), kind="width", fov=55),
+        "widths": Plane.of_scale_map(FLOOR.scale_map(), scale_kind="width", fov=55),
         "areas": Plane.of_scale_map(FLOOR.scale_map("area"), fov=55),
         "dictionary": Plane.of(FLOOR.as_dict()),
     }
@@ -77,7 +77,7 @@ def test_a_rectangle_lies_level(turn: float) -> None:
         (lambda: Plane.of_horizon((64, 64), [[31.5, 0], [31.5, 9]]), "runs through the picture's middle"),
         (lambda: Plane.of_horizon((64, 64), [[31.0, 0], [31.0, 9]]), "edge on"),
         (lambda: Plane.of_vanishing_points((64, 64), [[1, 2], [np.nan, 2]]), "points"),
-        (lambda: Plane.of_scale_map(np.ones((32, 32)), kind="volume"), "kind"),  # type: ignore[arg-type]
+        (lambda: Plane.of_scale_map(np.ones((32, 32)), scale_kind="volume"), "scale_kind"),  # type: ignore[arg-type]
         (lambda: Plane.of({"slant": 4}), "plane: needs a mapping"),
         (lambda: planes.find(np.zeros((128, 128), np.uint8)), "one colour"),
         (lambda: planes.find(np.zeros((32, 128), np.uint8)), "at least 64"),

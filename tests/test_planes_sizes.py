@@ -71,7 +71,7 @@ def test_verbs_say_what_was_measured_and_how_surely(tmp_path: Path, capsys: pyte
     found = planes.measure(floor)
     grown = texrs.perspective(floor, size=64)
     assert grown.report["measured"] == found.as_dict() == json.loads(json.dumps(grown.report["measured"]))
-    assert (found.as_dict()["shape"], found.as_dict()["kind"]) == ("plane", "width")
+    assert (found.as_dict()["shape"], found.as_dict()["scale_kind"]) == ("plane", "width")
     assert texrs.perspective(floor, "front", 64).report["measured"] is None
     report = texrs.complete(floor, hole, scale_map="auto").report
     assert report["measured"]["shape"] == "plane"

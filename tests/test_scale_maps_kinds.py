@@ -105,10 +105,12 @@ def test_a_target_of_the_other_kind_asks_for_the_same():
     )
     assert wide.report["sheet"]["kind"] == "plane"
     np.testing.assert_allclose(mixed.stages["target"], wide.stages["target"], rtol=1e-5)
-    other = texrs.perspective(floor.image, plane.scale_map("area"), target=np.asarray(target), kind="width", seed=1)
+    other = texrs.perspective(
+        floor.image, plane.scale_map("area"), target=np.asarray(target), scale_kind="width", seed=1
+    )
     np.testing.assert_allclose(other.stages["target"], target.as_kind("area"), rtol=1e-5)
     with pytest.raises(InvalidInput, match="kind: allowed are width and area"):
-        texrs.perspective(floor.image, plane.scale_map(), kind="length")
+        texrs.perspective(floor.image, plane.scale_map(), scale_kind="length")
 
 
 @pytest.mark.parametrize("name", ["map.tif", "map.png"])
@@ -139,15 +141,17 @@ def test_holes_are_filled_by_maps_of_either_kind(tmp_path, monkeypatch, capsys):
     by_widths = texrs.complete(floor.image, hole, scale_map=wide)
     # Arrays that do not say what they hold.
     one, other = np.array(wide), np.array(areas)
-    said = texrs.complete(floor.image, hole, scale_map=one, kind="width")
+    said = texrs.complete(floor.image, hole, scale_map=one, scale_kind="width")
     np.testing.assert_array_equal(said.image, by_widths.image)
     by_areas = texrs.complete(floor.image, hole, scale_map=areas)
-    np.testing.assert_array_equal(texrs.complete(floor.image, hole, scale_map=other, kind="area").image, by_areas.image)
-    assert (by_areas.image != texrs.complete(floor.image, hole, scale_map=other, kind="width").image).any()
+    np.testing.assert_array_equal(
+        texrs.complete(floor.image, hole, scale_map=other, scale_kind="area").image, by_areas.image
+    )
+    assert (by_areas.image != texrs.complete(floor.image, hole, scale_map=other, scale_kind="width").image).any()
     with pytest.raises(InvalidInput, match="kind: allowed are width and area"):
-        texrs.complete(floor.image, hole, scale_map=one, kind="length")
+        texrs.complete(floor.image, hole, scale_map=one, scale_kind="length")
     with pytest.raises(InvalidInput, match="kind: says what a scale map holds"):
-        texrs.complete(floor.image, hole, kind="width")
+        texrs.complete(floor.image, hole, scale_kind="width")
     for name, values in (("floor.png", floor.image), ("hole.png", hole), ("map.npy", other)):
         io.write(name, values)
     command = ["complete", "floor.png", "hole.png", "-o", "out.png", "--scale-map", "map.npy", "--scale-kind"]

@@ -117,14 +117,14 @@ def test_nonsense_takes_the_grid_and_says_why(image):
     assert found.kind == "grid"
     assert found.reason
     # What was asked for is given.
-    assert segment(image, ElementOptions(kind="components")).kind == "components"
+    assert segment(image, ElementOptions(segmentation="components")).kind == "components"
 
 
 def test_a_constant_image_has_no_elements_and_takes_the_grid():
     found = segment(np.full((64, 64, 3), 128, np.uint8))
     assert (found.kind, found.layers.max(), found.lattice) == ("grid", 0, None)
     assert found.reason == "elements cover 0% of the image, less than 5%"
-    assert segment(np.full((64, 64), 7.0), ElementOptions(kind="components")).count == 0
+    assert segment(np.full((64, 64), 7.0), ElementOptions(segmentation="components")).count == 0
 
 
 def test_one_element_is_found():
@@ -146,7 +146,7 @@ def test_fewer_layers_are_made_where_there_are_fewer_colours():
 @pytest.mark.parametrize("kind", ["auto", "components", "grid", "none"])
 def test_any_shape(shape, kind):
     image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
-    found = segment(image, ElementOptions(kind=kind))
+    found = segment(image, ElementOptions(segmentation=kind))
     assert found.elements.shape == found.layers.shape == shape[:2]
     assert found.elements.dtype == found.layers.dtype == np.int32
 
@@ -171,8 +171,8 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
         (PICTURE, {"layers": 0}, "layers"),
         (PICTURE, {"layers": 17}, "layers"),
         (PICTURE, {"layers": 2.5}, "layers"),
-        (PICTURE, {"kind": "cells"}, "kind"),
-        (PICTURE, {"kind": None}, "kind"),
+        (PICTURE, {"segmentation": "cells"}, "segmentation"),
+        (PICTURE, {"segmentation": None}, "segmentation"),
         (PICTURE, {"labels": np.zeros((31, 32), int)}, "labels"),
         (PICTURE, {"labels": np.zeros((32, 32, 1), int)}, "labels"),
         (PICTURE, {"labels": np.zeros((32, 32))}, "labels"),

@@ -62,7 +62,7 @@ def test_a_scale_map_is_shown_with_its_contours():
 
 
 def test_what_is_as_by_default_is_not_said():
-    assert repr(texrs.ElementOptions(kind="grid")) == "ElementOptions(kind='grid')"
+    assert repr(texrs.ElementOptions(segmentation="grid")) == "ElementOptions(segmentation='grid')"
     assert repr(MADE) == f"<Synthesis of {MADE.image.shape[0]} x {MADE.image.shape[1]}, 3 channels of uint8>"
     assert repr(texrs.Gallery([MADE] * 30)).endswith("... 30 in all])")
 

@@ -72,14 +72,14 @@ def test_normals_turn_with_the_frame(dtype):
     if dtype == np.float32:
         encoded[0, 0] = [-1e-3, 0, 1]  # a negative value says that floats are signed
     quarter = turned((21, 21), 90)
-    out = quarter.render(encoded, kind="normal")[10, 10].astype(float)
+    out = quarter.render(encoded, map_type="normal")[10, 10].astype(float)
     out = out if dtype == np.float32 else out / np.iinfo(dtype).max * 2 - 1
     # The height that these normals belong to, turned by the same map, gives the direction independently.
     height = quarter.render(np.tile(-0.75 * np.arange(21.0), (21, 1)))
     slope_row, slope_column = height[11, 10] - height[10, 10], height[10, 11] - height[10, 10]
     expected = np.array([-slope_column, slope_row, 1]) / np.sqrt(slope_row**2 + slope_column**2 + 1)
     np.testing.assert_allclose(out, expected, atol=0.01)
-    down = quarter.render(encoded, kind="normal", green="down")[10, 10].astype(float)
+    down = quarter.render(encoded, map_type="normal", green="down")[10, 10].astype(float)
     down = down if dtype == np.float32 else down / np.iinfo(dtype).max * 2 - 1
     np.testing.assert_allclose(down * [1, -1, 1], expected, atol=0.01)
 
@@ -185,10 +185,10 @@ def test_directions_of_volumes_turn_in_space(green):
         ("normal", np.einsum("nji,j->ni", frames, own)),
         ("vector", np.linalg.solve(frames.astype(float), np.tile(own, (5, 1))[..., np.newaxis])[..., 0]),
     ):
-        found = source.render(exemplar, kind=kind, green=green, interpolation="nearest")[0, 0]
+        found = source.render(exemplar, map_type=kind, green=green, interpolation="nearest")[0, 0]
         length = {"slope": None, "normal": 1.0, "vector": np.linalg.norm(given)}[kind]
         if length is not None:
             wanted = wanted * length / np.linalg.norm(wanted, axis=1, keepdims=True)
         np.testing.assert_allclose(found[:, ::-1] * [1, side, 1], wanted, rtol=1e-4, atol=1e-5)
     with pytest.raises(InvalidInput, match=r"needs shape \(planes, rows, columns, 3\)"):
-        source.render(exemplar[..., :2], kind="vector")
+        source.render(exemplar[..., :2], map_type="vector")

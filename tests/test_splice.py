@@ -277,7 +277,7 @@ def test_maps_in_register_come_out_in_register() -> None:
     assert set(np.unique(frames)) <= {-1.0, 0.0, 1.0}
     across = np.full((*mine.mask.shape, 3), (0.6, 0.0, 0.8), np.float32)
     across[0, 0] = (-0.6, 0, 0.8)
-    turned = result.source.render(across, kind="normal")
+    turned = result.source.render(across, map_type="normal")
     mirrored = frames[..., 1, 1] < 0
     usual = ~((rows == 0) & (columns == 0))
     assert (turned[mirrored & usual][:, 0] < 0).all()

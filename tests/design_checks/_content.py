@@ -245,7 +245,7 @@ def d8(
     """
     if report and "lattice" in report["reason"]:
         labels = None
-    elif report and labels is None and (report["kind"] == "grid" or report["elements"] < FEWEST):
+    elif report and labels is None and (report["segmentation"] == "grid" or report["elements"] < FEWEST):
         return D8(np.nan, np.nan, 0, False)
     if labels is not None:
         where = np.clip(np.rint(source.coordinates).astype(int), 0, np.array(labels.shape) - 1)

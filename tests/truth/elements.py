@@ -15,7 +15,7 @@ from texrs.exemplar import segment
 from truth.exemplars import clear, colour, deep, floats, sample
 from truth.table import Parts, case, parts_of
 
-DESIGNED = ("elements", "kind", "rotate", "shares", "holes", "operations")
+DESIGNED = ("elements", "segmentation", "rotate", "shares", "holes", "operations")
 
 
 @case
@@ -32,7 +32,7 @@ def design_of_16_bits_that_does_not_repeat() -> Parts:
         (128, 144),
         wrap=False,
         screening=None,
-        elements=ElementOptions(kind="grid"),
+        elements=ElementOptions(segmentation="grid"),
         tiles=3,
         deformation=DeformationOptions(rotate=30, translate=0.3),
         patch=14,
@@ -221,8 +221,8 @@ SEGMENTED = {
     "net": ElementOptions(),
     "scales": ElementOptions(),
     "beans": ElementOptions(layers=3),
-    "leaves_and_flowers": ElementOptions(kind="components"),
-    "bark": ElementOptions(kind="none", layers=4),
+    "leaves_and_flowers": ElementOptions(segmentation="components"),
+    "bark": ElementOptions(segmentation="none", layers=4),
     "grit": ElementOptions(),
 }
 

@@ -234,7 +234,7 @@ def blends() -> Parts:
         "paper": blend(source, heights, wrap=False, screening=0, outlines=False),
         "near seams": blend(source, grey(*args, seed=7), wrap=(True, False), band=6),
         "within": blend(source, heights, wrap=False, screening=0.01, within=within, known=known),
-        "normals": blend(source, slopes, wrap=True, kind="normal", green="down", interpolation="linear"),
+        "normals": blend(source, slopes, wrap=True, map_type="normal", green="down", interpolation="linear"),
     }
 
 
@@ -248,7 +248,7 @@ def source_maps() -> Parts:
         "nearest": source.render(deep(*args, seed=8), interpolation="nearest"),
         "linear": source.render(channels(*args, seed=8), interpolation="linear"),
         "cubic": source.render(clear(*args, seed=8)),
-        "normals": source.render(normals(*args, seed=8), kind="normal"),
+        "normals": source.render(normals(*args, seed=8), map_type="normal"),
         "continues": source.continues(1, wrap=True),
         "frames": source.frames(),
         "composed coordinates": tiled.coordinates,

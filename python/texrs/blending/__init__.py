@@ -64,7 +64,7 @@ def blend(
     outlines: bool = True,
     interpolation: Interpolation = "cubic",
     antialias: bool = False,
-    kind: Literal["colour", "normal", "vector"] = "colour",
+    map_type: Literal["colour", "normal", "vector"] = "colour",
     green: Literal["up", "down"] = "up",
     progress: Progress | bool | None = None,
 ) -> Array:
@@ -107,7 +107,7 @@ def blend(
         As in `SourceMap.render`.
     antialias : bool
         As in `SourceMap.render`.
-    kind, green
+    map_type, green
         As in `SourceMap.render`. The slopes of normals are corrected, and normals get unit length again; only the channels that
         store normals are corrected.
     progress : callable or True, optional
@@ -165,16 +165,16 @@ def blend(
     inside = None if within is None else as_mask(within, "within", source.shape)
     apart = None if parts is None else as_array(parts, "parts", np.uint16, source.shape)
     several = [as_ndarray(e, "exemplars") for e in as_list(exemplars)]
-    result = source.render(several, interpolation=interpolation, antialias=antialias, kind=kind, green=green)
+    result = source.render(several, interpolation=interpolation, antialias=antialias, map_type=map_type, green=green)
     shown = None if known is None else as_known(known, source.shapes)
-    samples = Samples.scale([as_image(e) for e in several], kind)
+    samples = Samples.scale([as_image(e) for e in several], map_type)
     if samples is None or interpolation == "nearest":
         return result
-    turned: Literal["colour", "vector", "slope"] = "slope" if kind == "normal" else kind
+    turned: Literal["colour", "vector", "slope"] = "slope" if map_type == "normal" else map_type
     # Seen with a channel axis; what is written to it is written to the result.
     pixels = result.reshape((*source.shape, -1))
     strips = list(divide_strips(source.shape, cyclic[0], weight))
-    groups = samples.group_channels(len(strips), math.prod(source.shape), kind)
+    groups = samples.group_channels(len(strips), math.prod(source.shape), map_type)
     steps = [(part, channels) for part in strips for channels in groups]
     seen: list[Seam] = []
     for number, (part, channels) in enumerate(steps):
@@ -188,7 +188,7 @@ def blend(
             report = None if progress is None else _scale_progress(progress, number, len(steps))
             marked = None if inside is None else inside[part.rows]
             correction = solve_correction(look.source.shape, seen, channels, closed, weight, width, marked, report)
-            samples.correct(pixels[part.kept], correction[part.inner], channels, kind)
+            samples.correct(pixels[part.kept], correction[part.inner], channels, map_type)
         if progress is not None:
             progress("blend", (number + 1) / len(steps))
     return result
@@ -198,14 +198,14 @@ def apply(
     source: SourceMap,
     exemplars: Array | Sequence[Array],
     *,
-    kind: Literal["colour", "normal", "vector", "label"] = "colour",
+    map_type: Literal["colour", "normal", "vector", "label"] = "colour",
     green: Literal["up", "down"] = "up",
     finish: Finish | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
     """Look a map up through a source map, and finish it as the verb that made the source map finished its picture.
 
-    The kind of the map is stated here; `texrs.apply` takes it from the name of a file.
+    The type of the map is stated here; `texrs.apply` takes it from the name of a file.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def apply(
         Source map of a picture or a volume.
     exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels.
-    kind : {"colour", "normal", "vector", "label"}
+    map_type : {"colour", "normal", "vector", "label"}
         Meaning of the values (see `texrs.apply`).
     green : {"up", "down"}
         Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX).
@@ -230,7 +230,7 @@ def apply(
     Raises
     ------
     InvalidInput
-        Another number of exemplars, or of another size, than the map was made from; a kind that is not known.
+        Another number of exemplars, or of another size, than the map was made from; an unknown type of map.
 
     Examples
     --------
@@ -243,45 +243,51 @@ def apply(
     """
     progress = listen(progress)
     as_instance(source, "source", SourceMap)
-    as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
+    as_choice(map_type, "map_type", ("colour", "normal", "vector", "label"))
     if finish is not None:
         as_instance(finish, "finish", Finish)
     how = finish or source.finish
     several: Sequence[Array] = as_list(exemplars)
-    made = _look_up(source, several, how, kind, green, progress)
-    return made if how is None or how.fade is None else fade_in(made, several[0], how.fade, kind)
+    made = _look_up(source, several, how, map_type, green, progress)
+    return made if how is None or how.fade is None else fade_in(made, several[0], how.fade, map_type)
 
 
 def _look_up(
     source: SourceMap,
     several: Sequence[Array],
     how: Finish | None,
-    kind: Literal["colour", "normal", "vector", "label"],
+    map_type: Literal["colour", "normal", "vector", "label"],
     green: Literal["up", "down"],
     progress: Progress | None,
 ) -> Array:
     """Look maps up and correct their seams, in even light or with light that is followed if the finish says so."""
-    if kind == "label":
+    if map_type == "label":
         return source.render(several, interpolation="nearest")
-    if how is not None and how.flatten and kind == "colour":
+    if how is not None and how.flatten and map_type == "colour":
         several = [flatten(as_ndarray(each, "exemplars")) for each in several]
-    if how is not None and how.light is not None and how.within is not None and kind == "colour" and len(several) == 1:
+    if (
+        how is not None
+        and how.light is not None
+        and how.within is not None
+        and map_type == "colour"
+        and len(several) == 1
+    ):
         return _follow_light(source, several[0], how, progress)
-    return _even_out(source, several, how, kind, green, progress)
+    return _even_out(source, several, how, map_type, green, progress)
 
 
 def _even_out(
     source: SourceMap,
     exemplars: Array | Sequence[Array],
     how: Finish | None,
-    kind: Literal["colour", "normal", "vector"],
+    map_type: Literal["colour", "normal", "vector"],
     green: Literal["up", "down"],
     progress: Progress | None,
 ) -> Array:
     """Look a map up, and correct its seams if they are to be."""
     if how is None or how.screening is None:
         rest: dict[str, Any] = {} if how is None else {"interpolation": how.interpolation, "antialias": how.antialias}
-        return source.render(exemplars, kind=kind, green=green, **rest)
+        return source.render(exemplars, map_type=map_type, green=green, **rest)
     return blend(
         source,
         exemplars,
@@ -295,7 +301,7 @@ def _even_out(
         outlines=how.outlines,
         interpolation=how.interpolation,
         antialias=how.antialias,
-        kind=kind,
+        map_type=map_type,
         green=green,
         progress=progress,
     )

@@ -9,7 +9,7 @@ from texrs._arrays import as_image
 from texrs._typing import Array
 
 
-def fade_in(made: Array, own: object, weight: NDArray[np.uint8], kind: str) -> Array:
+def fade_in(made: Array, own: object, weight: NDArray[np.uint8], map_type: str) -> Array:
     """Mix what is looked up with the exemplar at the same place, in the band where the weight is between 0 and 255.
 
     Labels and signed integers have no values between them, so the larger weight decides. Normals keep their length.
@@ -19,11 +19,11 @@ def fade_in(made: Array, own: object, weight: NDArray[np.uint8], kind: str) -> A
     # A view with a channel axis: a value that is written to it is written to the result.
     shown, there = result.reshape((*weight.shape, -1)), as_image(own, "exemplars", axes=weight.ndim)[at]
     share = (weight[at] / 255)[:, np.newaxis]
-    if kind == "label" or made.dtype.kind in "bi":
+    if map_type == "label" or made.dtype.kind in "bi":
         shown[at] = np.where(share >= 0.5, shown[at], there)
         return result
     mixed = share * shown[at].astype(np.float64) + (1 - share) * there.astype(np.float64)
-    if kind == "normal" and mixed.shape[-1] >= 3:
+    if map_type == "normal" and mixed.shape[-1] >= 3:
         top = float(np.iinfo(made.dtype).max) if made.dtype.kind == "u" else 1.0
         low = -top if made.dtype.kind == "f" and min(shown[..., :3].min(), there[..., :3].min()) < 0 else 0.0
         vector = 2 * (mixed[:, :3] - low) / (top - low) - 1

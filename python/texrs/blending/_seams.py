@@ -40,7 +40,7 @@ class Look:
     outlines: bool
     """Whether outlines of things keep their step."""
     interpolation: Interpolation
-    kind: Literal["colour", "vector", "slope"]
+    map_type: Literal["colour", "vector", "slope"]
     green: Literal["up", "down"]
 
     def look_beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:
@@ -56,10 +56,12 @@ class Look:
             places[np.newaxis],
             which[np.newaxis],
             np.arange(len(which), dtype=np.uint32)[np.newaxis],
-            None if self.kind == "colour" else frames,
+            None if self.map_type == "colour" else frames,
             source.shapes,
         )
-        shown = row.render(self.samples.images, interpolation=self.interpolation, kind=self.kind, green=self.green)
+        shown = row.render(
+            self.samples.images, interpolation=self.interpolation, map_type=self.map_type, green=self.green
+        )
         if self.known is not None:
             inside = inside & (np.abs(row.render(self.known, interpolation=self.interpolation)[0] - 1) < 1e-3)
         return shown[0], inside

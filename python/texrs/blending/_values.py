@@ -38,16 +38,16 @@ class Samples:
     """How many channels of normals are stored: 2 if z is not."""
 
     @classmethod
-    def scale(cls, exemplars: Sequence[Array], kind: str) -> Samples | None:
+    def scale(cls, exemplars: Sequence[Array], map_type: str) -> Samples | None:
         """Scale them; None where no values between theirs make sense."""
         dtype, channels = exemplars[0].dtype, exemplars[0].shape[-1]
-        if kind != "colour":
+        if map_type != "colour":
             # Half way is no slope, or no step, so that they can be turned as they are.
             top = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0
-            channels = 3 if kind == "normal" and stores_z(exemplars) else 2
+            channels = 3 if map_type == "normal" and stores_z(exemplars) else 2
             low = -top if dtype.kind != "u" and min(float(e[..., :channels].min()) for e in exemplars) < 0 else 0.0
             high = top
-            if kind == "normal":
+            if map_type == "normal":
                 # Slopes add up where heights do; normals do not.
                 shown = [_scale_slopes(e[..., :channels], low, high) for e in exemplars]
                 return cls(shown, low, high - low, 2, np.full(3, low), np.full(3, high), channels)
@@ -70,18 +70,18 @@ class Samples:
             np.max([e[..., :channels].max(axis=(0, 1)) for e in exemplars], axis=0),
         )
 
-    def group_channels(self, strips: int, pixels: int, kind: str) -> list[slice]:
+    def group_channels(self, strips: int, pixels: int, map_type: str) -> list[slice]:
         """Return the channels that are solved together: all, but one by one where a large picture is one strip."""
-        if strips > 1 or pixels <= STRIP or kind != "colour":
+        if strips > 1 or pixels <= STRIP or map_type != "colour":
             return [slice(0, self.channels)]
         return [slice(c, c + 1) for c in range(self.channels)]
 
-    def correct(self, pixels: Array, correction: Floats, channels: slice, kind: str) -> None:
+    def correct(self, pixels: Array, correction: Floats, channels: slice, map_type: str) -> None:
         """Add a correction to channels of pixels in the exemplar's own values, in place."""
         exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
         for rows in divide_rows(len(pixels)):
             change = correction[rows].astype(exact)
-            if kind == "normal":
+            if map_type == "normal":
                 mine = pixels[rows, :, : self.stored]
                 value = self._tilt(mine.astype(exact), change)
             else:

@@ -38,7 +38,7 @@ APPLIED = Options(
     optional=dict.fromkeys(
         ("wrap", "interpolation", "antialias", "screening", "across", "outlines", "flatten"), "as the map says"
     )
-    | dict.fromkeys(("kind", "green"), "as the name says"),
+    | dict.fromkeys(("map_type", "green"), "as the name says"),
 )
 
 
@@ -107,7 +107,7 @@ def store_map(
     if finish.flatten and kind == "colour":
         images = [flatten(image) for image in images]
     how: dict[str, Any] = {"interpolation": finish.interpolation, "antialias": finish.antialias}
-    how |= {"interpolation": "nearest"} if kind == "label" else {"kind": kind, "green": green}
+    how |= {"interpolation": "nearest"} if kind == "label" else {"map_type": kind, "green": green}
     running = _provenance.RUNNING.get()
     with show_progress(quiet=quiet) as progress:
         done = places.to_zarr(
@@ -141,18 +141,18 @@ def make_map(
     finish: Finish,
 ) -> Array:
     """Return what a source map makes of a map, by the options or else by its name."""
-    packed = None if {("kind",), ("green",)} & values.keys() else find_packed(path)
+    packed = None if {("map_type",), ("green",)} & values.keys() else find_packed(path)
     if packed is not None:
         return look_up(places, [Map(image, packed, "linear") for image in images], finish, lambda share: None)
     kind, green = read_kind(path, images, places, values)
-    return apply(places, images, kind=kind, green=green, finish=finish)
+    return apply(places, images, map_type=kind, green=green, finish=finish)
 
 
 def read_kind(
     path: str, images: Sequence[Array], places: SourceMap, values: Mapping[tuple[str, ...], Any]
 ) -> tuple[Kind, Green]:
     """Return how a map is looked up: as the options say, else as its name does."""
-    return choose_kind(path, images, places.axes, values.get(("kind",)), values.get(("green",)))
+    return choose_kind(path, images, places.axes, values.get(("map_type",)), values.get(("green",)))
 
 
 def fit(finish: Finish, paths: Sequence[str], given: Mapping[str, Any]) -> Finish:

@@ -115,7 +115,7 @@ def scale_map_command(
             inputs = {"mask": mask, "auto": auto or None, "scale_map": scale_map, "hole": hole, "encoding": levels}
             report = said | {name: value for name, value in inputs.items() if value is not None}
             report |= {"edit": asked["steps",]} if ("steps",) in asked else {}
-            report |= {} if kind is None else {"kind": kind}
+            report |= {} if kind is None else {"scale_kind": kind}
             with _outputs.write_folder(stages, "stages", suffix=Path(out).suffix) as folder:
                 save(shown, {**report, "size": made.shape, "least": least, "largest": largest}, folder)
     extent, seconds = _outputs.show_sides(made.shape), time.monotonic() - start

@@ -71,7 +71,7 @@ def make_verb(name: str) -> Verb:
             from texrs.completion import complete
 
             kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
-            names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map", "kind": "scale-kind"}
+            names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
             arguments, marked = {"image": UNKNOWN, "hole.marks": HOLE}, names | {"hole.marks": "hole"}
             flat = Options(complete, arguments=arguments, kinds=kinds, names=marked, optional={"marks": ""})
             deep = Options(
@@ -101,7 +101,6 @@ def make_verb(name: str) -> Verb:
                 perspective,
                 arguments={"exemplar": EXAMPLE},
                 kinds={"scale_map": SEEN, "target": TARGET, "direction": DIRECTION},
-                names={"kind": "scale-kind"},
                 optional={"target_green": "as the name says"},
             )
             return Verb(options, times=2, shape="target", says=tell_sizes, knows=read_cameras)

@@ -56,7 +56,7 @@ def complete(
     allowed: Array | Mask | str | None = None,
     scale_map: Array | str | None = None,
     exemplar_scale_map: Array | str | None = None,
-    kind: Kind | None = None,
+    scale_kind: Kind | None = None,
     method: Literal["patch", "optimise"] = "patch",
     patch: int | None = None,
     boundary: int = 0,
@@ -91,7 +91,7 @@ def complete(
     exemplar_scale_map : {None, "auto"} or (h, w) float array, optional
         How large they are in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
         front; measured maps have a geometric mean of 1.
-    kind : {"width", "area"}, optional
+    scale_kind : {"width", "area"}, optional
         What the maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope;
         "area", square roots of areas. None: what each fits best, as a map of a plane.
     method : {"patch", "optimise"}
@@ -171,7 +171,7 @@ def complete(
             "allowed": allowed is not None,
             "scale_map": scale_map is not None,
             "exemplar_scale_map": exemplar_scale_map is not None,
-            "kind": kind is not None,
+            "scale_kind": scale_kind is not None,
             "method": method != "patch",
             "mirror": mirror is not None,
             "wrap": wrap is not None,
@@ -184,9 +184,9 @@ def complete(
         )
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
-    if kind is not None and scale_map is None:
-        raise InvalidInput("kind: says what a scale map holds, and there is none; give one, or leave it out")
-    said = None if kind is None else as_kind(kind)
+    if scale_kind is not None and scale_map is None:
+        raise InvalidInput("scale_kind: says what a scale map holds, and there is none; give one, or leave it out")
+    said = None if scale_kind is None else as_kind(scale_kind)
     if mirror is not None or scale_map is not None:
         mirror = False if mirror is None else as_bool(mirror, "mirror")
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
@@ -286,14 +286,14 @@ def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
 
 
 def recover_scales(
-    pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object, kind: Kind | None
+    pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object, scale_kind: Kind | None
 ) -> tuple[list[Floats] | None, list[Sizes | None]]:
     """Return the scale maps of the picture and of the one to copy from, if scales count, and how each was measured."""
-    scale, measured = recover_scale(pictures[0], open_, own, kind=kind)
+    scale, measured = recover_scale(pictures[0], open_, own, scale_kind=scale_kind)
     if scale is None or len(pictures) == 1:
         return None if scale is None else [scale], [measured, None]
     shape = (pictures[1].shape[0], pictures[1].shape[1])
-    other, beside = recover_scale(pictures[1], np.zeros(shape, bool), of_exemplar, "exemplar_scale_map", kind)
+    other, beside = recover_scale(pictures[1], np.zeros(shape, bool), of_exemplar, "exemplar_scale_map", scale_kind)
     return [scale, np.ones(shape, np.float32) if other is None else other], [measured, beside]
 
 

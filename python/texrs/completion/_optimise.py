@@ -39,7 +39,7 @@ NOWHERE = 1e6
 
 
 def recover_scale(
-    picture: Array, open_: Bools, given: object, name: str = "scale_map", kind: Kind | None = None
+    picture: Array, open_: Bools, given: object, name: str = "scale_map", scale_kind: Kind | None = None
 ) -> tuple[Floats | None, Sizes | None]:
     """Return the scale map of a picture with holes: given, and continued into them, or measured, and how that was."""
     if given is None:
@@ -52,7 +52,7 @@ def recover_scale(
             raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
         found = measure_scale(picture, known)
         return found.scale, found
-    scale, holds = try_array(given), find_kind(given) or kind
+    scale, holds = try_array(given), find_kind(given) or scale_kind
     if scale.shape == open_.shape and scale.dtype.kind == "f":
         # Where there is a hole, a map may have one too.
         with np.errstate(invalid="ignore"):

@@ -64,7 +64,7 @@ def _find_blobs(small: Floats) -> list[tuple[float, float, float, float]]:
 
 def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
     """Take pieces of a segmentation by colour, of the usual size."""
-    inner = rank_pieces(segment(small, ElementOptions(kind="components")).elements)
+    inner = rank_pieces(segment(small, ElementOptions(segmentation="components")).elements)
     if len(inner) < 3:
         return []
     sides = [np.median([r.bbox[a + 2] - r.bbox[a] for r in inner[: max(3, len(inner) // 2)]]) for a in range(2)]

@@ -324,7 +324,7 @@ class Exemplar:
         Examples
         --------
         >>> import texrs
-        >>> texrs.Exemplar(texrs.samples.dots((64, 64)).image).segment(texrs.ElementOptions(kind="grid")).count
+        >>> texrs.Exemplar(texrs.samples.dots((64, 64)).image).segment(texrs.ElementOptions(segmentation="grid")).count
         18
 
         """

@@ -47,7 +47,7 @@ class ElementOptions:
         Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours. By default two, or three or
         four where these find clearly more elements of the same size that lie apart; where the ground is of fine grain,
         what is smooth belongs to the layer above it.
-    kind : {"auto", "components", "grid", "none"}
+    segmentation : {"auto", "components", "grid", "none"}
         "components": connected pieces of the layers above the background. "grid": jittered cells of 1/6 of the side,
         for images without separate elements. "none": whole layers. "auto": components, or the grid where nothing
         speaks for them: they cover less than 5 % of the image or one more than 25 %, they are ragged, of all sizes,
@@ -68,7 +68,7 @@ class ElementOptions:
     """
 
     layers: int | None = None
-    kind: Kind = "auto"
+    segmentation: Kind = "auto"
     labels: Marks | Sequence[Marks] | None = None
 
     __repr__ = brief
@@ -76,7 +76,7 @@ class ElementOptions:
     def __post_init__(self) -> None:
         if self.layers is not None:
             as_int(self.layers, "layers", 1, 16)
-        as_choice(self.kind, "kind", ("auto", "components", "grid", "none"))
+        as_choice(self.segmentation, "segmentation", ("auto", "components", "grid", "none"))
         for marks in as_list(self.labels):
             found = try_array(0 if marks is None else marks)
             if found.dtype.kind not in "biu":
@@ -87,7 +87,7 @@ class ElementOptions:
     @property
     def key(self) -> Hashable:
         """What tells these options from others: the labels by their content."""
-        return self.layers, self.kind, None if self.labels is None else content_hash(np.asarray(self.labels))
+        return self.layers, self.segmentation, None if self.labels is None else content_hash(np.asarray(self.labels))
 
     def select(self, number: int) -> ElementOptions:
         """Return the options of one of several exemplars, which may each have labels of its own.
@@ -256,7 +256,7 @@ def segment(
     >>> from texrs.exemplar import ElementOptions, segment
     >>> bool(segment(samples.dots().image).count > 10)
     True
-    >>> segment(samples.dots().image, ElementOptions(kind="grid")).count
+    >>> segment(samples.dots().image, ElementOptions(segmentation="grid")).count
     18
 
     """
@@ -269,7 +269,7 @@ def segment(
     rgb = np.ascontiguousarray(as_rgb(to_unit(pixels)))
     watch = Steps(progress)
     regions = Regions.of(rgb, watch)
-    if options.kind == "none":
+    if options.segmentation == "none":
         whole = regions.layers(options.layers or USUAL_LAYERS)
         return Segmentation(whole, whole.copy(), "none", "")
     lattice = find_lattice(rgb)
@@ -277,11 +277,11 @@ def segment(
     courses = find_courses(rgb, lattice)
     lattice = None if courses else lattice
     reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
-    if options.kind == "grid":
+    if options.segmentation == "grid":
         layers = regions.layers(options.layers or USUAL_LAYERS)
     else:
         layers, elements, fault = find_foreground(rgb, regions, options.layers, watch)
-        if options.kind == "components" or not fault:
+        if options.segmentation == "components" or not fault:
             return Segmentation(layers, fill_crescents(elements), "components", "; ".join(reasons), lattice, courses)
         reasons.insert(0, fault)
     return Segmentation(layers, draw_cells(height, width), "grid", "; ".join(reasons), lattice, courses)

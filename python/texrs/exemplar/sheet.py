@@ -398,7 +398,7 @@ def lay_out(copy: Copy) -> Floats:
     return np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
 
 
-def find_plane(colours: Floats, scale: Floats, kind: Kind | None = None) -> Plane | None:
+def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -> Plane | None:
     """Return the plane that an exemplar is a picture of, if the evidence is good enough.
 
     A map may hold the widths of elements, or the square roots of their areas, which are the 3/2 power of those; the plane is
@@ -407,7 +407,7 @@ def find_plane(colours: Floats, scale: Floats, kind: Kind | None = None) -> Plan
     get steeper along the slope with distance. Where the fit is good a little of that is enough; without any, a plane may have
     been fitted to what is none.
     """
-    holds = find_kind(scale) if kind is None else kind
+    holds = find_kind(scale) if scale_kind is None else scale_kind
     plane = Plane.fit(scale, AREAS if holds == "area" else 1.0)
     other = Plane.fit(scale, AREAS) if holds is None else None
     if plane is not None and other is not None and other.residual < BETTER * AREAS * plane.residual - SURE:

@@ -32,7 +32,7 @@ def apply(
     source: SourceMap,
     exemplars: Array | Path | Sequence[Array | Path],
     *,
-    kind: Kind | None = None,
+    map_type: Kind | None = None,
     green: Green | None = None,
     finish: Finish | None = None,
     progress: Progress | bool | None = None,
@@ -50,7 +50,7 @@ def apply(
     exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels. The name of a file gives its role, as
         in a folder of maps (`texrs.materials.guess_role`). Each channel of a packed map is looked up by itself.
-    kind : {"colour", "normal", "vector", "label"}, optional
+    map_type : {"colour", "normal", "vector", "label"}, optional
         "colour": also heights and all other values that may be mixed; if the finish removes uneven light, it does so here.
         "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values without
         a meaning between them; the nearest sample is taken, and nothing is corrected. Default: as the name of the file says;
@@ -71,7 +71,7 @@ def apply(
     Raises
     ------
     InvalidInput
-        Another number of exemplars, or of another size, than the map was made from; a kind that is not known.
+        Another number of exemplars, or of another size, than the map was made from; an unknown type of map.
     FileError
         A file cannot be read.
 
@@ -99,11 +99,11 @@ def apply(
     name = os.fspath(given[0]) if given and isinstance(given[0], str | os.PathLike) else None
     if finish is None and source.finish is not None:
         finish = choose_finish(source.finish, name)
-    if kind is None and green is None and (packed := find_packed(name)) is not None:
+    if map_type is None and green is None and (packed := find_packed(name)) is not None:
         maps = [Map(each, packed, "linear") for each in several]
         return look_up(source, maps, finish, lambda share: progress and progress("blend", share))
-    kind, green = choose_kind(name, several, source.axes, kind, green)
-    return blending.apply(source, several, kind=kind, green=green, finish=finish, progress=progress)
+    map_type, green = choose_kind(name, several, source.axes, map_type, green)
+    return blending.apply(source, several, map_type=map_type, green=green, finish=finish, progress=progress)
 
 
 def find_named(name: str | None, *, report: bool = False) -> Role | None:
@@ -144,30 +144,30 @@ def look_up(
 
         green: Green = "down" if role.down else "up"
         images = [each.pixels for each in group]
-        made.append(blending.apply(source, images, kind=find_kind(role), green=green, finish=finish, progress=tell))
+        made.append(blending.apply(source, images, map_type=find_kind(role), green=green, finish=finish, progress=tell))
     return made[0] if len(made) == 1 else np.concatenate(made, axis=-1)
 
 
 def choose_kind(
-    name: str | None, pixels: Sequence[Array], axes: int, kind: Kind | None = None, green: Green | None = None
+    name: str | None, pixels: Sequence[Array], axes: int, map_type: Kind | None = None, green: Green | None = None
 ) -> tuple[Kind, Green]:
     """Return how a map is looked up: as stated, as the name of its file says, or as its values do; report the last two."""
-    if kind is not None:
-        as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
+    if map_type is not None:
+        as_choice(map_type, "map_type", ("colour", "normal", "vector", "label"))
     if green is not None:
         as_choice(green, "green", ("up", "down"))
-    role = find_named(name, report=kind is None)
+    role = find_named(name, report=map_type is None)
     title, usual = name or "exemplars", find_kind(role)
-    found = kind or usual
-    if role is None and kind is None and pixels and all(holds_labels(each, axes) for each in pixels):
+    found = map_type or usual
+    if role is None and map_type is None and pixels and all(holds_labels(each, axes) for each in pixels):
         found = "label"
         assume(f"{title}: read as {REASON}")
     y: Green = green or ("down" if role is not None and role.down else "up")
-    if kind is None and role is not None and usual in ("normal", "vector"):
+    if map_type is None and role is not None and usual in ("normal", "vector"):
         assume(f"{title}: read as {usual}s, y {y}")
-    elif kind is None and role is not None and usual == "label":
+    elif map_type is None and role is not None and usual == "label":
         assume(f"{title}: read as labels, the values of which are not mixed")
-    elif name is not None and kind is None and role is None and found == "colour":
+    elif name is not None and map_type is None and role is None and found == "colour":
         # A short name such as stone_n has a role only next to other maps.
         if cut_name(FilePath(name).stem) != FilePath(name).stem:
             assume(f"{title}: read as colours, because no other map in the folder explains the name")

@@ -311,7 +311,7 @@ def _sample_slopes(texture: SolidTexture, points: NDArray[np.float64], slopes: F
     for start in range(0, len(points), _BAND):
         source = texture.trace(points[start : start + _BAND, ::-1] / texture.spacing)
         how = source.finish.interpolation if source.finish else "cubic"
-        parts.append(source.render(slopes, kind="slope", green="down", interpolation=how).reshape(-1, 3))
+        parts.append(source.render(slopes, map_type="slope", green="down", interpolation=how).reshape(-1, 3))
     return np.concatenate(parts).astype(np.float64)
 
 

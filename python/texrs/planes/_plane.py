@@ -225,7 +225,7 @@ class Plane:
 
     @classmethod
     def of_scale_map(
-        cls, scale: Array, *, kind: Literal["width", "area"] | None = None, fov: float | None = None
+        cls, scale: Array, *, scale_kind: Literal["width", "area"] | None = None, fov: float | None = None
     ) -> Plane:
         """Return the plane that a scale map is of.
 
@@ -233,7 +233,7 @@ class Plane:
         ----------
         scale : (H, W) float array
             How large things are (`texrs.scale_maps`).
-        kind : {"area", "width"}, optional
+        scale_kind : {"area", "width"}, optional
             "area": square roots of areas, as `texrs.scale_maps.from_mask` measures them; "width": widths across the slope, as
             `texrs.scale_maps.from_angles` gives them. By default what the map says (`texrs.scale_maps.ScaleMap`); of one that
             does not, areas.
@@ -260,7 +260,7 @@ class Plane:
 
         """
         given = as_map(scale)
-        what = find_kind(scale) or "area" if kind is None else as_kind(kind)
+        what = find_kind(scale) or "area" if scale_kind is None else as_kind(scale_kind)
         size = (given.shape[0], given.shape[1])
         slope = Slope.fit(given, 1.0 if what == "width" else AREAS)
         if slope is None:
@@ -413,12 +413,12 @@ class Plane:
         """
         return 1 + along(as_places(points) - self.middle, self._rise)
 
-    def scale_map(self, kind: Literal["width", "area"] = "width") -> ScaleMap:
+    def scale_map(self, scale_kind: Literal["width", "area"] = "width") -> ScaleMap:
         """Return how large things are at each pixel.
 
         Parameters
         ----------
-        kind : {"width", "area"}
+        scale_kind : {"width", "area"}
             Widths across the slope, or square roots of areas, which are their power 3/2: along the slope things are
             foreshortened besides.
 
@@ -439,7 +439,7 @@ class Plane:
         True
 
         """
-        what = as_kind(kind)
+        what = as_kind(scale_kind)
         wide = np.maximum(self.width(np.moveaxis(np.indices(self.shape), 0, -1)), LEAST)
         return ScaleMap(np.maximum(wide if what == "width" else wide ** (1 / AREAS), LEAST).astype(np.float32), what)
 

@@ -94,17 +94,17 @@ class Sizes:
         Returns
         -------
         dict
-            ``shape``, ``kind``, ``confidence`` from 0 to 1 and ``plane``.
+            ``shape``, ``scale_kind``, ``confidence`` from 0 to 1 and ``plane``.
 
         Examples
         --------
         >>> from texrs import planes, samples
         >>> sorted(planes.measure(samples.tilted_discs((128, 128)).image).as_dict())
-        ['confidence', 'kind', 'plane', 'shape']
+        ['confidence', 'plane', 'scale_kind', 'shape']
 
         """
         plane = None if self.plane is None else self.plane.as_dict()
-        return {"shape": self.shape, "kind": self.scale.kind, "confidence": self.confidence, "plane": plane}
+        return {"shape": self.shape, "scale_kind": self.scale.kind, "confidence": self.confidence, "plane": plane}
 
 
 def measure(image: object, *, known: object = None) -> Sizes:

@@ -61,7 +61,7 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
     def __new__(cls, scale: object, kind: Kind) -> ScaleMap:
         """Return a map of that kind."""
         made = as_map(scale).view(cls)
-        made.kind = as_kind(kind)
+        made.kind = as_kind(kind, "kind")
         return made
 
     def __array_finalize__(self, other: object) -> None:
@@ -136,14 +136,14 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
         'area'
 
         """
-        wanted = as_kind(kind)
+        wanted = as_kind(kind, "kind")
         if self.kind is None or self.kind == wanted:
             return ScaleMap(self, wanted)
         power = AREAS if wanted == "width" else 1 / AREAS
         return ScaleMap(np.maximum(power_single(self, power), np.float32(LEAST)), wanted)
 
 
-def as_kind(value: object, name: str = "kind") -> Kind:
+def as_kind(value: object, name: str = "scale_kind") -> Kind:
     """Check what a map is said to hold."""
     return cast("Kind", as_choice(value, name, KINDS))
 

@@ -222,7 +222,7 @@ class SourceMap(Parted):
         *,
         interpolation: Interpolation = "cubic",
         antialias: bool = False,
-        kind: Literal["colour", "normal", "vector", "slope"] = "colour",
+        map_type: Literal["colour", "normal", "vector", "slope"] = "colour",
         green: Literal["up", "down"] = "up",
     ) -> Array:
         """Return what a map that is in register with the exemplar looks like through this source map.
@@ -235,7 +235,7 @@ class SourceMap(Parted):
             Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
         antialias : bool
             Whether the exemplar is smoothed where the frames say that it is shrunk. Not for labels, nor with "nearest".
-        kind : {"colour", "normal", "vector", "slope"}
+        map_type : {"colour", "normal", "vector", "slope"}
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
             with the local frame. If z is not stored, only x and y turn, and the other channels are looked up as they are: the
             third channel is constant, holds other values, or is missing. "vector": directions on the surface, such as
@@ -274,21 +274,21 @@ class SourceMap(Parted):
         out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
         if as_bool(antialias, "antialias") and interpolation != "nearest":
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, find_shrinking(self), interpolation)
-        if isinstance(kind, str) and kind == "colour":
+        if isinstance(map_type, str) and map_type == "colour":
             return out
         if (
-            not isinstance(kind, str)
+            not isinstance(map_type, str)
             or not isinstance(green, str)
-            or kind not in ("normal", "vector", "slope")
+            or map_type not in ("normal", "vector", "slope")
             or green not in ("up", "down")
         ):
             raise InvalidInput(
-                f"kind, green: allowed are colour, normal, vector or slope, up or down; got {kind!r}, {green!r}"
+                f"map_type, green: allowed are colour, normal, vector or slope, up or down; got {map_type!r}, {green!r}"
             )
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
-        bare = kind == "normal" and self.axes == 2 and not stores_z(images)
-        channels = 3 if (kind == "normal" and not bare) or self.axes == 3 else 2
-        return turn_all(self, out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images), bare)
+        bare = map_type == "normal" and self.axes == 2 and not stores_z(images)
+        channels = 3 if (map_type == "normal" and not bare) or self.axes == 3 else 2
+        return turn_all(self, out, map_type, green, any(float(e[..., :channels].min()) < 0 for e in images), bare)
 
     def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:
         """Return the map of a picture made from pictures that were made from exemplars.

@@ -57,10 +57,10 @@ def stores_z(exemplars: Sequence[Array]) -> bool:
     return bool(error <= max(EXPLAINED * usual, rounding))
 
 
-def turn_all(source: Parted, vectors: Array, kind: str, green: str, signed: bool, bare: bool = False) -> Array:
+def turn_all(source: Parted, vectors: Array, map_type: str, green: str, signed: bool, bare: bool = False) -> Array:
     """Turn what was looked up through a map with its frames; ``signed`` and ``bare`` as for `turn_vectors`."""
-    count = source.axes if bare or kind != "normal" else 3
-    what = "a normal map" if kind == "normal" else "a map of vectors"
+    count = source.axes if bare or map_type != "normal" else 3
+    what = "a normal map" if map_type == "normal" else "a map of vectors"
     if vectors.ndim != source.axes + 1 or vectors.shape[-1] < count:
         sides = ("rows, columns", "planes, rows, columns")[source.axes - 2]
         raise InvalidInput(f"exemplars: {what} needs shape ({sides}, {count}), got {vectors.shape}")
@@ -74,12 +74,12 @@ def turn_all(source: Parted, vectors: Array, kind: str, green: str, signed: bool
     for band in divide_bands(source.shape):
         frames = frame[source.label[band]] if frame.ndim == 3 else frame[band]
         how = {"down": green == "down", "signed": signed, "bare": bare}
-        out[band] = turn_vectors(vectors[band], frames.astype(np.float64), kind, **how)
+        out[band] = turn_vectors(vectors[band], frames.astype(np.float64), map_type, **how)
     return out
 
 
 def turn_vectors(
-    vectors: Array, frames: NDArray[np.float64], kind: str, *, down: bool, signed: bool, bare: bool = False
+    vectors: Array, frames: NDArray[np.float64], map_type: str, *, down: bool, signed: bool, bare: bool = False
 ) -> Array:
     """Return vectors (..., C) as they are seen through frames (..., A, A), in their own dtype.
 
@@ -93,7 +93,7 @@ def turn_vectors(
         Channels x, y and, of normals and in volumes, z.
     frames : float64 array
         J, (row, column) or (plane, row, column).
-    kind : {"normal", "vector", "slope"}
+    map_type : {"normal", "vector", "slope"}
         What they are.
     down : bool
         Whether y grows down.
@@ -103,7 +103,7 @@ def turn_vectors(
         If True, only x and y of normals are stored, in a picture. Their z is computed; other channels stay as they are.
     """
     axes = frames.shape[-1]
-    count = axes if bare or kind != "normal" else 3
+    count = axes if bare or map_type != "normal" else 3
     integers = vectors.dtype.kind in "ui"
     scale, offset = find_scale(vectors.dtype, signed)
     v = vectors[..., :count].astype(np.float64) * scale - offset
@@ -115,14 +115,14 @@ def turn_vectors(
         length = np.sqrt(np.maximum(square, 1))
     side = 1.0 if down else -1.0
     flat = np.stack([*((v[..., 2],) if axes == 3 else ()), v[..., 1] * side, v[..., 0]], axis=-1)
-    if kind != "vector":
+    if map_type != "vector":
         turned = np.einsum("...ji,...j->...i", frames, flat)
     else:
         turned = (_turn_step if axes == 2 else _turn_step_of_space)(frames, flat)
         length = np.linalg.norm(flat, axis=-1, keepdims=True)
     rest = v[..., 2:] if axes == 2 else turned[..., :1]
     v = np.concatenate([turned[..., -1:], turned[..., -2:-1] * side, rest], axis=-1)
-    if kind != "slope":
+    if map_type != "slope":
         v *= length / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
     value = (v[..., :count] + offset) / scale
     out = vectors.copy()

@@ -110,10 +110,10 @@ def tile(
         The image, in the dtype and with the channels of the picture; an axis that does not wrap keeps its length, or that
         much of its middle that was asked for. The stages are ``"swapped"`` (the halves
         exchanged, nothing cut yet), ``"pieces"`` (which part of the picture each pixel is from) and ``"composite"``, the
-        result before colours are corrected. The report contains for each axis the overlap, 0 if the ends are covered, the number of
-        joints that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles. ``in_place`` is
-        the share of the pixels that are those of the picture at the same place. ``resized`` is the reason for another size,
-        and ``tiling`` is what `texrs.check_tiling` finds in the result.
+        result before colours are corrected. The report contains for each axis the overlap, 0 if the ends are covered, the
+        number of joints that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles.
+        ``in_place`` is the share of the pixels that are those of the picture at the same place. ``resized`` is the reason for
+        another size, and ``tiling`` is what `texrs.check_tiling` finds in the result.
 
     Raises
     ------

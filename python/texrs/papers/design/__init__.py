@@ -134,8 +134,8 @@ def design(
     method : {None, "paper"}
         "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
         by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
-        match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
-        and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
+        match; colours are corrected without weight on the values. The ``segmentation`` of elements and ``translate``,
+        ``rotate`` and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
     progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
         True shows a bar.
@@ -180,7 +180,7 @@ def design(
     >>> result.source.render(heights).shape
     (128, 160)
     >>> stones = texrs.elements.Elements.of_sample(texrs.samples.pebbles((96, 96)))
-    >>> texrs.design(stones, 96, tiles=1, plan="move").report["kind"]
+    >>> texrs.design(stones, 96, tiles=1, plan="move").report["segmentation"]
     'labels'
     >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, mirror=False))
 
@@ -271,8 +271,8 @@ def design_variants(
     method : {None, "paper"}
         "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
         by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
-        match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
-        and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
+        match; colours are corrected without weight on the values. The ``segmentation`` of elements and ``translate``,
+        ``rotate`` and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
     progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
         True shows a bar.
@@ -333,7 +333,7 @@ def segment(arguments: Arguments) -> list[Plan]:
     """Segment each exemplar, and settle how its elements may move: step 1."""
     plans: list[Plan] = []
     # The printed algorithm moves whole layers.
-    elements = replace(arguments.elements, kind="none") if arguments.literal else arguments.elements
+    elements = replace(arguments.elements, segmentation="none") if arguments.literal else arguments.elements
     arguments.watch("segment", 0.0)
     for number, exemplar in enumerate(arguments.guides):
         progress = partial(report_share, arguments.watch, number, len(arguments.guides))

@@ -149,7 +149,7 @@ def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], element
                 "of several exemplars each can be an entry itself"
             )
         return ElementOptions(labels=part_at_borders(elements))
-    plain = isinstance(elements, ElementOptions) and (elements.layers, elements.kind) == (None, "auto")
+    plain = isinstance(elements, ElementOptions) and (elements.layers, elements.segmentation) == (None, "auto")
     if not plain or elements.labels is not None or not any(isinstance(e, Elements) for e in given):
         return elements
     labels: list[Any] = [part_at_borders(e) if isinstance(e, Elements) else None for e in given]

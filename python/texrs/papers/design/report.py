@@ -57,7 +57,7 @@ def describe(
         "size": list(arguments.size),
         "wrap": list(arguments.wrap),
         "elements": sum(p.parts.count for p in plans),
-        "kind": first.parts.kind,
+        "segmentation": first.parts.kind,
         "reason": first.parts.reason,
         "arrangement": ["courses" if p.still and p.parts.courses else classify(p.parts) for p in plans],
         "plan": ["still" if p.still else "move" for p in plans],

@@ -70,7 +70,7 @@ def perspective(
     *,
     target: Array | Plane | str | None = None,
     target_green: Literal["up", "down"] = "up",
-    kind: Kind | None = None,
+    scale_kind: Kind | None = None,
     fov: float | None = None,
     direction: float | Array | Field | str | None = None,
     measuring: Measuring | None = None,
@@ -104,7 +104,7 @@ def perspective(
         ``scale_map``, stretched.
     target_green : {"up", "down"}
         Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX).
-    kind : {"width", "area"}, optional
+    scale_kind : {"width", "area"}, optional
         What maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope; "area",
         square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
     fov : float, optional
@@ -191,7 +191,7 @@ def perspective(
             size,
             target=target,
             target_green=target_green,
-            kind=kind,
+            scale_kind=scale_kind,
             fov=fov,
             direction=direction,
             measuring=measuring,

@@ -107,7 +107,7 @@ class Request:
         *,
         target: Array | Plane | str | None,
         target_green: Literal["up", "down"],
-        kind: Kind | None,
+        scale_kind: Kind | None,
         fov: float | None,
         direction: object,
         measuring: Measuring | None,
@@ -126,7 +126,7 @@ class Request:
         as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
         check_sizes(augment_scales)
         closed, number = as_wrap(wrap, usual=False), as_seed(seed)
-        said = None if kind is None else as_kind(kind)
+        said = None if scale_kind is None else as_kind(scale_kind)
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
         if fov is not None and (isinstance(scale_map, Plane) or is_words(scale_map)):
             raise InvalidInput("fov: the plane has one already")
