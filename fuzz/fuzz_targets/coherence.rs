@@ -1,5 +1,5 @@
-//! Exemplars analysed, and coordinates that are started, corrected and brought to the next resolution: always places of
-//! the exemplar, and points that are held keep theirs.
+//! Fuzzes exemplar analysis, and coordinates that are initialised, corrected and upsampled.
+//! Coordinates must always be inside the exemplar, and held points must keep theirs.
 
 #![no_main]
 
@@ -24,7 +24,8 @@ fn frame<const D: usize>(draw: &mut Draw<'_>) -> Frame<D> {
 
 fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     let (wrap, channels) = (draw.flags(), draw.within(0..=4));
-    // The axes of a window take the square of its numbers: wide ones, up to 343 a channel, are drawn seldom.
+    // The time of the analysis grows with the square of the window size. Wide windows, of up to 343
+    // values for each channel, are therefore rare.
     let widest = if draw.seldom(32) { 3 } else { 4 - D };
     let radius = draw.within(0..=if channels > 1 { widest.min(2) } else { widest });
     let exemplar = Grid::new(draw.shape::<D>(1..=longest), wrap).unwrap();
@@ -33,7 +34,7 @@ fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     let Some(mut parts) = made else {
         return;
     };
-    // What was stored, and may have been damaged.
+    // Damage some stored parts, as in a corrupt file.
     for _ in 0..if draw.seldom(8) {
         draw.within(1..=4)
     } else {
@@ -85,6 +86,7 @@ fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         all.all(|(&h, (&b, &a))| !h || appearance.bring_inside(b) == a)
     };
 
+    // Run one of the four kernels on the analysis.
     match draw.within(0..=3) {
         0 => {
             let options = blocks::Options {

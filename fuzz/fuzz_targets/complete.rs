@@ -1,4 +1,5 @@
-//! Holes filled by example: all is known at last, what must stay stays, and every pixel is one of the exemplars'.
+//! Fuzzes the filling of holes. At the end all pixels are known, kept pixels have not changed, and
+//! every filled pixel is one of the exemplars.
 
 #![no_main]
 
@@ -52,6 +53,7 @@ fuzz_target!(|bytes: &[u8]| {
         paper: draw.flag(),
         shown: shown.then_some(0),
     };
+    // One and two threads must agree.
     let found = agreed(|monitor| {
         let (mut colours, mut known) = (colours.clone(), known.clone());
         let mut canvas = Canvas {
@@ -67,6 +69,7 @@ fuzz_target!(|bytes: &[u8]| {
     let Some((filled, all, done)) = found else {
         return;
     };
+    // Compare each pixel with the patch that its label names.
     assert!(all.iter().all(|k| *k));
     for p in 0..n {
         let pixel = p * channels..(p + 1) * channels;

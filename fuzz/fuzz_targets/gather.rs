@@ -1,4 +1,5 @@
-//! Exemplars looked up through coordinates: within the range of their samples, and the samples themselves at whole places.
+//! Fuzzes the lookup of exemplars. Results are within the range of the samples, and equal the
+//! samples at whole coordinates.
 
 #![no_main]
 
@@ -71,6 +72,7 @@ fn check<T: Element + Debug + PartialOrd, const D: usize>(
     let Some(found) = found else {
         return;
     };
+    // Compare each value with the range of its exemplar.
     for p in 0..n {
         let e = which.get(p).map_or(0, |&e| usize::from(e));
         for c in 0..channels {
@@ -82,7 +84,7 @@ fn check<T: Element + Debug + PartialOrd, const D: usize>(
             let most = (0..grids[e].len())
                 .map(of)
                 .fold(of(0), |m, x| if x > m { x } else { m });
-            // Sums of samples with weights that add up to one may pass both by a rounding.
+            // Weights that sum to 1 may exceed the range by rounding.
             let slack = 1e-6 * most.to_f64().abs().max(least.to_f64().abs());
             assert!(
                 value.to_f64() >= least.to_f64() - slack && value.to_f64() <= most.to_f64() + slack

@@ -1,4 +1,5 @@
-//! Readers of image files: of any bytes, and of files that the writers made, damaged in a few places.
+//! Fuzzes the readers of image files with arbitrary bytes, and with written files that are damaged
+//! in a few places.
 
 #![no_main]
 
@@ -15,7 +16,7 @@ const FORMATS: [Format; 5] = [
 ];
 const SAMPLES: [Sample; 4] = [Sample::U8, Sample::U16, Sample::F16, Sample::F32];
 
-/// What comes out is whole, and no more than was allowed.
+/// Reads a file, and checks that the result is complete and within the limits.
 fn read(file: &[u8], limit: u64) -> Option<Decoded> {
     let found = decode("file", file, limit).inspect_err(speaks).ok()?;
     let [rows, columns, channels] = found.shape;
@@ -30,7 +31,8 @@ fn read(file: &[u8], limit: u64) -> Option<Decoded> {
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    // Most of a corpus is files as they are: their first bytes say that they are none of the other inputs.
+    // Most inputs of the corpus are plain files. Their first bytes cannot occur in the other
+    // inputs.
     if Format::of_content(bytes).is_some() {
         read(bytes, 1 << 12);
         read(bytes, 16);

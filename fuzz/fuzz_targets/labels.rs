@@ -1,4 +1,5 @@
-//! Binary labels of least energy, and least seams as shortest paths: against maximum flows and each other.
+//! Fuzzes binary labels of minimum energy and cheapest seams as shortest paths. Both are compared
+//! with maximum flows.
 
 #![no_main]
 
@@ -10,7 +11,8 @@ use texrs::seam::planar::ring::{Ring, Side, least_ring};
 use texrs::seam::planar::{Strip, least_seam};
 use texrs_fuzz::{Draw, agreed, near};
 
-/// The sum of the costs of the pairs that labels part, by whether the first one has the label.
+/// Returns the sum of the costs of the pairs with different labels. The cost depends on the label
+/// of the first point.
 fn parted<const D: usize, T>(
     grid: &Grid<D>,
     labels: &[bool],
@@ -60,7 +62,8 @@ fn energy<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         })
     };
     assert!(near(of(&found.labels), found.energy, 1e-9));
-    // Rounded to steps of the 2^25th part of the largest pairwise cost; where there is none, of the largest other.
+    // Costs are rounded to steps of 2^-25 of the largest pairwise cost, or of the largest unary
+    // cost without pairwise costs.
     let costs = pairs.iter().flatten().flatten().copied();
     let own = unary
         .as_flattened()
@@ -128,7 +131,7 @@ fn strip(draw: &mut Draw<'_>) {
 fn ring(draw: &mut Draw<'_>) {
     let (rows, columns) = (draw.within(1..=12), draw.within(1..=12));
     let n = rows * columns;
-    // Mostly a core in the middle and a rim outside, with changes.
+    // Mostly a core in the middle and a rim outside, with random changes.
     let middle = [rows / 2, columns / 2];
     let reach = draw.within(0..=3);
     let mut sides: Vec<Side> = (0..n)
@@ -188,7 +191,7 @@ fn ring(draw: &mut Draw<'_>) {
     let sum = parted(&grid, &inside, |axis, p, _| i64::from(pairs[axis][p]));
     let flow = min_cut(&graph, &Default::default()).unwrap();
     assert_eq!(sum, flow.value);
-    // Both say that they give the innermost of all.
+    // Both promise the innermost solution.
     assert_eq!(inside, flow.sink);
 }
 

@@ -1,4 +1,5 @@
-//! Minimum cuts of grids of two and three axes: the value is what the labels cost, and no labels cost less.
+//! Fuzzes minimum cuts of grids with two and three axes. The value must equal the cost of the
+//! labels, and no other labels may cost less.
 
 #![no_main]
 
@@ -7,7 +8,7 @@ use texrs::grid::Grid;
 use texrs::seam::maxflow::{Graph, Solver, min_cut};
 use texrs_fuzz::{Draw, agreed};
 
-/// What labels cost.
+/// Returns the cost of labels.
 fn cost<const D: usize>(graph: &Graph<'_, D>, sink: impl Fn(usize) -> bool) -> i64 {
     let grid = graph.grid;
     let mut sum = 0;
@@ -37,7 +38,7 @@ fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     let unit = [1, 1, 1000, 1 << 20, 1 << 26, i32::MAX / 300][draw.within(0..=5)];
     let most = draw.within(1..=300) as u32;
     let mut capacities = |low: i32| -> Vec<i32> {
-        // Now and then one that is not allowed.
+        // Sometimes include a capacity that is not allowed.
         let low = if draw.seldom(64) { low - 1 } else { low };
         draw.numbers(n, most)
             .map(|x| (x as i32 + low).saturating_mul(unit))
@@ -67,7 +68,7 @@ fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
             assert!(cost(&graph, |p| found.sink[p] != (p == changed)) >= found.value);
         }
     }
-    // A workspace that has cut another graph before cuts as a new one does.
+    // A reused workspace must give the same cut as a new one.
     let mut solver = Solver::default();
     let turned: Vec<i32> = terminal.iter().map(|t| t.saturating_neg()).collect();
     let _ = solver.min_cut(

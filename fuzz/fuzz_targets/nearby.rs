@@ -1,4 +1,4 @@
-//! Distances to outlines, and sums over what lies near by: as measured and summed point by point.
+//! Fuzzes distances to outlines and windowed sums. Both are compared with direct computations.
 
 #![no_main]
 

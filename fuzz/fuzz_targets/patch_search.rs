@@ -1,4 +1,4 @@
-//! Best matches of patches: those that scoring every position finds.
+//! Fuzzes the search for best matches. The result must equal that of scoring every position.
 
 #![no_main]
 
@@ -61,6 +61,7 @@ fuzz_target!(|bytes: &[u8]| {
         let Some(best) = agreed(|monitor| index.best(&query, &pick, monitor)) else {
             continue;
         };
+        // List all allowed positions.
         let mut all = Vec::new();
         for (e, ([rows, columns], allowed)) in shapes.iter().enumerate() {
             for row in 0..(rows + 1).saturating_sub(shape[0]) {

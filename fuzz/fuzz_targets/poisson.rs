@@ -1,4 +1,4 @@
-//! Images from their differences: kept values stay, the sum that is to be least is no more than it was.
+//! Fuzzes the Poisson solver. Kept values must not change, and the minimised sum must not grow.
 
 #![no_main]
 
@@ -6,7 +6,7 @@ use libfuzzer_sys::fuzz_target;
 use texrs::poisson::{Domain, Edge, Problem, solve};
 use texrs_fuzz::{Draw, agreed};
 
-/// The sum that is minimised.
+/// Returns the sum that is minimised.
 fn cost(problem: &Problem<'_>, values: &[f32]) -> f64 {
     let Domain {
         shape: [rows, columns, channels],
@@ -66,7 +66,7 @@ fuzz_target!(|bytes: &[u8]| {
             assert!((0..shape[2]).all(|c| found[p * shape[2] + c] == image[p * shape[2] + c]));
         }
     }
-    // Single precision: what is rounded counts by the square of the values.
+    // The rounding error of single precision grows with the square of the values.
     let most = given.fold(1.0f64, |m, x| m.max(f64::from(x.abs())));
     let rounding = n as f64 * (1.0 + problem.domain.screening) * (most * 1e-5).powi(2);
     let [before, after] = [&image, &found].map(|values| cost(&problem, values));

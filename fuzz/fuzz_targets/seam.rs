@@ -1,4 +1,5 @@
-//! Two images joined along the least visible seam: who must stay stays, and no pixel that changes sides costs less.
+//! Fuzzes seams between two images. Tied pixels must keep their side. A reused workspace must find
+//! the same cut, and a strip must cost as much as the general cut.
 
 #![no_main]
 
@@ -42,7 +43,7 @@ fn stitched<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         draw.flag()
             .then(|| core.iter().zip(mask).map(of).collect::<Vec<bool>>())
     });
-    // What is tied to both is refused; mostly it is not tried.
+    // Pixels that are tied to both images are an error, so this is tried rarely.
     let core_a = if draw.seldom(8) {
         core_a
     } else {
@@ -76,7 +77,7 @@ fn stitched<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         found.edges,
         count_edges(&grid, |p| mask_a[p] && mask_b[p], &found.b)
     );
-    // As a workspace that has cut something else.
+    // A reused workspace must give the same cut.
     let mut stitcher = Stitcher::default();
     let swapped = Overlap {
         old: None,
@@ -88,7 +89,7 @@ fn stitched<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     assert_eq!(stitcher.cut(&overlap, &Default::default()).unwrap(), found);
 }
 
-/// A strip is a stitch whose first line is A's and whose last one is B's.
+/// A strip equals a stitch whose first line is tied to A and whose last line is tied to B.
 fn pasted(draw: &mut Draw<'_>) {
     let shape = draw.shape::<2>(1..=12);
     let (n, channels, axis) = (shape[0] * shape[1], draw.within(1..=3), draw.within(0..=1));
@@ -125,12 +126,13 @@ fn pasted(draw: &mut Draw<'_>) {
         ..Overlap::new(grid, channels, &a, &b, &whole, &whole)
     };
     let flow = cut(&overlap, &Default::default()).unwrap();
-    // Where a straight seam costs more than 2^13, all costs are rounded so coarsely that any seam may do.
+    // If a straight seam costs more than 2^13, costs are rounded so coarsely that any seam may
+    // result.
     let given = a.iter().chain(&b).chain(penalty.iter().flatten());
     if !given.copied().all(|x| x.abs() <= 1.0) {
         return;
     }
-    // Costs are rounded to steps of 2^-16 at the finest, one an edge.
+    // The cost of each edge is rounded to steps of at least 2^-16.
     let step = n as f64 * 2.0 / 65536.0;
     assert!(
         (flow.value - value).abs() <= step || near(flow.value, value, 1e-3),

@@ -1,4 +1,5 @@
-//! Symmetric systems: what is factored solves them, and what is not positive definite, or no matrix, is refused.
+//! Fuzzes the sparse solver. Factors must solve their systems, and matrices that are invalid or not
+//! positive definite must give an error.
 
 #![no_main]
 
@@ -10,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut draw = Draw::new(bytes);
     let size = draw.within(0..=24);
     let (mut starts, mut rows, mut values) = (vec![0u32], Vec::new(), Vec::new());
-    // Diagonals that outweigh their rows, by the screening at least.
+    // The diagonals exceed the sums of their rows by the screening.
     let screening = [1e-6, 1.0, 0.0, -1.0][draw.within(0..=3)];
     let mut weights = vec![screening; size];
     let sparse = draw.within(1..=6) as u8;
@@ -40,7 +41,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
         starts.push(rows.len() as u32);
     }
-    // A few numbers that no matrix has.
+    // Include a few indices that are invalid in any matrix.
     if draw.seldom(8) {
         for _ in 0..draw.within(1..=3) {
             let list = if draw.flag() { &mut starts } else { &mut rows };
@@ -80,7 +81,7 @@ fuzz_target!(|bytes: &[u8]| {
     let Some(solved) = found else {
         return;
     };
-    // By definition, within what the condition of the matrix allows.
+    // Multiply by definition, with a tolerance for the condition of the matrix.
     let most = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     for (x, b) in solved.chunks_exact(size).zip(sides.chunks_exact(size)) {
         let mut product = vec![0.0; size];

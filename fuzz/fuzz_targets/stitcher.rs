@@ -1,4 +1,5 @@
-//! Regions filled with patches, of any source, frames and options: every point shows a patch, and what must stay stays.
+//! Fuzzes the stitcher with any source, frames and options. Every point must show a patch, and held
+//! points must not change.
 
 #![no_main]
 
@@ -75,7 +76,7 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         Err(error) => return speaks(&error),
     };
     let n = region.grid.len();
-    // Of a few kinds: a field has no more, and it takes few bytes.
+    // Use a few kinds of frames, which are realistic and need few bytes.
     let kinds: Vec<Frame<D>> = (0..draw.within(1..=3)).map(|_| frame(draw)).collect();
     let own: Vec<Frame<D>> = draw
         .numbers(n, kinds.len() as u32)
@@ -105,6 +106,7 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         places: &places,
         loose: &loose,
     };
+    // Stitch, and check each point.
     let options = Options {
         patch: 3.0 + draw.within(0..=12) as f32,
         overlap: draw.real() * 0.85,
@@ -136,7 +138,7 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     }
 }
 
-/// Patches that lie as they are.
+/// Fuzzes patches that are pasted without a frame.
 fn pasted(draw: &mut Draw<'_>) {
     let (count, channels) = (draw.within(0..=40), draw.within(0..=4));
     let colours = draw.reals(count * channels);

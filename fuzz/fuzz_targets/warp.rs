@@ -1,4 +1,4 @@
-//! Warps by meshes and by scattered points, and moved shapes: whatever the points are.
+//! Fuzzes warps by meshes and by scattered points, and moved shapes, with any points.
 
 #![no_main]
 
@@ -7,7 +7,8 @@ use texrs::grid::Grid;
 use texrs::warp::{Mesh, Motion, Point, Shape, Warped, mesh, scattered};
 use texrs_fuzz::{Draw, agreed};
 
-/// Mostly near the canvas, on a lattice of halves, so that points often coincide; seldom anything.
+/// Returns a coordinate, mostly near the canvas on a lattice of halves, so that points often
+/// coincide. Rarely it is arbitrary.
 fn coordinate(draw: &mut Draw<'_>) -> f64 {
     match draw.within(0..=31) {
         0 => f64::from(draw.real()) * 1e9,

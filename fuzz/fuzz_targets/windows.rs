@@ -1,4 +1,5 @@
-//! Correlations, mean shifts and regions: within their range, and as worked out window by window, or edge by edge.
+//! Fuzzes correlations, mean shifts and regions. Results must be within their ranges, and
+//! correlations and regions are compared with direct computations.
 
 #![no_main]
 
@@ -9,7 +10,7 @@ use texrs::ncc::Correlation;
 use texrs::regions;
 use texrs_fuzz::{Draw, agreed, speaks};
 
-/// The correlation of two lists of numbers, where both vary.
+/// Returns the correlation of two lists of numbers, or `None` if one of them is constant.
 fn correlate(a: &[f64], b: &[f64]) -> Option<f64> {
     let centred = |x: &[f64]| {
         let mean = x.iter().sum::<f64>() / x.len() as f64;
@@ -43,6 +44,7 @@ fn correlated(draw: &mut Draw<'_>) {
     {
         return;
     }
+    // Compare each value with the correlation of its window.
     for (i, found) in maps.iter().enumerate() {
         let (c, at) = (
             i / (positions[0] * positions[1]),
@@ -93,7 +95,8 @@ fn shifted(draw: &mut Draw<'_>) {
     }
 }
 
-/// Regions are numbered by their first pixels, each is whole, and none is too small that is not alone.
+/// Checks that regions are numbered by their first pixels, are connected, and have the minimum area
+/// unless there is only one.
 fn merged(draw: &mut Draw<'_>) {
     let shape = [draw.within(0..=12), draw.within(0..=12), draw.within(0..=4)];
     let image = draw.reals(shape.iter().product());
@@ -116,6 +119,7 @@ fn merged(draw: &mut Draw<'_>) {
         areas[label] += 1;
     }
     assert!(areas.len() == 1 || areas.iter().all(|&n| n >= options.least));
+    // Fill each region from its first pixel.
     let mut seen = vec![false; found.len()];
     for (first, &label) in found.iter().enumerate() {
         if seen[first] || found[..first].contains(&label) {

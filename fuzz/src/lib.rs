@@ -1,4 +1,5 @@
-//! What the targets share: small inputs drawn from bytes, and work that is done by one thread and by two.
+//! Functions that the fuzz targets share: small inputs drawn from bytes, and comparison of runs
+//! with one and two threads.
 
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
@@ -9,7 +10,7 @@ use texrs::hash::Noise;
 use texrs::par::{self, Monitor};
 use texrs::{Error, Result};
 
-/// Numbers that no kernel is meant for, or only just.
+/// Values that kernels must reject or can barely handle.
 const ODD: [f32; 10] = [
     f32::NAN,
     f32::INFINITY,
@@ -23,7 +24,8 @@ const ODD: [f32; 10] = [
     1e15,
 ];
 
-/// Values drawn from the bytes of an input; where these end all are the least.
+/// Values drawn from the bytes of an input. After the end of the bytes, all values are the smallest
+/// ones.
 pub struct Draw<'a>(Unstructured<'a>);
 
 impl<'a> Draw<'a> {
@@ -39,7 +41,7 @@ impl<'a> Draw<'a> {
         self.any()
     }
 
-    /// Once in `n` times.
+    /// Returns true once in `n` draws.
     pub fn seldom(&mut self, n: u8) -> bool {
         self.any::<u8>() % n == n - 1
     }
@@ -57,7 +59,10 @@ impl<'a> Draw<'a> {
         std::array::from_fn(|_| self.flag())
     }
 
-    /// A small region, about the origin or, seldom, anywhere; refused where it reaches too far.
+    /// Returns a small region, around the origin or rarely anywhere.
+    ///
+    /// # Errors
+    /// The region is too far from the origin.
     pub fn region<const D: usize>(&mut self, longest: usize) -> Result<Region<D>> {
         let grid = Grid::new(self.shape(1..=longest), self.flags())?;
         let origin = std::array::from_fn(|_| {
@@ -70,7 +75,7 @@ impl<'a> Draw<'a> {
         Region::new(grid, origin)
     }
 
-    /// From 0 to 1, seldom something odd.
+    /// Returns a value from 0 to 1, or rarely an odd value.
     pub fn real(&mut self) -> f32 {
         if self.seldom(32) {
             ODD[self.within(0..=ODD.len() - 1)]
@@ -79,14 +84,15 @@ impl<'a> Draw<'a> {
         }
     }
 
-    /// Values of `levels` levels from 0 to 1: of the bytes themselves, or noise of a seed. Few levels tie often.
+    /// Returns values from 0 to 1 with few levels, from the bytes or from the noise of a seed. Few
+    /// levels cause many ties.
     pub fn values(&mut self, n: usize) -> Vec<f32> {
         let levels = [1u32, 2, 5, 255][self.within(0..=3)];
         let level = |x: u32| (x % (levels + 1)) as f32 / levels as f32;
         self.words(n).map(level).collect()
     }
 
-    /// As [`Self::values`], seldom with a few that are odd.
+    /// Returns values like [`Self::values`], rarely with a few odd values.
     pub fn reals(&mut self, n: usize) -> Vec<f32> {
         let mut values = self.values(n);
         if n > 0 && self.seldom(16) {
@@ -97,18 +103,18 @@ impl<'a> Draw<'a> {
         values
     }
 
-    /// Flags, one in two, one in eight or seven in eight of them set.
+    /// Returns flags. The fraction of set flags is 1/2, 1/8, 7/8 or 1.
     pub fn mask(&mut self, n: usize) -> Vec<bool> {
         let set = [128, 32, 224, 256][self.within(0..=3)];
         self.words(n).map(|x| x % 256 < set).collect()
     }
 
-    /// Numbers below `most`.
+    /// Returns numbers below `most`.
     pub fn numbers(&mut self, n: usize, most: u32) -> impl Iterator<Item = u32> + use<'a> {
         self.words(n).map(move |x| x % most.max(1))
     }
 
-    /// Words: of the bytes, or of a seed, so that few bytes make much.
+    /// Returns words from the bytes or from a seed, so that few bytes give many words.
     pub fn words(&mut self, n: usize) -> impl Iterator<Item = u32> + use<'a> {
         let words: Vec<u32> = if self.flag() {
             (0..n).map(|_| u32::from(self.any::<u8>())).collect()
@@ -121,19 +127,20 @@ impl<'a> Draw<'a> {
         words.into_iter()
     }
 
-    /// What is left.
+    /// Returns the remaining bytes.
     pub fn rest(self) -> &'a [u8] {
         self.0.take_rest()
     }
 }
 
-/// What work returns: the same of one thread and of two, in the very bits, or an error that speaks.
+/// Returns the result of `work`, which must be bit-identical for one and two threads, or `None` if
+/// both return a meaningful error.
 pub fn agreed<T: Debug + Send>(work: impl Fn(&Monitor) -> Result<T> + Sync) -> Option<T> {
     let [one, two] =
         [1, 2].map(|threads| par::install(threads, || work(&Monitor::default())).unwrap());
     match (one, two) {
         (Ok(one), Ok(two)) => {
-            // Floats are printed to the last bit, and one NaN is as good as another.
+            // Floats are printed exactly, and all NaN values compare equal.
             assert_eq!(format!("{one:?}"), format!("{two:?}"), "one thread and two");
             Some(one)
         }
@@ -146,13 +153,13 @@ pub fn agreed<T: Debug + Send>(work: impl Fn(&Monitor) -> Result<T> + Sync) -> O
     }
 }
 
-/// Errors name an argument and say something of it, and nothing was cancelled.
+/// Checks that an error has a message with an argument, and that it is not a cancellation.
 pub fn speaks(error: &Error) {
     assert!(!matches!(error, Error::Cancelled(_)), "{error}");
     assert!(error.to_string().contains(' '), "{error:?}");
 }
 
-/// Near, for sums in another order.
+/// Whether two values are equal except for the rounding of sums in another order.
 pub fn near(a: f64, b: f64, share: f64) -> bool {
     a == b || (a - b).abs() <= share * (a.abs() + b.abs() + 1.0)
 }

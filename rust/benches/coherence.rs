@@ -1,4 +1,5 @@
-//! Similarity sets of a picture and of a volume, and one pass over as many points.
+//! Similarity sets of an image and of a volume, and one pass of correction over the same number of
+//! points.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::appearance::Appearance;

@@ -1,4 +1,4 @@
-//! A hole of a quarter of the side, in one pool of each size.
+//! Filling a hole of a quarter of the side, with pools of one and two threads.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::complete::{Canvas, Options, complete};

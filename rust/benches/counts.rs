@@ -1,6 +1,7 @@
-//! The hottest kernels, each once on little data, for a tool that counts instructions: see `.ci/counts`.
+//! The hottest kernels, each run once on little data, for a tool that counts instructions: see
+//! `.ci/counts`.
 //!
-//! `counts NAME` runs one. What is counted is what happens within [`measured`], on one thread.
+//! `counts NAME` runs one kernel. Only instructions within [`measured`] are counted, on one thread.
 
 use texrs::appearance::Appearance;
 use texrs::coherence::{self, FEW, Kinds};
@@ -17,7 +18,7 @@ use texrs::regions;
 use texrs::seam::stitch::{Overlap, Stitcher};
 use texrs::stitcher::{self, Adjacency, Elements, Given, Source, Weights};
 
-/// Waves with noise, of three channels.
+/// An image of three channels: waves with noise.
 fn image(side: usize, layer: u32) -> Vec<f32> {
     let noise = Noise::new(1);
     (0..side * side * 3)
@@ -29,7 +30,7 @@ fn image(side: usize, layer: u32) -> Vec<f32> {
         .collect()
 }
 
-/// The work whose instructions are counted.
+/// Runs the work whose instructions are counted.
 #[inline(never)]
 fn measured<R>(work: impl FnOnce() -> R) -> R {
     std::hint::black_box(work())

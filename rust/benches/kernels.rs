@@ -1,4 +1,4 @@
-//! One criterion root; a group a kernel, sizes and pools as ids.
+//! The root of the criterion benchmarks. Each kernel has a group, and sizes and pools are ids.
 
 mod coherence;
 mod complete;

@@ -1,4 +1,4 @@
-//! A noisy wave at the radii of segmentation.
+//! A noisy wave, filtered with radii that segmentation uses.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;

@@ -1,4 +1,4 @@
-//! A template in an image of eight channels, whose spectra are at hand.
+//! Correlation of a template with an image of eight channels whose spectra are computed before.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::hash::Noise;

@@ -1,4 +1,4 @@
-//! Patches of the sizes that completion asks for.
+//! Search for patches of the sizes that filling of holes uses.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;

@@ -1,4 +1,4 @@
-//! Rectangles at every kind of edge, and a disc under a mask.
+//! Rectangles with every kind of edge, and a disc under a mask.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::par::{self, Monitor};

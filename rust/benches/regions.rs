@@ -1,4 +1,4 @@
-//! A noisy wave, merged as segmentation does.
+//! A noisy wave, with the parameters of segmentation.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;

@@ -1,4 +1,4 @@
-//! The screened Laplacian of a grid, factored and solved for two right sides.
+//! The screened Laplacian of a grid, factored and solved for two right-hand sides.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::par::Monitor;

@@ -1,4 +1,4 @@
-//! Pictures and volumes filled with patches, with and without a field.
+//! Images and volumes filled with patches, with and without a field.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::fixed::{Frame, Frames, ONE, identity};
@@ -27,7 +27,7 @@ const OPTIONS: Options = Options {
     seed: 1,
 };
 
-/// Balls on a lattice, each of its own shade.
+/// Balls on a lattice, each with its own shade.
 fn balls<const D: usize>(side: usize) -> Source<D> {
     let grid = Grid::new([side; D], [false; D]).unwrap();
     let (mut colours, mut labels, mut depth) = (Vec::new(), Vec::new(), Vec::new());

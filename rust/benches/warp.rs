@@ -1,4 +1,4 @@
-//! A dense mesh, and scattered points, bent by a wave.
+//! A dense mesh and scattered points, bent by a wave.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::par::{self, Monitor};

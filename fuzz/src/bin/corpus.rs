@@ -1,4 +1,5 @@
-//! What fuzzing starts from, made anew: `corpus FOLDER TARGET...`, a folder of inputs a target.
+//! Writes the initial corpus of the fuzz targets. `corpus FOLDER TARGET...` writes one folder of
+//! inputs for each target.
 
 use std::fs;
 use std::io;
@@ -7,7 +8,7 @@ use std::path::Path;
 use texrs::hash::Noise;
 use texrs::image_io::{Format, Sample, encode};
 
-/// Inputs of a target that draws what it wants from bytes, of so many.
+/// Lengths in bytes of the inputs of a target that draws its arguments from bytes.
 const LENGTHS: [usize; 6] = [16, 48, 128, 400, 1200, 4000];
 
 fn bytes(seed: u64, n: usize) -> Vec<u8> {
@@ -17,7 +18,7 @@ fn bytes(seed: u64, n: usize) -> Vec<u8> {
         .collect()
 }
 
-/// Small files of all kinds that are written, and beginnings of files of all formats.
+/// Writes small files of all supported kinds, half of each file, and headers of the other formats.
 fn images(folder: &Path) -> io::Result<()> {
     let formats = [
         Format::Png,

@@ -1,45 +1,50 @@
-//! What a seam costs: the match of two images at the two ends of an edge, and its scaling to integer capacities.
+//! Cost of a seam: the difference of two images at the two ends of an edge, and its scaling to
+//! integer capacities.
 //!
-//! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures: image and video synthesis using graph cuts*, SIGGRAPH 2003.
+//! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures: image and video synthesis using graph
+//! cuts*, SIGGRAPH 2003.
 
 use crate::foundation::functions::power_below;
 use crate::{Error, Result};
 
-/// How visible a seam between two neighbours is.
+/// Visibility of a seam between two neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cost {
     /// `|A(s) - B(s)| + |A(t) - B(t)|`, summed over channels (Kwatra et al., eq. 1).
     Difference,
-    /// The same divided by `|A(s) - A(t)| + |B(s) - B(t)| + 0.05` (Kwatra et al., eq. 2): seams hide along edges of the
-    /// images. The constant is for values of about unit range; it keeps flat regions from costing infinitely much.
+    /// The same divided by `|A(s) - A(t)| + |B(s) - B(t)| + 0.05` (Kwatra et al., eq. 2), so that
+    /// seams follow edges of the images. The constant suits values from 0 to 1 and keeps the cost
+    /// finite in flat regions.
     Gradient,
 }
 
-/// Added to every edge, so that ties go to the shorter seam.
+/// Cost added to every edge, so that ties go to the shorter seam.
 pub const SHORTEST: f32 = 1e-4;
-/// Keeps the gradient cost finite where both images are flat.
+/// Constant that keeps the gradient cost finite where both images are flat.
 const FLAT: f32 = 0.05;
 
-/// How far two pixels may be apart: both ends of an edge together stay finite, and so does a gradient cost. Infinitely much by
-/// infinitely steep is no number, and no comparison tells that it is none.
+/// Maximum distance of two pixels. The sum of both ends of an edge and the gradient cost then stay
+/// finite. An infinite distance divided by an infinite slope would be NaN, which comparisons do not
+/// detect.
 pub(super) const FARTHEST: f32 = f32::MAX / 2.0;
 
-/// Values whose sums and quotients pass what a float can be, among ordinary ones.
+/// Test values: ordinary ones, and values whose sums and quotients overflow.
 #[cfg(test)]
 pub(super) const EXTREMES: [f32; 8] = [0.0, 0.5, 1.0, 1e30, 1.6e38, -1.6e38, f32::MAX, -f32::MAX];
 
-/// Capacities are costs times a power of two, at most this one.
+/// Maximum scale. Capacities are costs times a power of two.
 const FINEST: f64 = 65536.0;
-/// No single cost becomes a larger capacity: the sums that a solver makes of a node's edges stay within `i32`.
+/// Maximum capacity of a single cost, so that sums over the edges of a node fit `i32`.
 const LARGEST: f64 = (1u32 << 26) as f64;
 
-/// L1 distance of two pixels.
+/// Returns the L1 distance of two pixels.
 #[inline(always)]
 pub(super) fn distance(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + (x - y).abs())
 }
 
-/// Two images on one canvas. `C` is the number of channels where that is known, so that loops over them unroll, or 0.
+/// Two images on one canvas. `C` is the number of channels if it is a known constant, so that loops
+/// unroll, else 0.
 #[derive(Clone, Copy)]
 pub(super) struct Pair<'a, const C: usize> {
     pub a: &'a [f32],
@@ -53,14 +58,15 @@ impl<'a, const C: usize> Pair<'a, C> {
         if C == 0 { self.channels } else { C }
     }
 
-    /// How far the images are apart at a pixel.
+    /// Returns the distance of the two images at a pixel.
     #[inline(always)]
     pub(super) fn difference(&self, p: usize) -> f32 {
         let (at, n) = (p * self.channels(), self.channels());
         distance(&self.a[at..][..n], &self.b[at..][..n])
     }
 
-    /// The cost of a seam between neighbours `s` and `t`, given the differences there.
+    /// Returns the cost of a seam between neighbours `s` and `t`. `differences` is the sum of the
+    /// distances at both.
     #[inline(always)]
     pub(super) fn edge(&self, cost: Cost, s: usize, t: usize, differences: f32) -> f32 {
         let plain = match cost {
@@ -76,14 +82,15 @@ impl<'a, const C: usize> Pair<'a, C> {
         plain + SHORTEST
     }
 
-    /// [`Self::difference`] of all pixels.
+    /// Returns [`Self::difference`] of all pixels.
     pub(super) fn differences(&self) -> Vec<f32> {
         let n = self.channels();
         let pairs = self.a.chunks_exact(n).zip(self.b.chunks_exact(n));
         pairs.map(|(a, b)| distance(a, b)).collect()
     }
 
-    /// [`Self::edge`] of the pixels from `s` on and those from `t` on, in plain loops that become wide instructions.
+    /// Computes [`Self::edge`] for runs of pixels that start at `s` and at `t`, in simple loops
+    /// that vectorise.
     pub(super) fn edges(
         &self,
         cost: Cost,
@@ -111,7 +118,8 @@ impl<'a, const C: usize> Pair<'a, C> {
     }
 }
 
-/// The power of two by which costs are multiplied: 2^16, or less where the largest cost would pass 2^26.
+/// Returns the power of two that costs are multiplied by: 2^16, or less if the largest cost would
+/// exceed 2^26.
 pub(super) fn scale(largest: f64) -> f64 {
     let mut scale = FINEST;
     while largest * scale > LARGEST {
@@ -120,12 +128,12 @@ pub(super) fn scale(largest: f64) -> f64 {
     scale
 }
 
-/// The power of two by which the largest cost becomes more than 2^25 and at most 2^26.
+/// Returns the power of two that scales the largest cost to more than 2^25 and at most 2^26.
 pub(super) fn finest(largest: f64) -> f64 {
     if largest <= 0.0 {
         return 1.0;
     }
-    // 1e-300 is far below any `f32`; powers of two stay finite.
+    // The bound 1e-300 is far below any `f32` and keeps powers of two finite.
     let mut scale = power_below(LARGEST / largest.max(1e-300));
     while largest * scale > LARGEST {
         scale *= 0.5;
@@ -133,18 +141,21 @@ pub(super) fn finest(largest: f64) -> f64 {
     scale
 }
 
-/// A cost as a capacity, rounded to the nearest.
+/// Returns a cost as a capacity, rounded to the nearest integer.
 #[inline(always)]
 pub(super) fn capacity(cost: f64, scale: f64) -> i32 {
     (cost * scale + 0.5) as i32
 }
 
-/// Costs looked at side by side.
+/// Number of costs that are checked together.
 const LANES: usize = 16;
 
-/// The largest entry, 0 of none; refuses negative and non-finite ones.
+/// Returns the largest cost, or 0 for an empty array.
+///
+/// # Errors
+/// A cost is negative or not finite.
 pub(super) fn check_costs(argument: &'static str, costs: &[f32]) -> Result<f32> {
-    // One comparison that NaN fails too; several entries at a time, within which nothing has to be decided.
+    // NaN fails this comparison too. Entries are checked in blocks without branches.
     let sound = |c: f32| (0.0..f32::INFINITY).contains(&c);
     let (mut largest, mut bad) = ([0.0f32; LANES], [0u32; LANES]);
     let (blocks, rest) = costs.as_chunks::<LANES>();

@@ -1,6 +1,8 @@
-//! Binary labels of least energy on a grid: a cost for each label of each point, and one for each pair of neighbours that
-//! differ (Greig, Porteous, Seheult, *Exact maximum a posteriori estimation for binary images*, J. Royal Statistical
-//! Society B 1989).
+//! Binary labels of minimum energy on a grid.
+//!
+//! The energy has a cost for each label of each point, and one for each pair of neighbours with
+//! different labels. See Greig, Porteous, Seheult, *Exact maximum a posteriori estimation for
+//! binary images*, J. Royal Statistical Society B 1989.
 
 use super::cost::{capacity, check_costs, finest};
 use super::links;
@@ -11,36 +13,39 @@ use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// What labels cost.
+/// Costs of labels.
 #[derive(Debug, Clone, Copy)]
 pub struct Energy<'a, const D: usize> {
-    /// Shape, and which axes are cyclic.
+    /// Shape and wrapped axes.
     pub grid: Grid<D>,
-    /// Costs of false and of true at each point. One of them may be infinite, which forbids it; they may be negative.
+    /// Costs of false and of true at each point, which may be negative. One of them may be
+    /// infinite, which forbids the label.
     pub unary: &'a [[f32; 2]],
-    /// Cost where a point is false and the next one along the axis is true, at least 0; ignored where there is no next.
+    /// Cost if a point is false and the next one along the axis is true, at least 0. Entries
+    /// without a next point are ignored.
     pub forward: [&'a [f32]; D],
-    /// Cost where a point is true and the next one along the axis is false.
+    /// Cost if a point is true and the next one along the axis is false.
     pub backward: [&'a [f32]; D],
 }
 
-/// Labels of least energy.
+/// Labels of minimum energy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Labels {
-    /// The label of each point; of all best labellings, that with the fewest true.
+    /// Label of each point. Among several best labellings, this is the one with the fewest true
+    /// labels.
     pub labels: Vec<bool>,
     /// Sum of the costs of all points and pairs.
     pub energy: f64,
 }
 
-/// The labels of least energy.
+/// Returns the labels of minimum energy.
 ///
-/// Costs are rounded to multiples of the power of two by which the largest pairwise cost is more than 2^25 and up to 2^26
-/// steps.
+/// Costs are rounded to multiples of a power of two. The largest pairwise cost has more than 2^25
+/// and at most 2^26 such steps.
 ///
 /// # Errors
-/// Arrays that do not fit, pairwise costs that are negative or not finite, unary costs that are NaN, that forbid both
-/// labels or that are minus infinity.
+/// Arrays do not fit, a pairwise cost is negative or not finite, or a unary cost is NaN or minus
+/// infinity, or forbids both labels.
 pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -> Result<Labels> {
     let n = energy.grid.len();
     check_shape("unary", &[n], energy.unary.len())?;
@@ -50,7 +55,8 @@ pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -
         check_shape("pairwise", &[n], costs.len())?;
         largest = largest.max(check_costs("pairwise", costs)?);
     }
-    // Two that are above minus infinity, and of which one is below infinity; NaN is neither.
+    // Both costs must be above minus infinity and one of them below infinity. NaN fails both
+    // comparisons.
     let sound = |&[a, b]: &[f32; 2]| {
         (a > f32::NEG_INFINITY)
             & (b > f32::NEG_INFINITY)
@@ -66,6 +72,7 @@ pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -
             ),
         ));
     }
+    // Without pairwise costs, scale by the largest unary difference.
     let difference = |u: &[f32; 2]| f64::from(u[1]) - f64::from(u[0]);
     let mut largest = f64::from(largest);
     if largest == 0.0 {
@@ -81,15 +88,15 @@ pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -
     };
     let forward: [Vec<i32>; D] = energy.forward.map(rounded);
     let backward: [Vec<i32>; D] = energy.backward.map(rounded);
-    // A unary cost beyond what all pairs of a point can cost decides its label whatever it is: clipping it there changes
-    // nothing, and lets users forbid a label by any large number.
+    // A unary difference larger than all pairs of a point together decides its label. Clip it
+    // there, so that any large number forbids a label.
     let most = (2 * D) as f64 * f64::from(capacity(largest, scale)) + 1.0;
     let terminal: Vec<i32> = energy
         .unary
         .iter()
         .map(|u| {
             let steps = (difference(u) * scale).clamp(-most, most);
-            // `f64::round` is a call where the CPU is not known to have it.
+            // `f64::round` would be a function call on CPUs that may lack the instruction.
             (steps + 0.5f64.copysign(steps)) as i32
         })
         .collect();

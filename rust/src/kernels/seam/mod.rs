@@ -1,13 +1,13 @@
-//! Minimum cuts on grids: where two images meet least visibly, and binary labels of least energy.
+//! Minimum cuts on grids: seams where two images differ least, and binary labels of minimum energy.
 //!
-//! | part | noun |
+//! | part | content |
 //! |---|---|
-//! | [`maxflow`] | exact minimum cuts of directed, possibly cyclic grids |
-//! | [`cost`] | how visible a seam between two images is, and capacities made of costs |
-//! | [`planar`] | the same between opposite borders, open or cyclic, or around a core, as a shortest path on the dual |
-//! | [`labels`] | binary labels of least energy |
-//! | [`stitch`] | which of two images each pixel of a canvas takes, for overlaps of any shape |
-//! | [`strip`] | the same for two images that overlap altogether, seam from border to border |
+//! | [`maxflow`] | exact minimum cuts of directed grids, whose axes may wrap |
+//! | [`cost`] | visibility of a seam between two images, and its scaling to capacities |
+//! | [`planar`] | minimum cuts between opposite borders, open or closed, or around a core, as shortest paths on the dual |
+//! | [`labels`] | binary labels of minimum energy |
+//! | [`stitch`] | choice of one of two images for each pixel of a canvas, for overlaps of any shape |
+//! | [`strip`] | the same for two images of the same shape, with a seam from border to border |
 
 pub mod cost;
 pub mod labels;
@@ -20,13 +20,13 @@ pub mod strip;
 
 use crate::foundation::grid::Grid;
 
-/// Calls `f(p, q)` for each point `p` that has a next point `q` along an axis, in row-major order.
+/// Calls `f(p, q)` for each point `p` with a next point `q` along an axis, in row-major order.
 #[inline(always)]
 pub(crate) fn links<const D: usize>(grid: &Grid<D>, axis: usize, mut f: impl FnMut(usize, usize)) {
     steps(grid, axis, |_, p, q| f(p, q));
 }
 
-/// The same with the coordinate of `p` along the axis: `f(i, p, q)`.
+/// Calls `f(i, p, q)` like [`links`], where `i` is the coordinate of `p` along the axis.
 #[inline(always)]
 pub(crate) fn steps<const D: usize>(
     grid: &Grid<D>,

@@ -1,4 +1,5 @@
-//! Two images on one canvas: where each covers it, what is tied to which, and where both meet.
+//! Two images on one canvas: their coverage, their cores, and the window that contains their
+//! overlap.
 
 use super::cost::{Cost, check_costs};
 use super::planar::ring::Side;
@@ -6,46 +7,49 @@ use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
-/// Seams that A already contains. Entries belong to the pair of a point and the next one along the axis.
+/// Existing seams of A. Entries belong to the pair of a point and the next one along the axis.
 #[derive(Debug, Clone, Copy)]
 pub struct OldSeams<'a, const D: usize> {
-    /// Cost of the seam that is there, paid where both points keep A; 0 where there is none.
+    /// Cost of the existing seam, paid if both points keep A. Zero without a seam.
     pub kept: [&'a [f32]; D],
-    /// Cost where the first point keeps A and the next takes B: the first one's old source against B.
+    /// Cost if the first point keeps A and the next takes B: the first point's old source against
+    /// B.
     pub ab: [&'a [f32]; D],
-    /// Cost where the first point takes B and the next keeps A.
+    /// Cost if the first point takes B and the next keeps A.
     pub ba: [&'a [f32]; D],
 }
 
-/// What is to be stitched. Arrays are in row-major order over `grid`, images with their channels last.
+/// Two images to stitch. Arrays are in row-major order over `grid`, images with their channels
+/// last.
 #[derive(Debug, Clone, Copy)]
 pub struct Overlap<'a, const D: usize> {
-    /// The canvas, and which of its axes are cyclic.
+    /// Shape and wrapped axes of the canvas.
     pub grid: Grid<D>,
-    /// Channels of both images.
+    /// Number of channels of both images.
     pub channels: usize,
-    /// The image that is there. Values where it does not cover the canvas are never read.
+    /// The existing image. Values outside `mask_a` are never read.
     pub a: &'a [f32],
-    /// The image that is added.
+    /// The added image.
     pub b: &'a [f32],
-    /// Where A covers the canvas.
+    /// Flags of the pixels that A covers.
     pub mask_a: &'a [bool],
-    /// Where B covers the canvas.
+    /// Flags of the pixels that B covers.
     pub mask_b: &'a [bool],
-    /// Pixels of the overlap that must keep A.
+    /// Flags of the overlap pixels that must keep A.
     pub core_a: Option<&'a [bool]>,
-    /// Pixels of the overlap that must take B.
+    /// Flags of the overlap pixels that must take B.
     pub core_b: Option<&'a [bool]>,
-    /// Costs of edges are multiplied by one plus the mean of this at their ends.
+    /// Penalty of each pixel. The cost of an edge is multiplied by 1 plus the mean penalty of its
+    /// ends.
     pub penalty: Option<&'a [f32]>,
-    /// Seams that A already contains; they bear the penalty too.
+    /// Existing seams of A. The penalty applies to them too.
     pub old: Option<OldSeams<'a, D>>,
-    /// How visible a seam is.
+    /// Cost of a seam.
     pub cost: Cost,
 }
 
 impl<'a, const D: usize> Overlap<'a, D> {
-    /// An overlap without cores, penalty or old seams, at the gradient cost.
+    /// Returns an overlap without cores, penalty or old seams, with the gradient cost.
     pub fn new(
         grid: Grid<D>,
         channels: usize,
@@ -69,7 +73,8 @@ impl<'a, const D: usize> Overlap<'a, D> {
         }
     }
 
-    /// Arrays that do not fit the grid, and what cannot be: see [`super::stitch::Stitcher::cut`].
+    /// Checks shapes, cores, penalty and old seams. The errors are described at
+    /// [`super::stitch::Stitcher::cut`].
     pub(super) fn check(&self) -> Result<()> {
         let n = self.grid.len();
         if n > i32::MAX as usize {
@@ -84,6 +89,7 @@ impl<'a, const D: usize> Overlap<'a, D> {
         check_shape("b", &[samples], self.b.len())?;
         check_shape("mask_a", &[n], self.mask_a.len())?;
         check_shape("mask_b", &[n], self.mask_b.len())?;
+        // Cores must be inside their masks and disjoint.
         for (argument, core, mask) in [
             ("core_a", self.core_a, self.mask_a),
             ("core_b", self.core_b, self.mask_b),
@@ -125,7 +131,7 @@ impl<'a, const D: usize> Overlap<'a, D> {
         Ok(())
     }
 
-    /// Where a pixel must be: outside it keeps A, inside it takes B.
+    /// Returns the side of a pixel: outside pixels keep A, inside pixels take B.
     pub(super) fn tie(&self, at: usize) -> Side {
         match (self.mask_a[at], self.mask_b[at]) {
             (true, true) => {}
@@ -139,6 +145,7 @@ impl<'a, const D: usize> Overlap<'a, D> {
         if self.core_a.is_some_and(|core| core[at]) {
             return Side::Outside;
         }
+        // A pixel next to a pixel that only one image covers is tied to this image. A has priority.
         let point = self.grid.point(at);
         let mut found = Side::Free;
         for axis in 0..D {
@@ -159,7 +166,7 @@ impl<'a, const D: usize> Overlap<'a, D> {
         found
     }
 
-    /// The part of the canvas that both images cover some of; none where they do not meet.
+    /// Returns the bounding window of the overlap, or `None` if the images do not overlap.
     pub(super) fn window(&self) -> Result<Option<Window<D>>> {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
         let (mut low, mut high) = ([usize::MAX; D], [0; D]);
@@ -183,6 +190,7 @@ impl<'a, const D: usize> Overlap<'a, D> {
                 }
             }
         }
+        // An axis that wraps is kept only if the overlap reaches both of its ends.
         if low[0] == usize::MAX {
             return Ok(None);
         }
@@ -193,14 +201,15 @@ impl<'a, const D: usize> Overlap<'a, D> {
     }
 }
 
-/// The part of the canvas that the overlap lies in. A cyclic axis along which it meets both ends is taken whole.
+/// The part of the canvas that contains the overlap. A wrapped axis is kept whole if the overlap
+/// reaches both of its ends.
 pub(super) struct Window<const D: usize> {
     pub(super) grid: Grid<D>,
     from: [usize; D],
 }
 
 impl<const D: usize> Window<D> {
-    /// The index on the canvas of a point of the window.
+    /// Returns the index on the canvas of a point of the window.
     pub(super) fn canvas(&self, i: usize, grid: &Grid<D>) -> u32 {
         let mut point = self.grid.point(i);
         for (p, from) in point.iter_mut().zip(self.from) {

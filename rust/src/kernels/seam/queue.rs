@@ -1,25 +1,28 @@
-//! A queue of nodes by distance, for searches whose distances never fall far behind (Dial, *Algorithm 360: shortest-path
-//! forest with topological ordering*, CACM 1969), with buckets of more than one distance.
+//! A queue of nodes by distance, for searches whose distances never fall far behind. It is Dial's
+//! queue (*Algorithm 360: shortest-path forest with topological ordering*, CACM 1969) with buckets
+//! of more than one distance.
 
-/// Most buckets that are worth their memory.
+/// Maximum number of buckets. More would cost memory without benefit.
 const MOST: u32 = 4096;
 
-/// Buckets on a ring. Within a bucket those that came first are taken first, so that a node may be taken before its distance
-/// is final; it is then pushed again, and its old entry is stale. Were the last taken first, nodes of a plain where every step
-/// costs next to nothing would be taken over and over.
+/// Buckets on a ring.
+///
+/// Within a bucket, the oldest entry is taken first, so a node may be taken before its distance is
+/// final. It is then pushed again, and its old entry is stale. If the newest entry were taken
+/// first, nodes in a region of nearly zero costs would be taken over and over.
 #[derive(Debug, Default)]
 pub(super) struct Queue {
     buckets: Vec<Vec<(u32, u32)>>,
     shift: u32,
     current: u32,
-    /// Entries of the current bucket that have been taken.
+    /// Number of taken entries of the current bucket.
     taken: usize,
     entries: usize,
 }
 
 impl Queue {
-    /// Empties the queue for keys that rise by at most `step` over the key taken last; `fine` is about the smallest
-    /// difference of keys that matters.
+    /// Empties the queue. Keys may exceed the last taken key by at most `step`. `fine` is about the
+    /// smallest relevant difference of keys.
     pub(super) fn reset(&mut self, step: u32, fine: u32) {
         let mut shift = fine.max(1).ilog2();
         while (step >> shift) + 2 > MOST {
@@ -36,7 +39,7 @@ impl Queue {
         self.entries = 0;
     }
 
-    /// Where the taking begins: no key is below `key`.
+    /// Sets the start of the search. No key is below `key`.
     pub(super) fn begin(&mut self, key: u32) {
         self.current = key >> self.shift;
     }
@@ -48,7 +51,8 @@ impl Queue {
         self.entries += 1;
     }
 
-    /// A node and its distance from the lowest bucket, unless that lies beyond `last`.
+    /// Returns a node of the lowest bucket and its distance, or `None` if the bucket is beyond
+    /// `last`.
     #[inline(always)]
     pub(super) fn pop(&mut self, last: u32) -> Option<(u32, u32)> {
         if self.entries == 0 {

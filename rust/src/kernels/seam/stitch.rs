@@ -1,18 +1,25 @@
-//! Two images on one canvas: which of them each pixel takes, so that the seam between them is least visible.
+//! Two images on one canvas: each pixel takes one of them, so that the seam between them is least
+//! visible.
 //!
-//! Kwatra et al., *Graphcut textures*, SIGGRAPH 2003. Pixels that only one image covers take that one. In the overlap:
+//! Kwatra et al., *Graphcut textures*, SIGGRAPH 2003. Pixels that only one image covers take this
+//! image. In the overlap:
 //!
 //! 1. pixels of a core are tied to its image;
-//! 2. else pixels beside one that only A covers are tied to A, then those beside one that only B covers to B;
-//! 3. the others take what makes the sum of the costs of the edges that are cut least ([`super::cost`]); where that
-//!    leaves a choice, as few as possible take B.
+//! 2. other pixels are tied to A if they are next to a pixel that only A covers, or else to B if
+//!    next to one that only B covers;
+//! 3. the remaining pixels minimise the sum of the costs of the cut edges ([`super::cost`]); among
+//!    equal sums, as few pixels as possible take B.
 //!
-//! Where what must take B is one core on a plane, and what must keep A lies around it, that is a shortest closed path
-//! ([`super::planar::ring`]); else a maximum flow ([`super::maxflow`]).
+//! If B has a single core on a plane and A surrounds it, the seam is a shortest closed path
+//! ([`super::planar::ring`]). Otherwise it is computed by maximum flow ([`super::maxflow`]).
 //!
-//! Departures: A, which is there already, wins pixels that touch both; a `penalty` keeps seams off chosen pixels; an old
-//! seam is a pairwise term with one cost a labelling (Kolmogorov and Zabih, *What energy functions can be minimized via
-//! graph cuts?*, PAMI 2004) in place of Kwatra's extra node, which gives the same cuts with fewer nodes.
+//! Departures from the paper:
+//!
+//! - The existing image A has priority at pixels that touch both.
+//! - A `penalty` keeps seams away from chosen pixels.
+//! - An old seam is a pairwise term with one cost for each labelling. It follows Kolmogorov and
+//!   Zabih, *What energy functions can be minimized via graph cuts?*, PAMI 2004, and gives the same
+//!   cuts as Kwatra's extra node with fewer nodes.
 
 use super::cost::{FARTHEST, Pair, capacity, scale};
 use super::links;
@@ -25,23 +32,25 @@ use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// Which image each pixel takes.
+/// The image that each pixel takes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stitched {
-    /// Pixels that take B. The others take A where A covers them, and nothing elsewhere.
+    /// Flags of the pixels that take B. The others take A if A covers them, and are empty
+    /// otherwise.
     pub b: Vec<bool>,
-    /// Sum of the costs of the edges of the seam inside the overlap, old seams that stay included.
+    /// Sum of the costs of the seam's edges inside the overlap, including old seams that stay.
     pub value: f64,
     /// Number of edges between a pixel of A and one of B in the overlap.
     pub edges: usize,
 }
 
-/// The least visible seam of one overlap. Keep a [`Stitcher`] for many.
+/// Returns the least visible seam of one overlap. For many overlaps, reuse a [`Stitcher`].
 pub fn cut<const D: usize>(overlap: &Overlap<'_, D>, monitor: &Monitor) -> Result<Stitched> {
     Stitcher::default().cut(overlap, monitor)
 }
 
-/// Costs of the pair of a point and the next one, by who takes A (0) and who B (1). Taking B together is free.
+/// Costs of the pair of a point and the next one for each choice of A and B. If both take B, the
+/// cost is 0.
 #[derive(Debug, Clone, Copy, Default)]
 struct Costs {
     kept: f32,
@@ -49,14 +58,16 @@ struct Costs {
     ba: f32,
 }
 
-/// Boxes of fewer pixels go to the general solver: for them it is as fast, and it keeps its workspace.
+/// Windows of fewer pixels go to the general solver, which is as fast for them and reuses its
+/// workspace.
 const SMALL: usize = 64 * 64;
 
-/// A workspace for stitching; cuts after the first one of a size allocate only their result.
+/// A workspace for stitching. After the first cut of a size, further cuts allocate only their
+/// result.
 #[derive(Debug)]
 pub struct Stitcher<const D: usize> {
     solver: Solver<D>,
-    /// Canvas index of each point of the box.
+    /// Canvas index of each point of the window.
     canvas: Vec<u32>,
     differences: Vec<f32>,
     sides: Vec<Side>,
@@ -82,17 +93,18 @@ impl<const D: usize> Default for Stitcher<D> {
 }
 
 impl<const D: usize> Stitcher<D> {
-    /// The least visible seam of an overlap.
+    /// Returns the least visible seam of an overlap.
     ///
     /// # Errors
-    /// Arrays that do not fit the grid, a penalty or costs of old seams that are negative or not finite, cores that lie
-    /// outside the overlap's images or contradict each other, values that are not finite in the overlap.
+    /// Arrays do not fit the grid, or values in the overlap are not finite. A penalty or a cost of
+    /// old seams is negative or not finite. A core is outside its image or overlaps the other core.
     pub fn cut(&mut self, overlap: &Overlap<'_, D>, monitor: &Monitor) -> Result<Stitched> {
         let cut = self.cut_within(overlap, f64::INFINITY, monitor)?;
         Ok(cut.unwrap_or_else(|| unreachable!("no seam costs more")))
     }
 
-    /// The least visible seam of an overlap; it may be none where that costs more than `bound`, and no old seam is there.
+    /// Returns the least visible seam of an overlap. Without old seams, the result may be `None` if
+    /// the seam costs more than `bound`.
     pub(crate) fn cut_within(
         &mut self,
         overlap: &Overlap<'_, D>,
@@ -101,6 +113,7 @@ impl<const D: usize> Stitcher<D> {
     ) -> Result<Option<Stitched>> {
         overlap.check()?;
         memory::room("the graph of the seam", overlap.grid.len(), 80 * D)?;
+        // Pixels that only B covers take B.
         let mut b: Vec<bool> = overlap
             .mask_b
             .iter()
@@ -121,7 +134,7 @@ impl<const D: usize> Stitcher<D> {
         }?;
         let scale = scale(largest);
         self.capacities(overlap, &window, scale);
-        // Each edge of a cut may be rounded up by a half, and a point has D edges.
+        // Rounding may add half a step to each cut edge, and a point has D edges.
         let rounded = (D * window.grid.len()) as f64;
         let most = match overlap.old {
             None => (bound * scale + rounded) as i64,
@@ -142,6 +155,7 @@ impl<const D: usize> Stitcher<D> {
                 cut.sink
             }
         };
+        // Copy the labels of the overlap, and sum the costs of the seam.
         let inside: Vec<bool> = self.differences.iter().map(|d| !d.is_nan()).collect();
         for ((&at, &inside), &sink) in self.canvas.iter().zip(&inside).zip(&sink) {
             if inside {
@@ -166,8 +180,8 @@ impl<const D: usize> Stitcher<D> {
         Ok(Some(Stitched { b, value, edges }))
     }
 
-    /// What takes B, where that is what a least seam is around: on a plane and without old seams, which cost one way more
-    /// than the other.
+    /// Returns the pixels that take B if the seam is a closed path around a core. This requires a
+    /// plane without old seams, because their costs depend on the direction.
     fn ring(
         &self,
         overlap: &Overlap<'_, D>,
@@ -190,7 +204,7 @@ impl<const D: usize> Stitcher<D> {
         least_ring(&ring, monitor)
     }
 
-    /// Costs of all edges of the overlap in the window; the largest one.
+    /// Computes the costs of all edges of the overlap in the window. Returns the largest cost.
     fn weigh<const C: usize>(
         &mut self,
         overlap: &Overlap<'_, D>,
@@ -222,6 +236,7 @@ impl<const D: usize> Stitcher<D> {
                 }
             }
         }
+        // Compute the cost of each edge inside the overlap.
         let (mut largest, mut finite) = (0.0f32, true);
         for axis in 0..D {
             self.costs[axis].clear();
@@ -239,8 +254,9 @@ impl<const D: usize> Stitcher<D> {
                     Some(old) if old.kept[axis][s] > 0.0 => {
                         let (ab, ba) = (old.ab[axis][s] * weight, old.ba[axis][s] * weight);
                         Costs {
-                            // A seam that costs more than both its replacements together cannot be a graph; the
-                            // differences of three sources obey the triangle inequality, gradient costs may not.
+                            // An old seam that costs more than both its replacements together
+                            // cannot be a graph edge. Differences of three sources obey the
+                            // triangle inequality, but gradient costs may not.
                             kept: (old.kept[axis][s] * weight).min(ab + ba),
                             ab,
                             ba,
@@ -273,7 +289,7 @@ impl<const D: usize> Stitcher<D> {
         let n = window.grid.len();
         self.terminal.clear();
         self.terminal.resize(n, 0);
-        // What the edges of a point can cost altogether: a tie that costs more is never cut.
+        // Sum of the costs of all edges of a point. A tie with a higher cost is never cut.
         let mut around = vec![0i32; n];
         for axis in 0..D {
             for list in [&mut self.forward[axis], &mut self.backward[axis]] {
@@ -287,7 +303,8 @@ impl<const D: usize> Stitcher<D> {
                 if kept == 0 {
                     (self.forward[axis][i], self.backward[axis][i]) = (ab, ba);
                 } else {
-                    // With x = 1 for B: kept + (ba - kept) x_i - ba x_j + (ab + ba - kept) (1 - x_i) x_j.
+                    // With x = 1 for B: kept + (ba - kept) x_i - ba x_j + (ab + ba - kept) (1 -
+                    // x_i) x_j.
                     self.forward[axis][i] = ab + ba - kept;
                     self.terminal[i] += ba - kept;
                     self.terminal[j] -= ba;

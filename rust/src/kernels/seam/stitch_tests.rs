@@ -2,7 +2,7 @@ use super::super::cost::{Cost, EXTREMES};
 use super::*;
 use proptest::prelude::*;
 
-/// Sum of the costs of a labelling, from the definition.
+/// Returns the sum of the costs of a labelling, by definition.
 fn value(o: &Overlap<'_, 2>, b: &[bool]) -> f64 {
     let pixel = |image: &[f32], p: usize| image[p * o.channels..][..o.channels].to_vec();
     let l1 = |x: &[f32], y: &[f32]| -> f64 {
@@ -56,7 +56,7 @@ fn bools(n: usize) -> impl Strategy<Value = Vec<bool>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// A 3 x 3 canvas has few enough labellings to try them all, ties included.
+    /// A 3 x 3 canvas has few enough labellings to try them all, including ties.
     #[test]
     fn no_allowed_labelling_is_cheaper(
         wrap in any::<[bool; 2]>(),
@@ -99,7 +99,7 @@ proptest! {
             .filter(|labels| allowed(labels))
             .map(|labels| value(&overlap, &labels))
             .fold(f64::INFINITY, f64::min);
-        // Eighteen edges, each rounded to 2^-16.
+        // Eighteen edges are rounded to 2^-16 each.
         prop_assert!(cut.value <= least + 1e-3, "{} against {least}", cut.value);
     }
 
@@ -123,7 +123,8 @@ proptest! {
 
 #[test]
 fn the_seam_runs_where_the_images_agree() {
-    // Two rows; A covers the first four columns, B the last four; they agree in column 2 and 3 only.
+    // A covers the first four columns of two rows, B the last four. They agree only in columns 2
+    // and 3.
     let grid = Grid::new([2, 6], [false; 2]).unwrap();
     let a = [[0.1, 0.2, 0.3, 0.4, 0.0, 0.0]; 2].concat();
     let b = [[0.0, 0.9, 0.3, 0.4, 0.5, 0.6]; 2].concat();
@@ -205,7 +206,7 @@ fn refuses_contradictions() {
         ..plain
     };
     assert!(refused(unknown).contains("not finite"));
-    // Each of its replacements is a number, both together are none.
+    // Each replacement is finite, but their sum overflows.
     let (kept, others) = ([[3e38; 2]; 2], [[1.2e38; 2]; 2]);
     let endless = Overlap {
         penalty: Some(&[0.5; 2]),

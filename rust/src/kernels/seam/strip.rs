@@ -1,7 +1,8 @@
-//! Two images of the same shape that overlap altogether: the seam from border to border that is least visible.
+//! Two images of the same shape that overlap completely: the least visible seam from border to
+//! border.
 //!
-//! Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001, with the seam free to turn back:
-//! the exact minimum cut (see [`super::planar`]).
+//! Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001. The seam
+//! may turn back, because it is the exact minimum cut (see [`super::planar`]).
 
 use super::cost::{Cost, FARTHEST, Pair, check_costs};
 use super::planar::{LONGEST, Strip, least_seam, longest};
@@ -13,15 +14,15 @@ use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 use std::borrow::Cow;
 
-/// Pixels that are looked at together for whether a seam parts any of them from others.
+/// Number of pixels that are compared together to find edges that a seam cuts.
 const SIMILAR: usize = 64;
 
-/// Two images, and how they lie beside each other.
+/// Two images, and their arrangement.
 #[derive(Debug, Clone, Copy)]
 pub struct Pasted<'a> {
     /// Rows and columns of both images.
     pub shape: [usize; 2],
-    /// Channels of both images.
+    /// Number of channels of both images.
     pub channels: usize,
     /// The image at the start of `axis`.
     pub a: &'a [f32],
@@ -29,20 +30,22 @@ pub struct Pasted<'a> {
     pub b: &'a [f32],
     /// The axis that the seam crosses: the first line along it takes A, the last one B.
     pub axis: usize,
-    /// Whether the other axis is cyclic, so that the seam closes.
+    /// Whether the other axis wraps, so that the seam is closed.
     pub cyclic: bool,
-    /// Costs of edges are multiplied by one plus the mean of this at their ends.
+    /// Penalty of each pixel. The cost of an edge is multiplied by 1 plus the mean penalty of its
+    /// ends.
     pub penalty: Option<&'a [f32]>,
-    /// How visible a seam is.
+    /// Cost of a seam.
     pub cost: Cost,
 }
 
-/// The least visible seam.
+/// Returns the least visible seam.
 ///
-/// Costs are rounded to multiples of 2^-16, or coarser where a straight seam costs more than 2^13.
+/// Costs are rounded to multiples of 2^-16, or coarser if a straight seam costs more than 2^13.
 ///
 /// # Errors
-/// Arrays that do not fit, fewer than two pixels along `axis`, values or penalties that are not finite, negative penalties.
+/// Arrays do not fit, there are fewer than two pixels along `axis`, or values or penalties are not
+/// finite, or a penalty is negative.
 pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     let pixels = pasted.shape[0].saturating_mul(pasted.shape[1]);
     memory::room("the costs of the seam", pixels, 64)?;
@@ -52,7 +55,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
         _ => weigh::<0>(pasted),
     }?;
     let [rows, columns] = pasted.shape;
-    // The solver's rows run along the seam.
+    // The rows of the solver run along the seam.
     let (shape, across, along) = match pasted.axis {
         1 => ([rows, columns], Cow::from(&costs[1]), Cow::from(&costs[0])),
         _ => {
@@ -71,7 +74,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     while longest * scale >= (LONGEST / 2) as f64 {
         scale *= 0.5;
     }
-    // No cost is longer than the longest line.
+    // No single cost exceeds the longest line, so it fits.
     let rounded = |costs: &[f32]| -> Vec<u32> {
         let round = |&c: &f32| (f64::from(c) * scale + 0.5) as i32 as u32;
         costs.iter().map(round).collect()
@@ -88,6 +91,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
         1 => far,
         _ => transposed(&far, shape),
     };
+    // Sum the costs of the cut edges, skipping runs without any.
     let (mut value, mut edges) = (0.0, 0);
     let grid = grid(pasted)?;
     for (axis, costs) in costs.iter().enumerate() {
@@ -109,9 +113,9 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     Ok(Stitched { b, value, edges })
 }
 
-/// Rows as columns.
+/// Returns the transposed array.
 fn transposed<T: Copy + Default>(values: &[T], [rows, columns]: [usize; 2]) -> Vec<T> {
-    /// Rows taken at a time, so that what is read stays in the cache.
+    /// Number of rows that are read together, so that they stay in the cache.
     const BAND: usize = 16;
     let mut out = vec![T::default(); values.len()];
     for top in (0..rows).step_by(BAND) {
@@ -132,7 +136,8 @@ fn grid(pasted: &Pasted<'_>) -> Result<Grid<2>> {
     )
 }
 
-/// Calls `f(p, q, n)` for runs of `n` points from `p` on whose next points along an axis lie from `q` on.
+/// Calls `f(p, q, n)` for runs of `n` points. A run starts at `p`, and the next points along an
+/// axis start at `q`.
 fn runs(grid: &Grid<2>, axis: usize, mut f: impl FnMut(usize, usize, usize)) {
     let [rows, columns] = grid.shape();
     let closes = grid.wrap()[axis];
@@ -153,7 +158,7 @@ fn runs(grid: &Grid<2>, axis: usize, mut f: impl FnMut(usize, usize, usize)) {
     }
 }
 
-/// Costs of the edges along each axis.
+/// Returns the costs of the edges along each axis.
 fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
     let grid = grid(pasted)?;
     let n = grid.len();
@@ -181,12 +186,12 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
         b: pasted.b,
         channels: pasted.channels,
     };
-    // No channels, no differences.
+    // Without channels, all differences are zero.
     let differences = match pasted.channels {
         0 => vec![0.0; n],
         _ => pair.differences(),
     };
-    // Not the place at once, so that the search takes many at a time.
+    // Test first without the position, so that the loop vectorises.
     let far = |d: &f32| !(0.0..=FARTHEST).contains(d);
     if differences.iter().fold(false, |any, d| any | far(d)) {
         let at = differences.iter().position(far).unwrap_or(0);
@@ -218,7 +223,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// With the borders as cores the general cut has to find the same.
+        /// The general cut with the borders as cores must find a seam of the same cost.
         #[test]
         fn equals_the_general_cut(
             shape in prop::array::uniform2(2usize..9),

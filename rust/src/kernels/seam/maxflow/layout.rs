@@ -1,10 +1,11 @@
-//! Where the points of a grid lie in memory.
+//! Memory layout of the points of a grid.
 
 use super::ENDS;
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
-/// Where points lie in memory: an axis that does not wrap is followed by one empty place, so that every neighbour exists.
+/// Memory layout of the points. Along an axis that does not wrap, one empty node follows the
+/// points, so that every neighbour exists.
 pub(super) struct Layout<const D: usize> {
     pub(super) shape: [usize; D],
     pub(super) cyclic: [bool; D],
@@ -43,7 +44,8 @@ impl<const D: usize> Layout<D> {
         })
     }
 
-    /// Calls `f(index of the row's first point, its node, length)` for each row along the last axis.
+    /// Calls `f(index of the row's first point, its node, length)` for each row along the last
+    /// axis.
     pub(super) fn rows(&self, mut f: impl FnMut(usize, usize, usize)) {
         let n = self.shape[D - 1];
         let rows: usize = self.shape[..D - 1].iter().product();
@@ -58,7 +60,8 @@ impl<const D: usize> Layout<D> {
         }
     }
 
-    /// Bits `2 * axis` and `2 * axis + 1`: at the start, at the end of a cyclic axis.
+    /// Returns bits `2 * axis` and `2 * axis + 1`: the point is at the start, or at the end, of a
+    /// wrapped axis.
     pub(super) fn ends(&self, mut point: [usize; D], i: usize) -> u8 {
         point[D - 1] = i;
         let mut bits = 0;
@@ -71,7 +74,8 @@ impl<const D: usize> Layout<D> {
         bits
     }
 
-    /// Offsets of the next and the previous point along each axis, for each value of [`Self::ends`].
+    /// Returns a table by the values of [`Self::ends`]: the offsets of the next and the previous
+    /// point along each axis.
     pub(super) fn offsets(&self) -> [[[i32; 2]; D]; ENDS] {
         std::array::from_fn(|bits| {
             std::array::from_fn(|axis| {

@@ -1,13 +1,14 @@
-//! Flow that is pushed along the lines of the grid, before any tree grows.
+//! Flow that is pushed along the lines of the grid before the trees grow.
 
 use super::Solver;
 use super::layout::Layout;
 
-/// Lines that are swept together: enough to fill cache lines, few enough to stay in cache from one pass to the next.
+/// Number of lines that are swept together. They fill cache lines and stay in the cache from one
+/// pass to the next.
 const LINES: usize = 16;
 
 impl<const D: usize> Solver<D> {
-    /// Pushes flow along every line to needs further along it.
+    /// Pushes flow along every line to demands further along it.
     pub(super) fn sweep(&mut self, layout: &Layout<D>) {
         for axis in (0..D).rev() {
             let (stride, length) = (layout.strides[axis], layout.shape[axis]);
@@ -22,7 +23,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Sweeps neighbouring lines towards their end (`SIDE` 0) or their start. Arcs around a cyclic axis are left out.
+    /// Sweeps adjacent lines towards their end (`SIDE` 0) or their start. Arcs across the ends of a
+    /// wrapped axis are not used.
     fn lines<const SIDE: usize>(
         &mut self,
         from: usize,
@@ -32,11 +34,12 @@ impl<const D: usize> Solver<D> {
         axis: usize,
     ) {
         let nodes = &mut self.nodes[from..from + (length - 1) * stride + lines];
-        // Rows of nodes, one of each line, in the order of the sweep.
+        // Returns the offset of a row of nodes, one of each line, in the order of the sweep.
         let row = |i: usize| (if SIDE == 0 { i } else { length - 1 - i }) * stride;
         for node in &mut nodes[row(length - 1)..][..lines] {
             node.distance = 0;
         }
+        // Accumulate the demand further along each line, limited by the capacities.
         for i in (0..length - 1).rev() {
             let (p, q) = (row(i), row(i + 1));
             for k in 0..lines {
@@ -45,6 +48,7 @@ impl<const D: usize> Solver<D> {
                 nodes[p + k].distance = need.min(nodes[p + k].residual[axis][SIDE]);
             }
         }
+        // Push the flow that can satisfy this demand.
         for i in 0..length - 1 {
             let (p, q) = (row(i), row(i + 1));
             for k in 0..lines {

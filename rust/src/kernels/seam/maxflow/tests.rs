@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-/// Edmonds and Karp on a dense matrix: the obvious twin.
+/// The Edmonds-Karp algorithm on a dense matrix, as a simple reference.
 pub(in crate::kernels::seam) fn naive<const D: usize>(graph: &Graph<'_, D>) -> Cut {
     let n = graph.grid.len();
     let (source, sink) = (n, n + 1);
@@ -63,7 +63,7 @@ pub(in crate::kernels::seam) fn naive<const D: usize>(graph: &Graph<'_, D>) -> C
     }
 }
 
-/// The cost of a labelling, from the definition.
+/// Returns the cost of a labelling, by definition.
 pub(in crate::kernels::seam) fn energy<const D: usize>(graph: &Graph<'_, D>, sink: &[bool]) -> i64 {
     let mut sum = 0;
     for p in 0..graph.grid.len() {

@@ -1,4 +1,4 @@
-//! Two trees of residual paths that grow, meet, and adopt what loses its parent.
+//! Two trees of residual paths that grow, meet, and adopt orphans.
 
 use super::{BREATH, ENDS, ORPHAN, ROOT, SINK, SOURCE, Solver, Tree};
 use crate::Result;
@@ -11,7 +11,7 @@ impl<const D: usize> Solver<D> {
         p.wrapping_add_signed(self.offsets[usize::from(ends) % ENDS][axis][side])
     }
 
-    /// Axis and side of the parent, and the parent, of a node that has one.
+    /// Returns axis and side of the parent, and the parent, of a node that has a parent.
     #[inline(always)]
     fn up<const CYCLIC: bool>(&self, p: u32) -> (usize, usize, u32) {
         let parent = usize::from(self.node(p).parent);
@@ -19,8 +19,8 @@ impl<const D: usize> Solver<D> {
         (axis, side, self.neighbour::<CYCLIC>(p, axis, side))
     }
 
-    /// Residual capacity of the arc by which a tree takes `q` from `p`: towards `q` from the source, out of `q` towards the
-    /// sink.
+    /// Returns the residual capacity of the arc between `p` and a node `q` that the tree takes from
+    /// there. In the source's tree the arc leads to `q`, in the sink's tree out of `q`.
     #[inline(always)]
     fn arc<const TREE: usize>(&self, p: u32, q: u32, axis: usize, side: usize) -> i32 {
         if TREE == SOURCE {
@@ -38,7 +38,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Lets both trees grow until nothing is active, or more flows than `most`; returns whether no more does.
+    /// Grows both trees until no node is active or the flow exceeds `most`. Returns whether the
+    /// flow is at most `most`.
     pub(super) fn grow<const CYCLIC: bool>(
         &mut self,
         most: i64,
@@ -62,7 +63,7 @@ impl<const D: usize> Solver<D> {
         Ok(self.value <= most)
     }
 
-    /// Offers the arcs of an active node.
+    /// Offers the arcs of an active node to its neighbours.
     #[inline(always)]
     fn scan<const TREE: usize, const CYCLIC: bool>(
         &mut self,
@@ -73,13 +74,15 @@ impl<const D: usize> Solver<D> {
         for axis in 0..D {
             for side in 0..2 {
                 let q = self.neighbour::<CYCLIC>(p, axis, side);
-                // The same arc again after an augmentation: the neighbour may have been set free, or have stayed.
+                // Try the same arc again after an augmentation: the neighbour may be free now, or
+                // still in the other tree.
                 while self.arc::<TREE>(p, q, axis, side) > 0 {
                     let (stamp, distance) = (self.node(p).stamp, self.node(p).distance + 1);
                     let node = self.node_mut(q);
                     let free = node.tree == Tree::Free;
                     if free || node.tree == tree {
-                        // A node that was counted no later and is farther from the root is better off here.
+                        // A node whose distance is not more recent and is longer gets this shorter
+                        // path.
                         if free || node.stamp <= stamp && node.distance > distance {
                             node.tree = tree;
                             node.parent = (2 * axis + (side ^ 1)) as u8;
@@ -108,7 +111,8 @@ impl<const D: usize> Solver<D> {
         Ok(())
     }
 
-    /// Pushes all that fits along the path that the arc from `p` (in the source's tree) to `q` (in the sink's) closes.
+    /// Pushes the bottleneck along the path through the arc from `p` (in the source's tree) to `q`
+    /// (in the sink's tree).
     fn augment<const CYCLIC: bool>(&mut self, p: u32, q: u32, axis: usize, side: usize) {
         let mut flow = self.node(p).residual[axis][side];
         flow = self.bottleneck::<SOURCE, CYCLIC>(p, flow);
@@ -128,7 +132,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// The least residual capacity between a node and the root of its tree, and that of the root, if less than `flow`.
+    /// Returns the minimum of `flow`, of the residual capacities from a node to the root of its
+    /// tree, and of the root's terminal.
     #[inline(always)]
     fn bottleneck<const TREE: usize, const CYCLIC: bool>(&self, mut p: u32, mut flow: i32) -> i32 {
         while self.node(p).parent != ROOT {
@@ -139,12 +144,14 @@ impl<const D: usize> Solver<D> {
         flow.min(self.node(p).terminal.saturating_abs())
     }
 
-    /// Moves `flow` along the path between a node and the root of its tree. Those that lose their parent become orphans.
+    /// Moves `flow` along the path between a node and the root of its tree. Nodes that lose their
+    /// parent become orphans.
     #[inline(always)]
     fn push<const TREE: usize, const CYCLIC: bool>(&mut self, mut p: u32, flow: i32) {
         while self.node(p).parent != ROOT {
             let (axis, side, up) = self.up::<CYCLIC>(p);
-            // Flow runs from parent to child in the source's tree, from child to parent in the sink's.
+            // Flow runs from parent to child in the source's tree, and from child to parent in the
+            // sink's tree.
             let (tail, head, side) = if TREE == SOURCE {
                 (up, p, side ^ 1)
             } else {
@@ -167,7 +174,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Finds an orphan the parent with the shortest way to a root, or sets it free and orphans its children.
+    /// Gives an orphan the parent with the shortest path to a root. Without such a parent it
+    /// becomes free, and its children become orphans.
     fn adopt<const TREE: usize, const CYCLIC: bool>(&mut self, p: u32) {
         let tree = Tree::OF[TREE];
         let (mut best, mut parent) = (i32::MAX, ORPHAN);
@@ -192,6 +200,7 @@ impl<const D: usize> Solver<D> {
             node.distance = best + 1;
             return;
         }
+        // Set the node free, activate neighbours that can reach it, and orphan its children.
         node.tree = Tree::Free;
         node.stamp = 0;
         for axis in 0..D {
@@ -212,7 +221,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Steps from a node to the root of its tree, unless an orphan is in the way. Marks what it counts.
+    /// Returns the number of steps from a node to the root of its tree, or `None` if an orphan is
+    /// on the path. Marks the counted nodes.
     #[inline(always)]
     fn count<const CYCLIC: bool>(&mut self, q: u32) -> Option<i32> {
         let time = self.time;
@@ -234,6 +244,7 @@ impl<const D: usize> Solver<D> {
             }
             p = self.up::<CYCLIC>(p).2;
         }
+        // Mark the path, so that later counts in this augmentation stop at it.
         let (mut left, mut p) = (distance, q);
         while self.node(p).stamp != time {
             let node = self.node_mut(p);

@@ -1,4 +1,4 @@
-//! The least seam that closes on itself.
+//! The cheapest closed seam.
 
 use super::dual::{Dual, Face};
 use super::search::Between;
@@ -10,14 +10,14 @@ use crate::foundation::par::Monitor;
 #[derive(Debug, Default)]
 pub(super) struct Cycle {
     pub(super) value: u32,
-    /// The pairs of pixels in a row, as `row * width + column`, that it parts.
+    /// The horizontal pairs of pixels that the path separates, as `row * width + column`.
     pub(super) crossings: Vec<u32>,
-    /// Its faces, top copies among them, and how far along it they are.
+    /// The faces of the path, which may be top copies, and their distances along it.
     pub(super) trail: Vec<(u32, u32)>,
 }
 
 impl Dual {
-    /// The shortest path around the cylinder.
+    /// Returns the value and the crossings of the shortest path around the cylinder.
     pub(super) fn closed(&mut self, monitor: &Monitor) -> Result<(u32, Vec<u32>)> {
         let (width, rows) = (self.width, self.rows);
         for f in 0..width {
@@ -37,11 +37,12 @@ impl Dual {
         Ok((cycle.value, cycle.crossings))
     }
 
-    /// The shortest of the paths from the top copy of a face of P to that face; of value `u32::MAX` where there is none.
+    /// Returns the shortest of the paths from the top copy of a face of P to that face. Its value
+    /// is `u32::MAX` if no such path exists.
     pub(super) fn around(&mut self, monitor: &Monitor) -> Result<Cycle> {
         let (width, rows) = (self.width, self.rows);
         let top = self.faces.len() - self.path.len();
-        // Distances from the bottom lead all searches to come.
+        // Distances from the bottom guide all later searches.
         let bottom = self.path.clone();
         self.queue.reset(self.largest, self.mean / 4);
         self.start(&bottom);
@@ -56,7 +57,8 @@ impl Dual {
             value: u32::MAX,
             ..Cycle::default()
         };
-        // The most promising face first, for it prunes the others; then always the middle one.
+        // Search the most promising face first, because its result prunes the others. After that,
+        // always search the middle face of a range.
         let first = (0..n).min_by_key(|&k| bound[k]).unwrap_or(0);
         let mut ranges = vec![(0, n, first, Between::ALL)];
         while let Some((from, to, k, between)) = ranges.pop() {
@@ -73,7 +75,8 @@ impl Dual {
             self.queue.push(bound[k], start, 0);
             self.search::<true>(|f| f == goal, NEVER, between, monitor)?;
             let value = self.faces[goal as usize].distance;
-            // Not to be reached: an earlier seam runs along P here, and is shorter than any seam through this face.
+            // The goal may be unreachable: an earlier seam runs along P here, and is shorter than
+            // any seam through this face.
             if value != NEVER {
                 let crossings = self.crossings(goal);
                 let name = k as u32 + 1;
@@ -85,6 +88,7 @@ impl Dual {
                         trail: self.trail(goal),
                     };
                 }
+                // The new seam bounds the searches to its left and to its right.
                 left.right = name;
                 right.left = name;
             }
@@ -95,7 +99,7 @@ impl Dual {
         Ok(best)
     }
 
-    /// Finds P: the shortest path from one of some faces to one of others.
+    /// Computes P, the shortest path from one of some faces to one of others.
     pub(super) fn lay_path(
         &mut self,
         from: &[u32],
@@ -123,14 +127,15 @@ impl Dual {
         Ok(())
     }
 
-    /// Adds the top copies of the faces of P. The cut goes on beyond both ends of P, in eighths of a turn clockwise from
-    /// east: from the first face back to the one border, from the last face on to the other.
+    /// Adds the top copies of the faces of P. The cut continues beyond both ends of P to the
+    /// borders. `back` and `on` are its directions at the first and the last face, in eighths of a
+    /// turn clockwise from east.
     pub(super) fn cut_open(&mut self, back: usize, on: usize) {
         let path = std::mem::take(&mut self.path);
         self.place = vec![NEVER; self.faces.len()];
         for (k, &p) in path.iter().enumerate() {
             self.place[p as usize] = k as u32;
-            // Clockwise from the way on to the way back: what lies to the right of one who walks along P.
+            // Directions clockwise from the next step to the previous one are to the right of P.
             let on = self.steps.get(k).map_or(on, |&step| eighths(step));
             let back = k
                 .checked_sub(1)
@@ -142,6 +147,7 @@ impl Dual {
             self.down
                 .push(between.fold(0, |bits, angle| bits | 1 << (angle / 2)));
         }
+        // Mark the steps across P as irregular, at both of their faces.
         for (k, &p) in path.iter().enumerate() {
             for d in (0..4).filter(|d| self.down[k] >> d & 1 == 1) {
                 if self.cost(p, d) != NEVER {
@@ -159,7 +165,7 @@ impl Dual {
         self.path = path;
     }
 
-    /// Whether a step parts two pixels of which one at least is between two seams.
+    /// Whether a step separates two pixels, and at least one of them is between two seams.
     pub(super) fn within(&self, f: u32, direction: usize, between: Between) -> bool {
         let f = self.original(f) as usize;
         let (below, j) = (f / self.width - 1, f % self.width);
@@ -174,7 +180,8 @@ impl Dual {
         a.max(b) >= between.left && a.min(b) < between.right
     }
 
-    /// Labels the pixels right of a seam with its name, between the seams that it was searched between.
+    /// Labels the pixels to the right of a seam with its number, within the range that it was
+    /// searched in.
     fn split(&mut self, crossings: &[u32], name: u32, between: Between) {
         let far = sides(crossings, self.rows, self.width);
         for (cell, far) in self.cell.iter_mut().zip(far) {

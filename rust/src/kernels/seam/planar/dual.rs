@@ -11,9 +11,9 @@ pub(super) struct Face {
     pub(super) south: u32,
     /// Cost of the step east, between rows `l - 1` and `l` at column `j + 1`.
     pub(super) east: u32,
-    /// Direction of the last step of the shortest path to it.
+    /// Direction of the last step of the shortest path to this face.
     pub(super) step: u8,
-    /// Directions, as bits, in which the neighbour is not the next face in memory.
+    /// Bits of the directions whose neighbour is not the adjacent face in memory.
     pub(super) odd: u8,
 }
 
@@ -28,7 +28,7 @@ impl Face {
 }
 
 impl Face {
-    /// Takes a shorter way.
+    /// Takes a path to this face if it is shorter than the known one.
     #[inline(always)]
     pub(super) fn offer(&mut self, distance: u32, step: usize) {
         let nearer = distance < self.distance;
@@ -38,9 +38,10 @@ impl Face {
 }
 
 pub(super) struct Dual {
-    /// Faces from `first` on, row by row; before and after them a row of [`Face::NONE`]; then the top copies of P.
+    /// The faces, row by row, with a row of [`Face::NONE`] before and after them, then the top
+    /// copies of P.
     pub(super) faces: Vec<Face>,
-    /// Distance from the bottom of the opened strip.
+    /// Distance of each face from the bottom of the opened strip.
     pub(super) ahead: Vec<u32>,
     pub(super) rows: usize,
     pub(super) width: usize,
@@ -48,13 +49,13 @@ pub(super) struct Dual {
     pub(super) queue: Queue,
     pub(super) largest: u32,
     pub(super) mean: u32,
-    /// P; the direction from each of its faces to the next one; those that leave it downwards, as bits; the place on P of
-    /// each face.
+    /// The faces of P. `steps` has the direction from each face to the next one, and `down` the
+    /// bits of the directions that leave P downwards. `place` has the index on P of each face.
     pub(super) path: Vec<u32>,
     pub(super) steps: Vec<usize>,
     pub(super) down: Vec<u8>,
     pub(super) place: Vec<u32>,
-    /// For each pixel the last seam that it is right of, plus one: 0 where it is left of all.
+    /// For each pixel, the number of the last seam to its left, plus one, or 0 if there is none.
     pub(super) cell: Vec<u32>,
     pub(super) touched: Vec<u32>,
 }
@@ -75,7 +76,8 @@ impl Dual {
                     sum += u64::from(cost);
                 }
             }
-            // The row above this level; the first and the last level of an open strip have pixels on one side only.
+            // Row above this level. The first and the last level of an open strip have pixels on
+            // one side only.
             let above = match (l, strip.cyclic) {
                 (0, true) if rows > 1 => rows - 1,
                 (0, _) => continue,
@@ -109,7 +111,7 @@ impl Dual {
         }
     }
 
-    /// Where a step leads, and its cost: [`NEVER`] where there is no such step.
+    /// Returns the target and the cost of a step. The cost of a missing step is [`NEVER`].
     #[inline(always)]
     pub(super) fn neighbour(&self, f: u32, direction: usize) -> (u32, u32) {
         let (at, width) = (f as usize, self.width);
@@ -125,7 +127,7 @@ impl Dual {
         }
     }
 
-    /// [`Self::neighbour`] across the ends of the rows and across P.
+    /// [`Self::neighbour`] across the ends of rows and across P.
     #[cold]
     fn odd(&self, f: u32, direction: usize) -> (u32, u32) {
         let top = (self.faces.len() - self.path.len()) as u32;
@@ -136,13 +138,14 @@ impl Dual {
             return (f, NEVER);
         }
         let to = self.beside(from, direction);
-        // The place on P of a face that a direction leaves downwards.
+        // Index on P of a face, if the direction leaves P downwards there.
         let downwards = |p: u32, d: usize| {
             let k = *self.place.get(p as usize)?;
             (k != NEVER && self.down[k as usize] >> d & 1 == 1).then_some(k)
         };
         match (copy, downwards(from, direction)) {
-            // The steps downwards from P belong to the copies, which share the steps along P with the faces themselves.
+            // Steps downwards from P belong to the copies. Copies and faces share the steps along
+            // P.
             (None, Some(_)) => (f, NEVER),
             (Some(k), None) if self.steps.get(k) == Some(&direction) => (f + 1, cost),
             (Some(k), None) if k > 0 && self.steps[k - 1] == direction ^ 2 => (f - 1, cost),
@@ -151,7 +154,7 @@ impl Dual {
         }
     }
 
-    /// The face next to an original one, around the cylinder.
+    /// Returns the face next to an original face, modulo the rows if the strip is cyclic.
     pub(super) fn beside(&self, f: u32, direction: usize) -> u32 {
         let (width, last) = (self.width as u32, (self.rows * self.width) as u32);
         match direction {
@@ -164,7 +167,7 @@ impl Dual {
         }
     }
 
-    /// Cost of a step from an original face.
+    /// Returns the cost of a step from an original face.
     pub(super) fn cost(&self, f: u32, direction: usize) -> u32 {
         match direction {
             EAST => self.faces[f as usize].east,
@@ -174,13 +177,14 @@ impl Dual {
         }
     }
 
-    /// The original of a face.
+    /// Returns the original of a face.
     pub(super) fn original(&self, f: u32) -> u32 {
         let top = self.faces.len() - self.path.len();
         (f as usize).checked_sub(top).map_or(f, |k| self.path[k])
     }
 
-    /// The pairs of pixels in a row, as `row * width + column`, that the path to a face parts.
+    /// Returns the horizontal pairs of pixels that the path to a face separates, as `row * width +
+    /// column`.
     pub(super) fn crossings(&self, mut f: u32) -> Vec<u32> {
         let mut crossings = Vec::new();
         loop {
@@ -198,7 +202,7 @@ impl Dual {
         }
     }
 
-    /// The faces of the path to a face, and their distances.
+    /// Returns the faces of the path to a face, and their distances.
     pub(super) fn trail(&self, mut f: u32) -> Vec<(u32, u32)> {
         let mut trail = Vec::new();
         loop {

@@ -1,13 +1,15 @@
-//! Of all least seams around a core the innermost.
+//! The innermost of all cheapest seams around a core.
 //!
-//! A least seam is found together with a maximum flow across it (Miller and Naor, *Flow in planar graphs with multiple sources
-//! and sinks*, SIAM J. Computing 1995): give each face a potential that differs by at most the cost of a step at its two ends
-//! and that rises by the value of the seam once around; the differences are the flow across the edges. Then the pixels from
-//! which flow can still get to the core are inside of all least seams.
+//! A cheapest seam is found together with a maximum flow across it. See Miller and Naor, *Flow in
+//! planar graphs with multiple sources and sinks*, SIAM J. Computing 1995. Each face gets a
+//! potential. Potentials at the two ends of a step differ by at most its cost, and rise by the
+//! value of the seam once around. Their differences are the flow across the edges. The pixels that
+//! can still send flow to the core are inside all cheapest seams.
 //!
-//! 1. along the seam that was found potentials are the distances; inside of it, the shortest ways from there. Across P they
-//!    change by the value, which makes some steps negative, but no way around;
-//! 2. from the core outwards, take each pixel with residual capacity towards what is taken.
+//! 1. Along the seam found, potentials are the distances. Inside it, they are the lengths of the
+//!    shortest paths from the seam. Across P they change by the value of the seam, which makes some
+//!    steps negative, but no closed path.
+//! 2. From the core outwards, take each pixel with residual capacity towards a taken pixel.
 
 use super::cylinder::Cycle;
 use super::dual::Dual;
@@ -16,7 +18,8 @@ use crate::Result;
 use crate::foundation::par::Monitor;
 
 impl Dual {
-    /// Which pixels are inside of the innermost least seam; `core` is inside of all. None where a potential is too large.
+    /// Returns the pixels inside the innermost cheapest seam, or `None` if a potential is too
+    /// large. The pixels of `core` are inside all seams.
     pub(super) fn innermost(
         &mut self,
         cycle: &Cycle,
@@ -31,7 +34,7 @@ impl Dual {
         Ok(Some(self.residual(i64::from(cycle.value), core)))
     }
 
-    /// Bars all steps between two pixels outside.
+    /// Closes all steps between two pixels outside the seam.
     fn close(&mut self, within: &[bool]) {
         let (width, columns) = (self.width, self.width + 1);
         for l in 0..=self.rows {
@@ -48,12 +51,14 @@ impl Dual {
         }
     }
 
-    /// Sets the distance of each face inside of a seam to its potential; returns whether all fit.
+    /// Sets the distance of each face inside a seam to its potential. Returns whether all
+    /// potentials fit.
     fn potentials(&mut self, cycle: &Cycle, monitor: &Monitor) -> Result<bool> {
         let (top, value) = (self.faces.len() - self.path.len(), cycle.value);
-        // Ways that wind about P lead below what they start from, by less than twice the value.
+        // Paths that wind around P can lead to potentials below their start, by less than twice the
+        // value.
         let base = 2 * value;
-        // Keys below the one taken last come in the next turn of the queue.
+        // Keys below the last taken one are found in the next turn of the queue.
         self.queue.reset(2 * value + self.largest, self.mean / 4);
         self.queue.begin(base);
         for &(f, along) in &cycle.trail {
@@ -79,6 +84,7 @@ impl Dual {
                 if cost == NEVER {
                     continue;
                 }
+                // A step across P changes the potential by the value of the seam.
                 let mut next = i64::from(distance) + i64::from(cost);
                 if self.faces[f as usize].odd >> direction & 1 == 1 {
                     next += self.winding(f, direction, to) * i64::from(value);
@@ -96,7 +102,7 @@ impl Dual {
         Ok(true)
     }
 
-    /// The pixels with residual capacity towards the core, over any number of edges.
+    /// Returns the pixels with residual capacity towards the core, over any number of edges.
     fn residual(&self, value: i64, core: Vec<usize>) -> Vec<bool> {
         let (width, columns) = (self.width, self.width + 1);
         let mut taken = vec![false; self.rows * columns];
@@ -107,7 +113,7 @@ impl Dual {
         while let Some(q) = waiting.pop() {
             let (r, c) = (q / columns, q % columns);
             let face = |l: usize, j: usize| ((l + 1) * width + j) as u32;
-            // One who takes the step has the first pixel of the pair at the left hand; flow goes from right to left.
+            // A step has the first pixel of the pair on its left. Flow runs from right to left.
             let around = [
                 (q - columns, face(r, c - 1), EAST, 1),
                 (q + columns, face(r + 1, c - 1), EAST, -1),
@@ -136,7 +142,7 @@ impl Dual {
         taken
     }
 
-    /// How often a step crosses P, from below it upwards.
+    /// Returns how often a step crosses P upwards, minus how often downwards.
     fn winding(&self, f: u32, direction: usize, to: u32) -> i64 {
         let downwards = |p: u32, d: usize| {
             let k = self.place[p as usize];
@@ -145,7 +151,7 @@ impl Dual {
         i64::from(downwards(to, direction ^ 2)) - i64::from(downwards(f, direction))
     }
 
-    /// Where a step of a strip that is not cyclic leads, P or not, and its cost.
+    /// Returns the target and the cost of a step in a strip that is not cyclic, ignoring P.
     #[inline(always)]
     fn plain(&self, f: u32, direction: usize) -> (u32, u32) {
         let (at, width) = (f as usize, self.width);

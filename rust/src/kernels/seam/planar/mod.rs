@@ -1,23 +1,28 @@
 //! The minimum cut between two opposite borders of a 2-D grid, as a shortest path on its dual.
 //!
-//! A seam between the left and the right border crosses from face to face of the grid: its cost is the length of a path on
-//! the planar dual, so the least seam is a shortest path (Ford and Fulkerson 1956; Hassin, *Maximum flow in (s,t) planar
-//! networks*, Information Processing Letters 1981). The path may turn back: this is not a row-by-row recurrence.
+//! A seam between the left and the right border runs from face to face of the grid. Its cost is the
+//! length of a path on the planar dual, so the cheapest seam is a shortest path. See Ford and
+//! Fulkerson 1956, and Hassin, *Maximum flow in (s,t) planar networks*, Information Processing
+//! Letters 1981. The path may turn back, in contrast to a row-by-row recurrence.
 //!
-//! Where the rows are cyclic the seam must close on itself (Reif, *Minimum s-t cut of a planar undirected network in
-//! O(n log^2 n) time*, SIAM J. Computing 1983):
+//! If the rows are cyclic, the seam must be closed. The method is that of Reif, *Minimum s-t cut of
+//! a planar undirected network in O(n log^2 n) time*, SIAM J. Computing 1983:
 //!
-//! 1. a shortest path P from the left to the right border of the dual; some least seam crosses it once;
-//! 2. the cylinder is cut open along P, whose faces become two: a *top* copy and the face itself at the bottom;
-//! 3. for a face of P, the shortest path from its top copy to itself is the least seam through it;
-//! 4. such paths need not cross each other, so each one splits the strip, and the faces to its left and right on P are
-//!    searched on their side only.
+//! 1. a shortest path P leads from the left to the right border of the dual; some cheapest seam
+//!    crosses it once;
+//! 2. the cylinder is cut open along P, whose faces are doubled: a *top* copy, and the face itself
+//!    at the bottom;
+//! 3. for a face of P, the shortest path from its top copy to itself is the cheapest seam through
+//!    it;
+//! 4. such paths need not cross each other, so each path splits the strip. The faces of P to its
+//!    left and right are searched only on their side.
 //!
-//! Departures: distances from the bottom of the opened strip are computed once. They lead every search (A*) and bound the
-//! seams through each face of P from below, so that faces that cannot do better are never searched: on natural images
-//! that leaves a few searches of the hundreds.
+//! Departure from the paper: distances from the bottom of the opened strip are computed once. They
+//! guide every search (A*) and are lower bounds of the seams through each face of P. Faces that
+//! cannot do better are not searched. On natural images, a few of hundreds of searches remain.
 //!
-//! A seam around a core ([`ring`]) is the same on an annulus, with P from its rim to the core.
+//! A seam around a core ([`ring`]) is the same problem on an annulus, with P from its rim to the
+//! core.
 
 mod cylinder;
 mod dual;
@@ -30,53 +35,57 @@ use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 use dual::Dual;
 
-/// A strip of pixels: the first column is on one side of the seam, the last column on the other.
+/// A strip of pixels. The first column is on one side of the seam, the last column on the other
+/// side.
 #[derive(Debug, Clone, Copy)]
 pub struct Strip<'a> {
-    /// Rows, along which the seam runs.
+    /// Number of rows. The seam runs along them.
     pub rows: usize,
-    /// Columns, at least two.
+    /// Number of columns, at least two.
     pub columns: usize,
-    /// Whether the last row is followed by the first.
+    /// Whether the first row follows the last one.
     pub cyclic: bool,
-    /// Cost of parting each pixel from the next one in its row: rows x columns, the last column ignored.
+    /// Cost of separating each pixel from the next one in its row: rows x columns, the last column
+    /// is ignored.
     pub across: &'a [u32],
-    /// Cost of parting each pixel from the next one in its column: rows x columns, the last row ignored unless cyclic.
+    /// Cost of separating each pixel from the next one in its column: rows x columns. The last row
+    /// is ignored unless the strip is cyclic.
     pub along: &'a [u32],
 }
 
-/// A least seam.
+/// A cheapest seam.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seam {
-    /// Whether each pixel is on the side of the last column.
+    /// Flags of the pixels on the side of the last column.
     pub far: Vec<bool>,
-    /// Cost of all edges that are cut.
+    /// Sum of the costs of all cut edges.
     pub value: u32,
 }
 
-/// No edge, no distance; the sum of two fits.
+/// Cost of a missing edge, and an unknown distance. The sum of two fits `u32`.
 const NEVER: u32 = u32::MAX >> 1;
-/// No sum of a whole straight row or column may reach this, so that no distance overflows.
+/// Limit of the sum along a whole straight row or column, so that distances do not overflow.
 pub(super) const LONGEST: u64 = 1 << 30;
-/// Directions on the dual, clockwise: opposite ones differ by two.
+/// Directions on the dual, clockwise. Opposite directions differ by two.
 const EAST: usize = 0;
 const SOUTH: usize = 1;
 const WEST: usize = 2;
 const NORTH: usize = 3;
-/// Step that led to a start.
+/// Step of a face where a search starts.
 const START: u8 = 4;
-/// Faces taken between two looks at the monitor.
+/// Number of faces taken between checks of the monitor.
 const BREATH: usize = 1 << 14;
 
-/// A direction as an angle in eighths of a turn, clockwise from east.
+/// Returns a direction as an angle in eighths of a turn, clockwise from east.
 const fn eighths(direction: usize) -> usize {
     2 * direction
 }
 
-/// The least seam of a strip.
+/// Returns the cheapest seam of a strip.
 ///
 /// # Errors
-/// Fewer than two columns, arrays that do not fit, or costs of which a straight row or column sums to 2^30 or more.
+/// There are fewer than two columns, arrays do not fit, or costs along a straight row or column sum
+/// to 2^30 or more.
 pub fn least_seam(strip: &Strip<'_>, monitor: &Monitor) -> Result<Seam> {
     check(strip)?;
     let mut dual = Dual::new(strip);
@@ -96,8 +105,8 @@ pub fn least_seam(strip: &Strip<'_>, monitor: &Monitor) -> Result<Seam> {
     })
 }
 
-/// Which pixels lie beyond a seam that parts these pairs of pixels (`row * width + column`) of rows of `width` pairs. Pairs
-/// that are parted twice are not parted.
+/// Returns the pixels beyond a seam. `crossings` are the separated pairs (`row * width + column`)
+/// in rows of `width` pairs. A pair that occurs twice is not separated.
 fn sides(crossings: &[u32], rows: usize, width: usize) -> Vec<bool> {
     let mut far = vec![false; rows * (width + 1)];
     for &at in crossings {
@@ -142,7 +151,8 @@ fn check(strip: &Strip<'_>) -> Result<()> {
     Ok(())
 }
 
-/// The largest sum of costs along a straight seam or straight across it: no shortest path is longer.
+/// Returns the largest sum of costs along a straight seam or straight across it. No shortest path
+/// is longer.
 pub(super) fn longest<C: Copy, T>(
     columns: usize,
     across: &[C],
@@ -162,7 +172,8 @@ where
         for (sum, &cost) in sums[..columns - 1].iter_mut().zip(across) {
             *sum = *sum + value(cost);
         }
-        // Sums beside each other, for one alone waits for each addition.
+        // Use several partial sums, because with one sum each addition would wait for the previous
+        // one.
         let (chunks, rest) = along.as_chunks::<8>();
         let mut lanes = [T::default(); 8];
         for chunk in chunks {

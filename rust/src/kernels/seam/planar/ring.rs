@@ -1,8 +1,8 @@
-//! The least seam around a core.
+//! The cheapest seam around a core.
 //!
-//! What must stay outside and what must be inside are each in one piece, the former if it may be joined around the grid. So
-//! all seams are closed paths on an annulus of the dual, which is cut open along a shortest path P from the one to the other
-//! as a cylinder is.
+//! The outside and the inside are each connected; the outside may be connected across the border of
+//! the grid. All seams are then closed paths on an annulus of the dual. Like a cylinder, it is cut
+//! open along a shortest path P from the outside to the inside.
 
 use super::cylinder::Cycle;
 use super::dual::Dual;
@@ -10,43 +10,46 @@ use super::{NEVER, Strip};
 use crate::Result;
 use crate::foundation::par::Monitor;
 
-/// Where a pixel must be.
+/// Required side of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// Anywhere.
+    /// Either side.
     Free,
-    /// Outside of the seam.
+    /// Outside the seam.
     Outside,
-    /// Inside.
+    /// Inside the seam.
     Inside,
 }
 
-/// A grid of pixels of which some must be inside of a seam and others outside.
+/// A grid of pixels. Some must be inside a seam and others outside.
 #[derive(Debug, Clone, Copy)]
 pub struct Ring<'a> {
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Columns.
+    /// Number of columns.
     pub columns: usize,
-    /// Where each pixel must be.
+    /// Required side of each pixel.
     pub sides: &'a [Side],
-    /// Cost of parting each pixel from the next one in its row, the last column ignored; less than 2^27.
+    /// Cost of separating each pixel from the next one in its row, less than 2^27. The last column
+    /// is ignored.
     pub across: &'a [i32],
-    /// Cost of parting each pixel from the next one in its column, the last row ignored; less than 2^27.
+    /// Cost of separating each pixel from the next one in its column, less than 2^27. The last row
+    /// is ignored.
     pub along: &'a [i32],
 }
 
-/// Seams that cost this or more are left to others, so that no sum overflows.
+/// Seams of at least this cost are left to another solver, so that sums do not overflow.
 const DEAREST: u32 = 1 << 28;
-/// The pixels at a face, by the angle at which they lie: south-east, south-west, north-west, north-east; their distance
-/// down and to the right of the one in the north-west.
+/// The pixels around a face: the angle (south-east, south-west, north-west, north-east), and the
+/// offset down and to the right from the north-western pixel.
 const AROUND: [(usize, [usize; 2]); 4] = [(1, [1, 1]), (3, [1, 0]), (5, [0, 0]), (7, [0, 1])];
 
-/// Which pixels are inside of the least seam: of all least seams the innermost. None where the problem is another one: the
-/// inside absent or in pieces, the outside in pieces that do not all meet the border, or costs that are too large.
+/// Returns the pixels inside the cheapest seam, the innermost one if there are several. The result
+/// is `None` if this solver does not apply. Then the inside is missing or not connected, the
+/// outside has parts that do not meet the border, or costs are too large.
 ///
 /// # Errors
-/// A monitor that was cancelled.
+/// The monitor was cancelled.
 pub fn least_ring(ring: &Ring<'_>, monitor: &Monitor) -> Result<Option<Vec<bool>>> {
     let annulus = Annulus::new(ring);
     if !annulus.is_whole() {
@@ -58,6 +61,8 @@ pub fn least_ring(ring: &Ring<'_>, monitor: &Monitor) -> Result<Option<Vec<bool>
     for &f in &inner {
         arrived[f as usize] = true;
     }
+    // Cut the annulus open along a path from the outside to the inside, and search the closed
+    // paths.
     dual.lay_path(&outer, &inner, |f| arrived[f as usize], monitor)?;
     let [first, last] = [dual.path[0], dual.path[dual.path.len() - 1]];
     let back = annulus.angle(first, Side::Outside);
@@ -74,6 +79,7 @@ pub fn least_ring(ring: &Ring<'_>, monitor: &Monitor) -> Result<Option<Vec<bool>
     let Some(far) = dual.innermost(&cycle, inside.collect(), monitor)? else {
         return Ok(None);
     };
+    // Remove the frame.
     let rows = far.chunks_exact(annulus.columns).skip(1).take(ring.rows);
     Ok(Some(
         rows.flat_map(|row| &row[1..=ring.columns])
@@ -82,7 +88,7 @@ pub fn least_ring(ring: &Ring<'_>, monitor: &Monitor) -> Result<Option<Vec<bool>
     ))
 }
 
-/// The grid with a frame of pixels outside.
+/// The grid with a frame of outside pixels.
 struct Annulus {
     rows: usize,
     columns: usize,
@@ -108,7 +114,7 @@ impl Annulus {
                 }
             }
         }
-        // What is on one side is never parted.
+        // Pixels of the same side are never separated.
         let tied = |p: usize, q: usize| sides[p] == sides[q] && sides[p] != Side::Free;
         for p in 0..sides.len() {
             if p + 1 < sides.len() && tied(p, p + 1) {
@@ -127,7 +133,7 @@ impl Annulus {
         }
     }
 
-    /// Whether the outside and the inside are each in one piece.
+    /// Whether the outside and the inside are each connected.
     fn is_whole(&self) -> bool {
         let count = |side| self.sides.iter().filter(|&&s| s == side).count();
         let Some(core) = self.sides.iter().position(|&s| s == Side::Inside) else {
@@ -136,7 +142,7 @@ impl Annulus {
         self.piece(core) == count(Side::Inside) && self.piece(0) == count(Side::Outside)
     }
 
-    /// Pixels of the piece of its side that a pixel is in.
+    /// Returns the number of pixels of the same side that are connected to a pixel.
     fn piece(&self, seed: usize) -> usize {
         let (side, columns) = (self.sides[seed], self.columns);
         let n = self.sides.len();
@@ -145,7 +151,7 @@ impl Annulus {
         let (mut waiting, mut count) = (vec![seed], 0);
         while let Some(p) = waiting.pop() {
             count += 1;
-            // Around the ends of the rows the frame is one piece.
+            // The frame connects the ends of each row with the next row.
             let beside = [
                 p.checked_sub(columns),
                 p.checked_sub(1),
@@ -178,7 +184,7 @@ impl Annulus {
         dual
     }
 
-    /// The faces at pixels of a side that are at others too.
+    /// Returns the faces that touch both this side and other pixels.
     fn faces(&self, side: Side) -> Vec<u32> {
         let (columns, width) = (self.columns, self.columns - 1);
         let mut faces = Vec::new();
@@ -187,7 +193,7 @@ impl Annulus {
                 let p = r * columns + c;
                 let here = [p, p + 1, p + columns, p + columns + 1].map(|p| self.sides[p] == side);
                 if here != [here[0]; 4] {
-                    // The face above row r + 1; the first row of faces is no face.
+                    // A face is above row r + 1, and the first row of faces is padding.
                     faces.push(((r + 2) * width + c) as u32);
                 }
             }
@@ -195,7 +201,7 @@ impl Annulus {
         faces
     }
 
-    /// At which angle a pixel of a side lies at a face.
+    /// Returns the angle of a pixel of this side at a face.
     fn angle(&self, face: u32, side: Side) -> Option<usize> {
         let (columns, width) = (self.columns, self.columns - 1);
         let (r, c) = (

@@ -3,7 +3,7 @@ use crate::foundation::grid::Grid;
 use crate::kernels::seam::maxflow::{Graph, min_cut};
 use proptest::prelude::*;
 
-/// What can reach the inside, by maximum flow.
+/// Returns the pixels that can reach the inside, by maximum flow.
 fn by_flow(ring: &Ring<'_>) -> Vec<bool> {
     let terminal: Vec<i32> = ring
         .sides
@@ -23,7 +23,7 @@ fn by_flow(ring: &Ring<'_>) -> Vec<bool> {
     min_cut(&graph, &Monitor::default()).unwrap().sink
 }
 
-/// A walk over the grid: pixels in one piece.
+/// Pixels of a random walk over the grid, which are connected.
 fn blob(rows: usize, columns: usize, start: [usize; 2], steps: &[u8]) -> Vec<usize> {
     let [mut r, mut c] = [start[0] % rows, start[1] % columns];
     let mut pixels = vec![r * columns + c];
@@ -61,7 +61,7 @@ impl Case {
     }
 }
 
-/// Costs with many ties, free edges and walls among them.
+/// Costs with many ties, including zeros and high walls.
 fn costs(n: usize) -> impl Strategy<Value = Vec<i32>> {
     (0i32..40).prop_flat_map(move |most| {
         let cost = prop_oneof![6 => 0..=most, 1 => Just(0), 1 => Just(most * 20)];
@@ -69,7 +69,7 @@ fn costs(n: usize) -> impl Strategy<Value = Vec<i32>> {
     })
 }
 
-/// A core made by a walk; some pixels outside, at random or along the border.
+/// A core made by a random walk. Outside pixels are random or along the border.
 fn cases(longest: usize) -> impl Strategy<Value = Case> {
     (1..=longest, 1..=longest).prop_flat_map(|(rows, columns)| {
         let n = rows * columns;
@@ -105,7 +105,7 @@ fn cases(longest: usize) -> impl Strategy<Value = Case> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
-    /// The very set that the maximum flow leaves to the inside, ties included.
+    /// The result must be the same set as that of the maximum flow, including ties.
     #[test]
     fn equals_the_maximum_flow(case in cases(12)) {
         if let Some(inside) = least_ring(&case.ring(), &Monitor::default()).unwrap() {
@@ -114,7 +114,7 @@ proptest! {
     }
 }
 
-/// Sides and costs 1 from a picture: `o` outside, `x` inside.
+/// Solves a problem with costs 1 whose sides are drawn: `o` is outside, `x` is inside.
 fn drawn(picture: &[&str]) -> Option<Vec<bool>> {
     let (rows, columns) = (picture.len(), picture[0].len());
     let sides: Vec<Side> = picture
@@ -144,11 +144,11 @@ fn drawn(picture: &[&str]) -> Option<Vec<bool>> {
 #[test]
 fn knows_what_it_cannot_do() {
     assert!(drawn(&["ooooo", "o...o", "o.x.o", "o...o", "ooooo"]).is_some());
-    // Two cores, no core, and an outside in the middle.
+    // Cases: two cores, no core, and an outside in the middle.
     assert!(drawn(&["oooooo", "ox..xo", "oooooo"]).is_none());
     assert!(drawn(&["ooo", "o.o", "ooo"]).is_none());
     assert!(drawn(&["xxxxx", "x...x", "x.o.x", "x...x", "xxxxx"]).is_none());
-    // A core at the border and a rim in two pieces are seams around it nevertheless.
+    // A core at the border and a rim in two parts can still be solved.
     assert!(drawn(&["x...o", "....o", "o...o"]).is_some());
 }
 
@@ -158,7 +158,7 @@ fn of_equal_seams_the_innermost() {
     assert_eq!(inside.iter().filter(|&&i| i).count(), 1);
 }
 
-/// Costs so large that sums would not fit are left to others.
+/// Larger costs, whose sums would not fit, are left to another solver.
 #[test]
 fn refuses_what_would_overflow() {
     let sides = [

@@ -5,7 +5,8 @@ use super::{BREATH, EAST, NEVER, NORTH, SOUTH, START, WEST};
 use crate::Result;
 use crate::foundation::par::Monitor;
 
-/// Between which seams a search stays: pixels right of all seams have cells from `left` on and below `right`.
+/// The seams that a search stays between. Pixels between them have cells from `left` (inclusive) to
+/// `right` (exclusive).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Between {
     pub(super) left: u32,
@@ -20,13 +21,14 @@ impl Between {
 }
 
 impl Dual {
-    /// The shortest path from above the first row to below the last one.
+    /// Returns the value and the crossings of the shortest path from above the first row to below
+    /// the last one.
     pub(super) fn open(&mut self, monitor: &Monitor) -> Result<(u32, Vec<u32>)> {
         let width = self.width;
         let start: Vec<u32> = (width..2 * width).map(|f| f as u32).collect();
         let goal = ((self.rows + 1) * width) as u32;
-        // Most shortest paths never turn back, or once: sweeps find these, in the order of memory, and leave the rest to
-        // the queue.
+        // Most shortest paths turn back at most once. Sweeps in memory order find these, and the
+        // queue finds the rest.
         for &f in &start {
             self.faces[f as usize].distance = 0;
         }
@@ -41,7 +43,7 @@ impl Dual {
         Ok((self.faces[end as usize].distance, self.crossings(end)))
     }
 
-    /// Makes faces the starts of searches.
+    /// Makes faces the starts of a search.
     pub(super) fn start(&mut self, start: &[u32]) {
         for &f in start {
             let face = &mut self.faces[f as usize];
@@ -50,8 +52,9 @@ impl Dual {
         }
     }
 
-    /// Finds the shortest paths that begin with what is in the queue, to all that is no farther than the nearest goal, or
-    /// than `last`. `LED` searches look ahead and stay between two seams.
+    /// Finds the shortest paths from the faces in the queue to all faces up to the distance of the
+    /// nearest goal, or up to `last`. `LED` searches are guided by distances ahead and stay between
+    /// two seams.
     pub(super) fn search<const LED: bool>(
         &mut self,
         goals: impl Fn(u32) -> bool,
@@ -69,7 +72,7 @@ impl Dual {
                 continue;
             }
             if goals(f) {
-                // Its bucket may hold nearer ones.
+                // The same bucket may contain nearer faces, so continue.
                 last = last.min(distance);
                 continue;
             }
@@ -98,7 +101,8 @@ impl Dual {
         Ok(())
     }
 
-    /// Carries distances along each row both ways and on to the next row, over all rows of an open strip.
+    /// Propagates distances along each row in both directions and on to the next row, over all rows
+    /// of an open strip.
     pub(super) fn sweep(&mut self, southwards: bool) {
         let width = self.width;
         for i in 0..=self.rows {
@@ -127,7 +131,7 @@ impl Dual {
         }
     }
 
-    /// Puts the faces of an open strip from which a shorter way leads on into the queue.
+    /// Queues the faces of an open strip that offer a shorter path to a neighbour.
     pub(super) fn enqueue(&mut self, last: u32) {
         let width = self.width;
         for f in width..(self.rows + 2) * width {
@@ -144,16 +148,16 @@ impl Dual {
         }
     }
 
-    /// The nearest of some faces, the first one of equals.
+    /// Returns the nearest of some faces. Ties go to the first.
     pub(super) fn nearest(&self, faces: impl Iterator<Item = u32>) -> u32 {
         faces
             .min_by_key(|&f| self.faces[f as usize].distance)
             .expect("a dual has faces in each row and column")
     }
 
-    /// Makes all distances unknown again.
+    /// Resets all distances.
     pub(super) fn forget(&mut self) {
-        // A search that was led lists what it touched; others touch nearly everything.
+        // A guided search lists the faces that it touched. Other searches touch nearly all faces.
         if self.ahead.is_empty() || self.cell.is_empty() {
             for face in &mut self.faces {
                 face.distance = NEVER;

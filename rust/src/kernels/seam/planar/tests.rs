@@ -3,7 +3,8 @@ use crate::foundation::grid::Grid;
 use crate::kernels::seam::maxflow::{Graph, min_cut};
 use proptest::prelude::*;
 
-/// The same cut by maximum flow: the first column tied to the source, the last one to the sink.
+/// Returns the same cut by maximum flow, with the first column tied to the source and the last one
+/// to the sink.
 fn by_flow(strip: &Strip<'_>) -> i64 {
     let n = strip.rows * strip.columns;
     let signed = |costs: &[u32]| -> Vec<i32> { costs.iter().map(|&c| c as i32).collect() };
@@ -24,7 +25,7 @@ fn by_flow(strip: &Strip<'_>) -> i64 {
     min_cut(&graph, &Monitor::default()).unwrap().value
 }
 
-/// Cost of a labelling, from the definition.
+/// Returns the cost of a labelling, by definition.
 fn value(strip: &Strip<'_>, far: &[bool]) -> u32 {
     let grid = Grid::new([strip.rows, strip.columns], [strip.cyclic, false]).unwrap();
     let mut sum = 0;
@@ -41,7 +42,7 @@ fn value(strip: &Strip<'_>, far: &[bool]) -> u32 {
 }
 
 fn costs(n: usize, most: u32) -> impl Strategy<Value = Vec<u32>> {
-    // Mostly small ones with a few walls, so that shortest paths turn back.
+    // Costs are mostly small with a few walls, so that shortest paths turn back.
     let cost = prop_oneof![3 => 0..=most, 1 => Just(most * 20)];
     prop::collection::vec(cost, n)
 }
@@ -72,7 +73,7 @@ proptest! {
     }
 }
 
-/// Diagonal stripes: seams that close must cross them, which misleads every lower bound.
+/// A closed seam must cross diagonal stripes, which makes every lower bound misleading.
 #[test]
 fn a_cyclic_seam_crosses_diagonal_stripes() {
     let (rows, columns) = (40, 57);
