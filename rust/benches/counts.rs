@@ -1,5 +1,5 @@
-//! The hottest kernels, each run once on little data, for a tool that counts instructions: see
-//! `.ci/counts`.
+//! The hottest kernels, each run once on little data. The tool `.ci/counts` counts their
+//! instructions.
 //!
 //! `counts NAME` runs one kernel. Only instructions within [`measured`] are counted, on one thread.
 

@@ -5,8 +5,8 @@
 //! image. In the overlap:
 //!
 //! 1. pixels of a core are tied to its image;
-//! 2. other pixels are tied to A if they are next to a pixel that only A covers, or else to B if
-//!    next to one that only B covers;
+//! 2. other pixels next to a pixel that only A covers are tied to A, then those next to one of B to
+//!    B;
 //! 3. the remaining pixels minimise the sum of the costs of the cut edges ([`super::cost`]); among
 //!    equal sums, as few pixels as possible take B.
 //!
@@ -18,8 +18,8 @@
 //! - The existing image A has priority at pixels that touch both.
 //! - A `penalty` keeps seams away from chosen pixels.
 //! - An old seam is a pairwise term with one cost for each labelling. It follows Kolmogorov and
-//!   Zabih, *What energy functions can be minimized via graph cuts?*, PAMI 2004, and gives the same
-//!   cuts as Kwatra's extra node with fewer nodes.
+//!   Zabih, *What energy functions can be minimized via graph cuts?*, PAMI 2004. Kwatra's extra
+//!   node gives the same cuts with more nodes.
 
 use super::cost::{FARTHEST, Pair, capacity, scale};
 use super::links;

@@ -1,29 +1,30 @@
-//! Unknowns parted in two, by some that lie between.
+//! Division of unknowns into two parts and a separator between them.
 
 use super::NONE;
 use super::grid::{AXES, Grid, Item, Links};
 use crate::Result;
 use crate::foundation::memory;
 
-/// A level of more than one in so many unknowns is wide.
+/// A level is wide if it contains more than one in this number of unknowns.
 const MANY: usize = 4;
-/// How many times as many others as is usual hubs have to do with.
+/// An unknown is a hub if it is coupled to this multiple of the average number of others.
 const HUB: usize = 4;
 
-/// What becomes of a part.
+/// Result of the division of a part.
 pub(super) enum Cut {
-    /// It is eliminated at once.
+    /// The part is eliminated at once.
     Leaf,
-    /// So many unknowns of the first and of the second side come first; what is left parts them.
+    /// The unknowns of the first and then of the second side come first. The remaining ones
+    /// separate them.
     Parts { low: usize, high: usize },
-    /// So many each have nothing to do with each other.
+    /// Numbers of unknowns of parts that are not coupled to each other.
     Pieces(Vec<usize>),
 }
 
-/// Working memory.
+/// Scratch memory.
 pub(super) struct Scratch {
     items: Vec<Item>,
-    /// Of unknowns of no grid: how far from the start of the search.
+    /// Distance from the start of the search, for unknowns that are not on a grid.
     level: Vec<u32>,
     counts: Vec<u32>,
 }
@@ -38,7 +39,7 @@ impl Scratch {
         })
     }
 
-    /// Parts unknowns of a grid, along the axis where that is cheapest.
+    /// Divides unknowns of a grid along the axis with the cheapest separator.
     pub(super) fn cut_grid(&mut self, part: &mut [Item], grid: Grid) -> Cut {
         let (low, high) = bound(part);
         let sizes: [usize; AXES] = std::array::from_fn(|k| (high[k] - low[k]) as usize + 1);
@@ -47,6 +48,7 @@ impl Scratch {
         let (rows, rest) = self.counts.split_at_mut(sizes[0]);
         let (columns, rest) = rest.split_at_mut(sizes[1]);
         let (falling, rising) = rest.split_at_mut(sizes[2]);
+        // Count the unknowns on each line of each axis, and choose the best line.
         for item in part.iter() {
             rows[(item[0] - low[0]) as usize] += 1;
             columns[(item[1] - low[1]) as usize] += 1;
@@ -72,11 +74,13 @@ impl Scratch {
         Cut::Leaf
     }
 
-    /// Parts unknowns of no grid, along a level of a search from one that lies far out.
+    /// Divides unknowns that are not on a grid, along a level of a breadth-first search from a
+    /// remote unknown.
     pub(super) fn cut_levels(&mut self, part: &mut [Item], links: &Links) -> Cut {
         const HERE: u32 = NONE - 1;
         let mut start = part[0][1];
         let (mut levels, mut found) = (0, 0);
+        // Repeat the search from the last unknown found, which is more remote, at most three times.
         for _ in 0..3 {
             for item in part.iter() {
                 self.level[item[1] as usize] = HERE;
@@ -105,6 +109,7 @@ impl Scratch {
             }
             (levels, start) = (far, last);
         }
+        // If the search does not reach all unknowns, the part is not connected.
         if found < part.len() {
             return self.list_pieces(part, links, found, HERE);
         }
@@ -118,7 +123,8 @@ impl Scratch {
         }
         let cut = match choose(&self.counts, 1) {
             Some((_, at)) if self.counts[at] as usize > part.len() / MANY => {
-                // Levels are wide where a few have to do with most.
+                // A wide level means that a few hubs are coupled to most unknowns, so cut at the
+                // hubs.
                 let hubs = self.list_hubs(part, links);
                 self.cut_at(part, links, at, &hubs)
             }
@@ -131,7 +137,8 @@ impl Scratch {
         cut
     }
 
-    /// Lists what has to do with many times as many of a part as others have, in order.
+    /// Returns the hubs of a part in order: unknowns that are coupled to many more unknowns of the
+    /// part than usual.
     fn list_hubs(&self, part: &[Item], links: &Links) -> Vec<u32> {
         let inside = |&&other: &&u32| self.level[other as usize] != NONE;
         let degree = |item: &Item| links.of(item[1]).iter().filter(inside).count();
@@ -144,7 +151,7 @@ impl Scratch {
         hubs
     }
 
-    /// Parts unknowns along a level, or by hubs, where there are some and these are fewer.
+    /// Divides unknowns along a level, or at the hubs if there are fewer of them.
     fn cut_at(&mut self, part: &mut [Item], links: &Links, at: usize, hubs: &[u32]) -> Cut {
         if (1..self.counts[at] as usize).contains(&hubs.len()) {
             return self.share_out(part, |item| {
@@ -156,7 +163,7 @@ impl Scratch {
             let own = level[item[1] as usize];
             let parts = || {
                 let mut others = links.of(item[1]).iter();
-                // Those of another part are none.
+                // Unknowns of other parts have the level [`NONE`], so they do not count.
                 others.any(|&other| level[other as usize] == at + 1)
             };
             if own < at || (own == at && !parts()) {
@@ -169,7 +176,7 @@ impl Scratch {
         cut
     }
 
-    /// Lists what has to do with each other piece by piece, after `found` of one piece.
+    /// Lists connected unknowns piece by piece. The first `found` unknowns are one piece.
     fn list_pieces(&mut self, part: &mut [Item], links: &Links, found: usize, here: u32) -> Cut {
         let mut sizes = vec![found];
         let (mut read, mut found) = (found, found);
@@ -200,10 +207,12 @@ impl Scratch {
         Cut::Pieces(sizes)
     }
 
-    /// Brings the unknowns of either side, and then those between, together, each in their order.
+    /// Groups the unknowns of the first side, of the second side and of the separator, each in
+    /// their order.
     fn share_out(&mut self, part: &mut [Item], side: impl Fn(&Item) -> usize) -> Cut {
         let sides = &mut self.items[..part.len()];
-        // The first side stays in place, the second and what lies between come back after it, the latter from behind.
+        // The first side stays in place. The second side and the separator are buffered and copied
+        // behind it, the separator in reverse.
         let (mut low, mut high, mut between) = (0, 0, part.len());
         for i in 0..part.len() {
             let item = part[i];
@@ -233,7 +242,7 @@ impl Scratch {
     }
 }
 
-/// The least and the largest places along all axes.
+/// Returns the lowest and the highest places along all axes.
 fn bound(part: &[Item]) -> (Item, Item) {
     let (mut low, mut high) = ([u32::MAX; AXES], [0; AXES]);
     for item in part {
@@ -245,14 +254,15 @@ fn bound(part: &[Item]) -> (Item, Item) {
     (low, high)
 }
 
-/// The first of `reach` lines that part the others best: that are few, and leave as many on either side.
+/// Returns the cost and the first of `reach` lines that are the best separator: few unknowns, and
+/// equal numbers on both sides.
 fn choose(counts: &[u32], reach: usize) -> Option<(f64, usize)> {
     let total: u64 = counts.iter().map(|&n| u64::from(n)).sum();
     let mut best: Option<(f64, usize)> = None;
     let mut low = 0u64;
     let mut between: u64 = counts.iter().take(reach).map(|&n| u64::from(n)).sum();
     for at in 0..counts.len().saturating_sub(reach) {
-        // Lines from `at` on, of which `between` are parting.
+        // The lines from `at` on are the separator, with `between` unknowns.
         let high = total - low - between;
         if low > 0 && high > 0 {
             let all = (low + high) as f64;

@@ -1,17 +1,18 @@
-//! The dense part: a front's own columns are factored, and what they leave is taken off the rest.
+//! The dense part: the columns of a front are factored, and their contribution is subtracted from
+//! the rest.
 //!
-//! Arrays lie column by column. Every number is a sum over the columns before it, in their order, and nothing is fused: the
-//! same bytes for any registers.
+//! Arrays are stored column by column. Every number is a sum over the previous columns in their
+//! order, and no operation is fused. The result is therefore the same for all registers.
 
 use super::plan::TILE;
 use crate::Result;
 use crate::foundation::par::Monitor;
 use crate::foundation::wide::{wide_fn, widest_fn};
 
-/// The most rows that are handled at once.
+/// Maximum number of rows that are processed together.
 const TALL: usize = 16;
 
-/// Of some rows and four further ones: the products with each other, summed over columns of some `height`.
+/// Returns the products of `N` rows with four further rows, summed over columns of `height`.
 #[inline(always)]
 fn multiply<const N: usize>(
     columns: &[f64],
@@ -36,13 +37,14 @@ fn multiply<const N: usize>(
     sums
 }
 
-/// Whether a positive definite matrix may have a number on the diagonal.
+/// Whether a positive definite matrix may have this number on the diagonal.
 #[inline(always)]
 pub(super) fn is_pivot(number: f64) -> bool {
     number > 0.0 && number < f64::INFINITY
 }
 
-/// The factor of four by four numbers, whose diagonal is one by that of the factor, or none.
+/// Factors a 4 x 4 tile, and stores the reciprocals of the factor's diagonal. Returns false if the
+/// tile is not positive definite.
 #[inline(always)]
 fn factor_tile(tile: &mut [[f64; TILE]; TILE]) -> bool {
     for j in 0..TILE {
@@ -64,7 +66,8 @@ fn factor_tile(tile: &mut [[f64; TILE]; TILE]) -> bool {
     true
 }
 
-/// Rows of four columns of the factor: less what those before leave, and divided by the factor's tile.
+/// Computes rows of four columns of the factor: subtracts the contribution of previous columns, and
+/// divides by the factored tile.
 #[inline(always)]
 fn divide<const N: usize>(
     done: &[f64],
@@ -95,14 +98,16 @@ fn divide<const N: usize>(
 }
 
 widest_fn! {
-    /// Factors the columns of a front, `height` numbers each, of which there are a multiple of four; their diagonal is then one
-    /// by that of the factor. False where they are of no positive definite matrix.
+    /// Factors the columns of a front of `height` rows. Their number is a multiple of four. The
+    /// diagonal becomes the reciprocal of the factor's diagonal. Returns false if the matrix is not
+    /// positive definite.
     pub(super) fn factor<const ROWS: usize>(front: &mut [f64], height: usize, monitor: &Monitor) -> Result<bool> {
         let columns = front.len() / height;
         for at in (0..columns).step_by(TILE) {
             monitor.check()?;
             let (done, rest) = front.split_at_mut(at * height);
             let four = &mut rest[..TILE * height];
+            // Factor the tile on the diagonal.
             let mut tile = multiply::<TILE>(done, height, at, at);
             for j in 0..TILE {
                 for i in 0..TILE {
@@ -117,6 +122,7 @@ widest_fn! {
                     four[j * height + at + i] = tile[j][i];
                 }
             }
+            // Divide the rows below the tile.
             let mut row = at + TILE;
             while row + ROWS <= height {
                 divide::<ROWS>(done, four, height, row, at, &tile);
@@ -134,7 +140,7 @@ widest_fn! {
     }
 }
 
-/// Rows of four columns of what is left.
+/// Subtracts the contribution of a front from rows of four columns of the rest.
 #[inline(always)]
 fn take_off_tile<const N: usize>(
     rest: &mut [f64],
@@ -156,7 +162,8 @@ fn take_off_tile<const N: usize>(
 }
 
 widest_fn! {
-    /// Takes off `rest`, a square of `size` whose lower triangle counts, what the factored columns of a front leave to it.
+    /// Subtracts the contribution of the factored columns of a front from `rest`, a square of
+    /// `size` whose lower triangle is used.
     pub(super) fn take_off<const ROWS: usize>(
         rest: &mut [f64],
         size: usize,
@@ -187,25 +194,26 @@ widest_fn! {
     }
 }
 
-/// Sets to zero what counts of a square of `size`: its lower triangle, by whole tiles.
+/// Sets the used part of a square of `size` to zero: its lower triangle, extended to whole tiles.
 pub(super) fn clear(rest: &mut [f64], size: usize) {
     for (j, column) in rest.chunks_exact_mut(size.max(1)).enumerate() {
         column[j - j % TALL..].fill(0.0);
     }
 }
 
-/// Rows that follow each other in what a child leaves and in its parent's front.
+/// Rows that are consecutive both in a child's contribution and in its parent's front.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run {
-    /// The first one in the child.
+    /// First row in the child.
     first: usize,
-    /// How many there are.
+    /// Number of rows.
     len: usize,
-    /// The first one in the front.
+    /// First row in the front.
     there: usize,
 }
 
-/// Lists runs of rows, of which `into` says which rows of the front they are; none goes on from own columns into the rest.
+/// Lists runs of rows. `into` contains the row of the front for each row. No run continues from own
+/// columns into the rest.
 pub(super) fn list_runs(into: &[u32], columns: usize, runs: &mut Vec<Run>) {
     runs.clear();
     for (first, &there) in into.iter().enumerate() {
@@ -222,7 +230,8 @@ pub(super) fn list_runs(into: &[u32], columns: usize, runs: &mut Vec<Run>) {
 }
 
 wide_fn! {
-    /// Adds what a child leaves, a square of `size`, to its parent's front, of so many rows and columns, and the rest of that.
+    /// Adds a child's contribution, a square of `size`, to its parent's front and to the rest of
+    /// the parent. `sides` are the numbers of rows and columns of the front.
     pub(super) fn hand_on(
         left: &[f64],
         size: usize,
@@ -233,7 +242,7 @@ wide_fn! {
     ) {
         let [height, columns] = sides;
         for (k, across) in runs.iter().enumerate() {
-            // Rows of the rest are counted from its own first one.
+            // Rows of the rest are counted from its own first row.
             let (target, side, less) = if across.there < columns {
                 (&mut *front, height, 0)
             } else {
@@ -241,7 +250,7 @@ wide_fn! {
             };
             for (down, run) in runs[k..].iter().enumerate() {
                 for j in 0..across.len {
-                    // Of a square on the diagonal what is below that.
+                    // Only the part below the diagonal of a diagonal square is added.
                     let skip = if down == 0 { j } else { 0 };
                     let to = (across.there + j - less) * side + run.there + skip - less;
                     let from = (across.first + j) * size + run.first + skip;

@@ -1,4 +1,4 @@
-//! The numbers of a factor, block by block.
+//! Numeric factorisation, block by block.
 
 use std::ops::Range;
 
@@ -10,17 +10,18 @@ use crate::foundation::par::{self, Monitor};
 
 const WHAT: &str = "the factor of the matrix";
 
-/// The numbers of blocks that follow each other.
+/// The numbers of consecutive blocks.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// Which blocks these are.
+    /// Range of the blocks.
     pub(super) fronts: Range<usize>,
-    /// Of each block, one after the other, the columns of its own unknowns: one by the diagonal, what is below it, further rows.
+    /// Columns of the own unknowns of each block, one block after the other. A column has the
+    /// reciprocal of the diagonal, the numbers below it, and the further rows.
     pub(super) values: Vec<f64>,
 }
 
 impl Part {
-    /// Blocks, with their numbers.
+    /// Returns the blocks with their numbers.
     pub(super) fn blocks<'a>(
         &'a self,
         plan: &'a Plan,
@@ -41,7 +42,7 @@ pub(super) fn factor(plan: &Plan, entries: &Entries, monitor: &Monitor) -> Resul
         monitor,
     };
     let mut parts = Vec::new();
-    // Alone, a worker keeps all in one piece.
+    // With a single thread, factor everything as one job.
     let whole = [Job::Run(0..plan.fronts.len())];
     let jobs = if par::threads() > 1 {
         &plan.jobs
@@ -54,7 +55,8 @@ pub(super) fn factor(plan: &Plan, entries: &Entries, monitor: &Monitor) -> Resul
     Ok(parts)
 }
 
-/// Parts of the factor, and what the last block leaves to its parent: a square of as many rows as that has further ones.
+/// Parts of the factor, and the contribution of the last block to its parent: a square with the
+/// further rows of that block.
 type Done = (Vec<Part>, Vec<f64>);
 
 #[derive(Clone, Copy)]
@@ -67,7 +69,7 @@ struct Task<'a> {
 impl Task<'_> {
     fn work_all(&self, jobs: &[Job]) -> Result<Vec<Done>> {
         match jobs {
-            // Other threads stay asleep.
+            // A single job runs on this thread, so that other threads stay asleep.
             [one] => Ok(vec![self.work(one)?]),
             _ => par::map(jobs.len(), |i| self.work(&jobs[i]))
                 .into_iter()
@@ -82,7 +84,7 @@ impl Task<'_> {
         }
     }
 
-    /// Factors a block whose children are done.
+    /// Factors a block after its children are done.
     fn join(&self, beneath: Vec<Done>, last: usize) -> Result<Done> {
         let front = &self.plan.fronts[last];
         let mut parts = Vec::new();
@@ -104,15 +106,16 @@ impl Task<'_> {
         Ok((parts, rest))
     }
 
-    /// Factors blocks one after the other, the last of which may leave something.
+    /// Factors blocks one after the other. The last one may leave a contribution.
     fn run(&self, range: Range<usize>) -> Result<Done> {
         let fronts = &self.plan.fronts[range.clone()];
         let largest = fronts.iter().map(Front::area).max();
         let mut bench = Bench::new(largest.unwrap_or(0))?;
         let mut values = Vec::new();
         memory::reserve(WHAT, &mut values, fronts.iter().map(Front::len).sum())?;
-        // What blocks of even and of odd depth leave: the last ones are the children of the next block, whose own comes last in
-        // the other.
+        // Contributions of blocks of even and of odd depth are on separate piles. The last
+        // contributions of one pile come from the children of the next block, whose own
+        // contribution goes on the other pile.
         let [even, odd] = measure_piles(&self.plan.fronts, range.clone());
         let mut piles = [
             memory::filled(WHAT, 0.0, even)?,
@@ -131,6 +134,7 @@ impl Task<'_> {
             dense::clear(rest, size);
             used[mine] += size * size;
             let is_child = |&&child: &&usize| self.plan.fronts[child].parent == Some(number);
+            // Take the children's contributions from their pile, and add them to the front.
             let children = waiting.len() - waiting.iter().rev().take_while(is_child).count();
             let left = |child: &usize| self.plan.fronts[*child].rest().pow(2);
             used[theirs] -= waiting[children..].iter().map(left).sum::<usize>();
@@ -154,7 +158,7 @@ impl Task<'_> {
         Ok((vec![part], rest))
     }
 
-    /// Lays a block's own columns out, with the matrix's entries.
+    /// Writes the matrix entries into the own columns of a block.
     fn lay_out(&self, front: &Front, bench: &mut Bench) {
         let (height, columns) = (front.height(), front.columns());
         bench.own.clear();
@@ -169,13 +173,13 @@ impl Task<'_> {
                 column[row as usize] += value;
             }
         }
-        // What a block is filled up with stands for itself.
+        // Padding columns are columns of the identity.
         for k in front.own..columns {
             bench.own[k * height + k] = 1.0;
         }
     }
 
-    /// Adds what a child has left.
+    /// Adds the contribution of a child.
     fn hand_on(
         &self,
         child: usize,
@@ -198,7 +202,7 @@ impl Task<'_> {
         );
     }
 
-    /// Factors a block, takes off what it leaves, and keeps its numbers.
+    /// Factors a block, subtracts its contribution from the rest, and stores its numbers.
     fn finish(
         &self,
         front: &Front,
@@ -219,11 +223,11 @@ impl Task<'_> {
     }
 }
 
-/// What one worker has at hand.
+/// Buffers of one worker.
 struct Bench {
     /// The columns of a block.
     own: Vec<f64>,
-    /// Rows that follow each other in a child and in a block.
+    /// Rows that are consecutive in a child and in a block.
     runs: Vec<dense::Run>,
 }
 

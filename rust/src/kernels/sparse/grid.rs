@@ -1,39 +1,42 @@
-//! What unknowns have to do with which: of a grid by how far apart they lie, of all else by a list.
+//! Couplings of unknowns: on a grid by their distance, otherwise by a list.
 
 use super::Checked;
 use crate::Result;
 use crate::foundation::memory;
 
-/// Furthest that unknowns of a grid may lie apart, along an axis, that have to do with each other.
+/// Maximum distance along an axis of coupled unknowns on a grid.
 const FAR: u32 = 8;
-/// Distances between row and column, of all entries, beyond which unknowns are of no grid.
+/// Maximum number of different distances between row and column over all entries. With more, the
+/// unknowns are not treated as a grid.
 const MOST: usize = 64;
 
-/// Axes along which unknowns of a grid are parted: along its rows and columns, and aslant.
+/// Number of axes of separators on a grid: along its rows, its columns and both diagonals.
 pub(super) const AXES: usize = 4;
 
-/// An unknown as its place in a grid along all axes, of which the first two are row and column; of no grid, its number is the
-/// second.
+/// An unknown as its place on a grid along all axes, row and column first. Without a grid, the
+/// second entry is the number of the unknown.
 pub(super) type Item = [u32; AXES];
 
-/// A grid that the unknowns of a matrix lie on, row by row.
+/// A grid that contains the unknowns of a matrix, row by row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
     pub(super) columns: u32,
-    /// How far apart unknowns may lie, along each axis, that have to do with each other.
+    /// Maximum distance of coupled unknowns along each axis.
     pub(super) reach: [u32; AXES],
 }
 
 impl Grid {
-    /// Where an unknown is along all axes.
+    /// Returns the place of an unknown along all axes.
     pub(super) fn place(&self, unknown: u32) -> Item {
         let (row, column) = (unknown / self.columns, unknown % self.columns);
         [row, column, row + column, row + (self.columns - column)]
     }
 
-    /// The grid that the distances between rows and columns of the entries tell of, where that is of any use.
+    /// Returns the grid that follows from the distances between rows and columns of the entries, or
+    /// `None` if there is not a useful one.
     pub(super) fn recognise(matrix: &Checked<'_>) -> Result<Option<Self>> {
         let size = matrix.size();
+        // Collect the different distances.
         let mut seen: Vec<bool> = memory::filled("the order of the matrix", false, size)?;
         let mut apart: Vec<u32> = Vec::new();
         for column in 0..size {
@@ -49,7 +52,8 @@ impl Grid {
             }
         }
         apart.sort_unstable();
-        // Those in a row are 1, 2, ...; those of the next row lie around the number of columns.
+        // Distances within a row are 1, 2, ... Distances to the next row are around the number of
+        // columns.
         let beside = (1..).zip(&apart).take_while(|&(i, &d)| i == d).count();
         let next = &apart[beside..];
         let near = next.windows(2).take_while(|two| two[1] - two[0] <= 2);
@@ -57,10 +61,12 @@ impl Grid {
             Some(first) => (first + next[near.count()]) / 2,
             None => size as u32,
         };
+        // Measure the reach along each axis, and reject couplings that are too far for a grid.
         let mut reach = [0u32; AXES];
         let (mut line, mut x) = (0, 0);
         for column in 0..size {
-            // The first unknown of the line that an entry's row lies in: rows rise.
+            // First unknown of the grid line that contains the entry's row. Rows are in increasing
+            // order.
             let (mut first, mut down) = (line, 0);
             for &row in matrix.below(column) {
                 while row - first >= columns && down <= FAR {
@@ -91,7 +97,7 @@ impl Grid {
     }
 }
 
-/// Which unknowns have to do with each, both ways.
+/// The couplings of each unknown, in both directions.
 #[derive(Debug, Default)]
 pub(super) struct Links {
     starts: Vec<u32>,

@@ -1,11 +1,17 @@
 //! Symmetric positive definite systems: factored once, solved many times.
 //!
-//! A sparse Cholesky factorisation in double precision: deformation energies weigh some equations 10^9 times as much as
-//! others, which leaves nothing for iterations or for single precision. It is multifrontal, over a tree of blocks that nested
-//! dissection makes: `order` says which unknowns are eliminated when (`cut` parts them, by what `grid` knows of them), `plan`
-//! which rows each block has; `factor` works out the numbers, and `solve` solves with them; what is dense is in `dense`. Every
-//! number is made by one thread, by sums in one order that nothing fuses: the same bytes for any number of threads, and for any
-//! registers.
+//! This is a sparse Cholesky factorisation in double precision. Deformation energies weight some
+//! equations 10^9 times as much as others, which is too much for iterative solvers and for single
+//! precision. The method is multifrontal, over a tree of blocks from nested dissection:
+//!
+//! - `order` chooses the order of elimination. `cut` divides the unknowns, and `grid` describes
+//!   their couplings.
+//! - `plan` computes the rows of each block.
+//! - `factor` computes the numbers, with the dense operations in `dense`.
+//! - `solve` solves with them.
+//!
+//! Every number is computed by one thread, by sums in a fixed order without fused operations. The
+//! result is therefore the same for any number of threads and for all registers.
 
 mod cut;
 mod dense;
@@ -22,24 +28,25 @@ use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// No unknown, and no block.
+/// Value for a missing unknown or block.
 const NONE: u32 = u32::MAX;
 
-/// A symmetric matrix, column by column, of which the lower triangle is read.
+/// A symmetric matrix, column by column. Only its lower triangle is read.
 #[derive(Debug, Clone, Copy)]
 pub struct Lower<'a> {
-    /// Where each column begins in `rows` and `values`, and where the last one ends.
+    /// Start of each column in `rows` and `values`, and the end of the last column.
     pub starts: &'a [u32],
-    /// Rows of the entries, rising in each column; each has one on the diagonal. Those above it may be left out.
+    /// Rows of the entries, in increasing order within each column. Each column needs its diagonal
+    /// entry. Entries above the diagonal may be omitted.
     pub rows: &'a [u32],
-    /// The entries.
+    /// Values of the entries.
     pub values: &'a [f64],
 }
 
-/// A matrix that was checked.
+/// A matrix whose structure and entries are valid.
 struct Checked<'a> {
     matrix: Lower<'a>,
-    /// Where the diagonal's entries are.
+    /// Positions of the diagonal entries.
     diagonal: Vec<u32>,
 }
 
@@ -60,6 +67,7 @@ impl<'a> Checked<'a> {
                 "its columns must begin at 0 and end with the last of as many rows as values",
             );
         }
+        // Find the diagonal of each column, and check the order of its rows.
         let mut diagonal = memory::filled("the order of the matrix", 0, size)?;
         for column in 0..size {
             let (from, to) = (starts[column] as usize, starts[column + 1] as usize);
@@ -88,7 +96,7 @@ impl<'a> Checked<'a> {
         Ok(Self { matrix, diagonal })
     }
 
-    /// Rows and columns.
+    /// Number of rows and columns.
     fn size(&self) -> usize {
         self.diagonal.len()
     }
@@ -97,17 +105,17 @@ impl<'a> Checked<'a> {
         self.diagonal[column] as usize..self.matrix.starts[column + 1] as usize
     }
 
-    /// Rows of a column's entries, from the diagonal on.
+    /// Rows of the entries of a column, starting at the diagonal.
     fn rows(&self, column: usize) -> &[u32] {
         &self.matrix.rows[self.span(column)]
     }
 
-    /// Those entries.
+    /// Values of the entries of a column, starting at the diagonal.
     fn values(&self, column: usize) -> &[f64] {
         &self.matrix.values[self.span(column)]
     }
 
-    /// Rows of a column's entries below the diagonal.
+    /// Rows of the entries of a column below the diagonal.
     fn below(&self, column: usize) -> &[u32] {
         &self.rows(column)[1..]
     }
@@ -117,16 +125,17 @@ impl<'a> Checked<'a> {
 #[derive(Debug)]
 pub struct Cholesky {
     plan: Plan,
-    /// One by the diagonal, of unknowns that have to do with no other.
+    /// Reciprocal diagonal entries of unknowns that are not coupled to others.
     alone: Vec<f64>,
     /// The numbers of all blocks.
     parts: Vec<Part>,
 }
 
 impl Cholesky {
-    /// Factors a positive definite matrix whose factor, with the work on it, takes at most `limit` bytes.
+    /// Factors a positive definite matrix. The factor and the work on it may take at most `limit`
+    /// bytes.
     pub fn new(matrix: &Lower<'_>, limit: usize, monitor: &Monitor) -> Result<Self> {
-        // Of the pattern of the factor, beside its numbers.
+        // Memory for the pattern of the factor, without its numbers.
         memory::room("the order of the matrix", matrix.rows.len(), 64)?;
         let matrix = Checked::new(*matrix)?;
         let order = order::dissect(&matrix, monitor)?;
@@ -152,17 +161,17 @@ impl Cholesky {
         Ok(Self { plan, alone, parts })
     }
 
-    /// Rows of the matrix.
+    /// Number of rows of the matrix.
     pub fn size(&self) -> usize {
         self.plan.unknown.len()
     }
 
-    /// Entries of the factor, with the zeros that its dense blocks hold.
+    /// Number of entries of the factor, including the zeros in its dense blocks.
     pub fn entries(&self) -> usize {
         self.plan.alone + self.plan.len
     }
 
-    /// Replaces right sides, one after the other, by the solutions.
+    /// Replaces right-hand sides, stored one after the other, by the solutions.
     pub fn solve(&self, sides: &mut [f64]) -> Result<()> {
         let size = self.size();
         if sides.is_empty() || !sides.len().is_multiple_of(size) {

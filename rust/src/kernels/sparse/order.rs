@@ -1,10 +1,14 @@
-//! Nested dissection: unknowns in the order of their elimination, and the tree of blocks that are eliminated together.
+//! Nested dissection: the order of elimination of the unknowns, and the tree of blocks that are
+//! eliminated together.
 //!
-//! George, "Nested dissection of a regular finite element mesh", SIAM Journal on Numerical Analysis 10(2), 1973: what lies on
-//! either side of a separator has nothing to do with the other, and fills in nothing there; the separator comes last. The
-//! unknowns of a grid are cut along lines of it, straight or aslant: where each has to do with those that lie so many steps away, a
-//! separator aslant encloses twice as much as a straight one of as many unknowns. Those of all else are cut along the levels of
-//! a breadth-first search (George and Liu's automatic nested dissection).
+//! George, "Nested dissection of a regular finite element mesh", SIAM Journal on Numerical Analysis
+//! 10(2), 1973. The unknowns on both sides of a separator are not coupled, so elimination does not
+//! fill in entries between them. The separator comes last.
+//!
+//! Unknowns of a grid are divided along its lines, straight or diagonal. Let each unknown be
+//! coupled to those within a number of steps. A diagonal separator then encloses twice as much as a
+//! straight one with the same number of unknowns. Other unknowns are divided along the levels of a
+//! breadth-first search (George and Liu's automatic nested dissection).
 
 use super::cut::{Cut, Scratch};
 use super::grid::{AXES, Grid, Item, Links};
@@ -13,28 +17,28 @@ use crate::Result;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 
-/// Unknowns that are not parted any more.
+/// Maximum number of unknowns that are not divided any further.
 const LEAF: usize = 20;
 
 /// Unknowns that are eliminated together.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
-    /// The first of them, in the order of elimination.
+    /// First unknown, in the order of elimination.
     pub(super) start: u32,
-    /// The one after the last.
+    /// End of the range, exclusive.
     pub(super) end: u32,
-    /// The block that is waited for next, or [`NONE`].
+    /// The block that follows after this one in the tree, or [`NONE`].
     pub(super) parent: u32,
 }
 
-/// In what order unknowns are eliminated.
+/// Order of elimination of the unknowns.
 #[derive(Debug)]
 pub(super) struct Order {
     /// The unknown at each place of the order.
     pub(super) unknown: Vec<u32>,
-    /// How many come first that have to do with no other.
+    /// Number of unknowns that are not coupled to others. They come first.
     pub(super) alone: usize,
-    /// All others, block by block, each after those that it is the parent of.
+    /// All other unknowns, block by block. Each block follows after its children.
     pub(super) blocks: Vec<Block>,
 }
 
@@ -42,6 +46,8 @@ pub(super) struct Order {
 pub(super) fn dissect(matrix: &Checked<'_>, monitor: &Monitor) -> Result<Order> {
     let what = "the order of the matrix";
     let size = matrix.size();
+    // Group connected unknowns, and describe each unknown by its place on the grid or by its
+    // number.
     let (list, ends, alone) = part(matrix)?;
     let grid = Grid::recognise(matrix)?;
     let links = match grid {
@@ -64,7 +70,8 @@ pub(super) fn dissect(matrix: &Checked<'_>, monitor: &Monitor) -> Result<Order> 
         tasks.push((first, end, NONE));
         first = end;
     }
-    // The last part first: read backwards, every block comes after its children.
+    // The last part is processed first, so that in reverse order every block comes after its
+    // children.
     while let Some((first, end, parent)) = tasks.pop() {
         monitor.check()?;
         if first == end {
@@ -76,6 +83,7 @@ pub(super) fn dissect(matrix: &Checked<'_>, monitor: &Monitor) -> Result<Order> 
             (true, Some(grid)) => scratch.cut_grid(part, grid),
             (true, None) => scratch.cut_levels(part, &links),
         };
+        // A divided part becomes a block for the separator and two tasks for the sides.
         match cut {
             Cut::Leaf => blocks.push(Block {
                 start: first as u32,
@@ -106,6 +114,7 @@ pub(super) fn dissect(matrix: &Checked<'_>, monitor: &Monitor) -> Result<Order> 
             }
         }
     }
+    // Reverse the blocks and their parents' numbers.
     blocks.reverse();
     let last = blocks.len() as u32;
     for block in &mut blocks {
@@ -124,7 +133,8 @@ pub(super) fn dissect(matrix: &Checked<'_>, monitor: &Monitor) -> Result<Order> 
     })
 }
 
-/// Lists unknowns by what they have to do with each other, those that are alone first; with where each group ends.
+/// Lists unknowns group by group, where a group is connected. Uncoupled unknowns come first. Also
+/// returns the end of each group and the number of uncoupled unknowns.
 fn part(matrix: &Checked<'_>) -> Result<(Vec<u32>, Vec<usize>, usize)> {
     let size = matrix.size();
     let what = "the order of the matrix";
@@ -140,6 +150,7 @@ fn part(matrix: &Checked<'_>) -> Result<(Vec<u32>, Vec<usize>, usize)> {
         }
         i
     };
+    // Find connected groups by union-find. The lowest unknown is the root.
     for column in 0..size {
         let mut own = find(&mut root, column as u32);
         for &row in matrix.below(column) {
@@ -160,7 +171,7 @@ fn part(matrix: &Checked<'_>) -> Result<(Vec<u32>, Vec<usize>, usize)> {
     }
     let alone = count.iter().filter(|&&n| n == 1).count();
     let (mut single, mut next, mut ends) = (0, alone, Vec::new());
-    // From here on, where the next of a group goes.
+    // From here on, `count` is the position of the next unknown of each group.
     for count in &mut count {
         match *count {
             0 => {}

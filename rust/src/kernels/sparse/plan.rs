@@ -1,7 +1,8 @@
-//! The pattern of a factor: which rows each block of it has, and where its numbers lie.
+//! The pattern of a factor: the rows of each block, and the positions of its numbers.
 //!
-//! Of the multifrontal method of Duff and Reid (1983): a block's front holds the columns of its own unknowns, and what these
-//! leave for the blocks that come after it, the rest; that is handed to the parent, whose rows have all of the same.
+//! The terms are those of the multifrontal method of Duff and Reid (1983). The front of a block
+//! contains the columns of its own unknowns, and the rest: their contribution to later blocks. The
+//! rest is added to the parent, whose rows include all rows of the rest.
 
 use std::ops::Range;
 
@@ -11,55 +12,56 @@ use crate::Result;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 
-/// Rows are handled so many at a time, and so many columns: fronts are filled up to multiples of it.
+/// Number of rows, and of columns, that are processed together. Fronts are padded to multiples of
+/// it.
 pub(super) const TILE: usize = 4;
 
 /// A block of the factor.
 #[derive(Debug, Clone)]
 pub(super) struct Front {
-    /// Its first unknown, in the order of elimination.
+    /// First unknown, in the order of elimination.
     pub(super) start: usize,
-    /// Unknowns of its own.
+    /// Number of own unknowns.
     pub(super) own: usize,
-    /// Where its further rows begin in [`Plan::rows`], and end.
+    /// Range of the further rows in [`Plan::rows`].
     pub(super) rows: Range<usize>,
-    /// Where its numbers begin in the factor: of each of its unknowns the rows from that on.
+    /// Position of the numbers in the factor. Each own unknown has the rows from its diagonal on.
     pub(super) values: usize,
-    /// The block that gets what is left.
+    /// The block that receives the rest.
     pub(super) parent: Option<usize>,
-    /// Blocks that come before its parent, counted from the top: what is left lies in either of two places by turns.
+    /// Depth in the tree, from the root. The rests of even and of odd depth are on separate piles.
     pub(super) depth: usize,
-    /// How many of the blocks before it are beneath it.
+    /// Number of previous blocks that are below this block in the tree.
     pub(super) beneath: usize,
 }
 
 impl Front {
-    /// Its own unknowns, filled up.
+    /// Number of own unknowns, padded.
     pub(super) fn columns(&self) -> usize {
         self.own.next_multiple_of(TILE)
     }
 
-    /// Further rows, filled up.
+    /// Number of further rows, padded.
     pub(super) fn rest(&self) -> usize {
         self.rows.len().next_multiple_of(TILE)
     }
 
-    /// All rows.
+    /// Number of all rows.
     pub(super) fn height(&self) -> usize {
         self.columns() + self.rest()
     }
 
-    /// Numbers of the factor.
+    /// Number of values of the factor.
     pub(super) fn len(&self) -> usize {
         self.own * (self.own + 1) / 2 + self.own * self.rows.len()
     }
 
-    /// Numbers of its own columns while it is worked on.
+    /// Number of values of the own columns during the factorisation.
     pub(super) fn area(&self) -> usize {
         self.columns() * self.height()
     }
 
-    /// Multiplications that it takes, about.
+    /// Approximate number of multiplications.
     pub(super) fn work(&self) -> u64 {
         let (columns, height) = (self.columns() as u64, self.height() as u64);
         columns * height * height / 2
@@ -71,53 +73,54 @@ impl Front {
 pub(super) struct Plan {
     /// The unknown at each place of the order.
     pub(super) unknown: Vec<u32>,
-    /// How many come first that have to do with no other.
+    /// Number of unknowns that are not coupled to others. They come first.
     pub(super) alone: usize,
-    /// Blocks, each after those beneath it.
+    /// Blocks, each after the blocks below it in the tree.
     pub(super) fronts: Vec<Front>,
-    /// Further rows of blocks: places in the order, rising.
+    /// Further rows of the blocks: places in the order, increasing within a block.
     pub(super) rows: Vec<u32>,
-    /// Which rows of the parent's front these are.
+    /// Rows of the parent's front that correspond to `rows`.
     pub(super) into: Vec<u32>,
-    /// Numbers of the factor, of all blocks.
+    /// Number of values of the factor, over all blocks.
     pub(super) len: usize,
-    /// What is done by itself.
+    /// Independent pieces of work.
     pub(super) jobs: Vec<Job>,
-    /// Numbers that the work takes at most, beside those of the factor.
+    /// Maximum number of values that the work takes in addition to the factor.
     pub(super) room: usize,
 }
 
-/// Work on blocks that nothing else is needed for.
+/// Work on blocks that does not depend on other jobs.
 #[derive(Debug)]
 pub(super) enum Job {
-    /// On these, one after the other.
+    /// Work on a range of blocks, one after the other.
     Run(Range<usize>),
-    /// On one, after what is beneath it.
+    /// Work on one block, after the jobs below it.
     Join(Vec<Job>, usize),
 }
 
-/// Work that is not worth to be shared, in multiplications.
+/// Number of multiplications below which work is not divided.
 const LITTLE: u64 = 1 << 21;
-/// Shares of all work that are not shared any further.
+/// Work is divided down to one part in this number of the total.
 const SHARES: u64 = 16;
-/// How far down from the top work is shared.
+/// Maximum depth in the tree of divided work.
 const DEEP: usize = 6;
-/// The most jobs that one waits for.
+/// Maximum number of jobs that one job waits for.
 const MOST: usize = 8;
 
 /// The entries of a matrix by the columns of a factor.
 #[derive(Debug)]
 pub(super) struct Entries {
-    /// Where those of each place in the order begin, and the last ones end.
+    /// Start of the entries of each place in the order, and the end of the last ones.
     pub(super) starts: Vec<u32>,
-    /// Rows of the block's front.
+    /// Rows in the front of the block.
     pub(super) rows: Vec<u32>,
     /// The entries.
     pub(super) values: Vec<f64>,
 }
 
 impl Entries {
-    /// Sorts entries by the one of their two unknowns that is eliminated first; rows are still places in the order.
+    /// Sorts entries by their unknown that is eliminated first. The rows are still places in the
+    /// order.
     fn new(matrix: &Checked<'_>, unknown: &[u32]) -> Result<Self> {
         let (what, size) = ("the order of the matrix", unknown.len());
         let mut place: Vec<u32> = memory::filled(what, 0, size)?;
@@ -138,7 +141,7 @@ impl Entries {
         }
         let mut rows: Vec<u32> = memory::filled(what, 0, sum as usize)?;
         let mut values: Vec<f64> = memory::filled(what, 0.0, sum as usize)?;
-        // From behind: then each start is where it belongs.
+        // Iterate backwards, so that each start ends at the right position.
         for column in (0..size).rev() {
             let own = place[column];
             let (of, numbers) = (matrix.rows(column), matrix.values(column));
@@ -157,7 +160,7 @@ impl Entries {
         })
     }
 
-    /// Where the entries of places in the order are.
+    /// Returns the positions of the entries of a range of places.
     pub(super) fn of(&self, places: Range<usize>) -> Range<usize> {
         self.starts[places.start] as usize..self.starts[places.end] as usize
     }
@@ -174,12 +177,13 @@ impl Plan {
         let mut entries = Entries::new(matrix, &order.unknown)?;
         let count = order.blocks.len();
         let size = order.unknown.len();
-        // Where each place of the order is in the front at hand, and in whose front that was.
+        // Row in the current front of each place in the order, and the last front that contains the
+        // place.
         let mut place: Vec<u32> = memory::filled(what, 0, size)?;
         let mut whose: Vec<u32> = memory::filled(what, NONE, size)?;
         let mut fronts: Vec<Front> = Vec::with_capacity(count);
         let (mut rows, mut into): (Vec<u32>, Vec<u32>) = Default::default();
-        // Blocks whose parent is not there yet: the last ones are those of the next.
+        // Blocks whose parent has not come yet. The last ones are the children of the next block.
         let mut waiting: Vec<usize> = Vec::new();
         let mut len = 0;
         for (number, &Block { start, end, parent }) in order.blocks.iter().enumerate() {
@@ -188,6 +192,7 @@ impl Plan {
             let own = entries.of(start as usize..end as usize);
             let is_child = |&&child: &&usize| order.blocks[child].parent == number as u32;
             let children = waiting.len() - waiting.iter().rev().take_while(is_child).count();
+            // Collect the further rows: those of the children and of the matrix entries.
             let most: usize = waiting[children..]
                 .iter()
                 .map(|&child| fronts[child].rows.len())
@@ -209,7 +214,7 @@ impl Plan {
             for &row in &entries.rows[own.clone()] {
                 gather(row, &mut rows);
             }
-            // Those of each child rise already.
+            // The rows of each child are already sorted, which `sort` makes use of.
             rows[first..].sort();
             let columns = ((end - start) as usize).next_multiple_of(TILE) as u32;
             for (i, row) in (start..end).enumerate() {
@@ -220,6 +225,7 @@ impl Plan {
             }
             memory::reserve(what, &mut into, rows.len() - first)?;
             into.resize(rows.len(), 0);
+            // Replace places by rows of this front, in the children's rows and in the entries.
             for child in waiting.drain(children..) {
                 let of = fronts[child].rows.clone();
                 for (into, &row) in into[of.clone()].iter_mut().zip(&rows[of]) {
@@ -263,7 +269,8 @@ impl Plan {
     }
 }
 
-/// Shares the work out: by the matrix alone, whoever does it then.
+/// Divides the work into jobs. The division depends only on the matrix, not on the number of
+/// threads.
 fn share_out(fronts: &[Front]) -> Vec<Job> {
     let mut work: Vec<u64> = fronts.iter().map(Front::work).collect();
     for (number, front) in fronts.iter().enumerate() {
@@ -274,6 +281,7 @@ fn share_out(fronts: &[Front]) -> Vec<Job> {
     let roots = || (0..fronts.len()).filter(|&number| fronts[number].parent.is_none());
     let total: u64 = roots().map(|root| work[root]).sum();
     let share = (total / SHARES).max(LITTLE);
+    // Small trees are collected into runs. Large trees are divided further.
     let mut jobs = Vec::new();
     let (mut first, mut sum) = (0, 0);
     for root in roots() {
@@ -298,7 +306,7 @@ fn share_out(fronts: &[Front]) -> Vec<Job> {
 }
 
 impl Job {
-    /// The work on a block and all beneath it.
+    /// Returns the work on a block and on all blocks below it.
     fn of(last: usize, fronts: &[Front], work: &[u64], share: u64, level: usize) -> Self {
         let first = last - fronts[last].beneath;
         let mut children = Vec::new();
@@ -319,7 +327,7 @@ impl Job {
         )
     }
 
-    /// Numbers that it takes at most, beside those of the factor.
+    /// Returns the maximum number of values that the job takes in addition to the factor.
     fn room(&self, fronts: &[Front]) -> usize {
         match self {
             Self::Run(range) => {
@@ -334,7 +342,7 @@ impl Job {
     }
 }
 
-/// The most that blocks leave to others while they are worked on, those of even and those of odd depth.
+/// Returns the maximum sizes of the two piles of rests, of even and of odd depth.
 pub(super) fn measure_piles(fronts: &[Front], range: Range<usize>) -> [usize; 2] {
     let (mut now, mut most) = ([0; 2], [0; 2]);
     let mut waiting: Vec<usize> = Vec::new();

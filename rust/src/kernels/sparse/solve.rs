@@ -1,4 +1,4 @@
-//! Solutions, block by block: forwards, and backwards.
+//! Solution with the factor: forward and backward substitution, block by block.
 
 use super::Cholesky;
 use super::plan::TILE;
@@ -6,7 +6,8 @@ use crate::Result;
 use crate::foundation::memory;
 use crate::foundation::wide::wide_fn;
 
-/// Replaces right sides by the solutions, all at once: each number of the factor is read once for all.
+/// Replaces right-hand sides by the solutions, all together, so that each number of the factor is
+/// read once.
 pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -> Result<()> {
     let (plan, what) = (&factor.plan, "the solution");
     let most = plan
@@ -15,6 +16,7 @@ pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -
         .map(|f| f.own + f.rows.len())
         .max()
         .unwrap_or(0);
+    // Bring the right-hand sides into the order of elimination.
     let mut part: [Vec<f64>; N] = std::array::from_fn(|_| Vec::new());
     let mut all: [Vec<f64>; N] = std::array::from_fn(|_| Vec::new());
     for n in 0..N {
@@ -27,6 +29,7 @@ pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -
             *x *= by;
         }
     }
+    // Forward substitution.
     for (front, numbers) in factor.parts.iter().flat_map(|part| part.blocks(plan)) {
         let rows = &plan.rows[front.rows.clone()];
         for (part, all) in part.iter_mut().zip(&all) {
@@ -41,6 +44,7 @@ pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -
             }
         }
     }
+    // Backward substitution.
     for (front, numbers) in factor
         .parts
         .iter()
@@ -59,6 +63,7 @@ pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -
             all[front.start..][..front.own].copy_from_slice(&part[..front.own]);
         }
     }
+    // Bring the solutions back into the order of the matrix.
     for (all, side) in all.iter().zip(sides) {
         for (x, &unknown) in all.iter().zip(&plan.unknown) {
             side[unknown as usize] = *x;
@@ -67,7 +72,8 @@ pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -
     Ok(())
 }
 
-/// Where columns of a factor's block begin, one after the other, that have `height` numbers and each one less than the one before.
+/// Splits off `B` columns of a block. The first has `height` numbers, and each following one has
+/// one number less.
 #[inline(always)]
 fn split<const B: usize>(numbers: &[f64], height: usize) -> ([&[f64]; B], &[f64]) {
     let mut left = numbers;
@@ -79,7 +85,8 @@ fn split<const B: usize>(numbers: &[f64], height: usize) -> ([&[f64]; B], &[f64]
     (columns, left)
 }
 
-/// Solves for so many unknowns, forwards, and takes off all after them what they leave; returns what is left of the block.
+/// Solves for `B` unknowns forwards, and subtracts their contribution from the unknowns after them.
+/// Returns the remaining numbers of the block.
 #[inline(always)]
 fn forward_columns<'a, const N: usize, const B: usize>(
     numbers: &'a [f64],
@@ -113,7 +120,7 @@ fn forward_columns<'a, const N: usize, const B: usize>(
     left
 }
 
-/// Solves for so many unknowns, backwards, from all after them.
+/// Solves for `B` unknowns backwards, given the unknowns after them.
 #[inline(always)]
 fn backward_columns<const N: usize, const B: usize>(
     numbers: &[f64],
@@ -127,7 +134,7 @@ fn backward_columns<const N: usize, const B: usize>(
     let of: [&[f64]; B] = std::array::from_fn(|j| &columns[j][B - j..][..rest]);
     for x in x {
         let (own, after) = x[at..height].split_at_mut(B);
-        // Sums of every eighth row: added up in one order.
+        // One sum for every eighth row, combined in a fixed order.
         let mut sums = [[0.0; LANES]; B];
         let whole = rest - rest % LANES;
         for i in (0..whole).step_by(LANES) {
@@ -165,7 +172,8 @@ fn backward_columns<const N: usize, const B: usize>(
 }
 
 wide_fn! {
-    /// Solves for `own` unknowns of a block with `height` rows, forwards, and takes off the further rows what they leave.
+    /// Solves for the `own` unknowns of a block with `height` rows forwards, and subtracts their
+    /// contribution from the further rows.
     fn forward<const N: usize>(
         numbers: &[f64],
         own: usize,
@@ -186,7 +194,8 @@ wide_fn! {
 }
 
 wide_fn! {
-    /// Solves for `own` unknowns of a block with `height` rows, backwards, from the further rows.
+    /// Solves for the `own` unknowns of a block with `height` rows backwards, given the further
+    /// rows.
     fn backward<const N: usize>(
         numbers: &[f64],
         own: usize,

@@ -12,7 +12,7 @@ struct Triangle {
 }
 
 impl Triangle {
-    /// Of pairs with weights: a Laplacian, screened.
+    /// The screened Laplacian of pairs with weights.
     fn laplacian(size: usize, pairs: &[(usize, usize, f64)], screening: f64) -> Self {
         let mut columns = vec![std::collections::BTreeMap::new(); size];
         for (i, column) in columns.iter_mut().enumerate() {
@@ -38,7 +38,8 @@ impl Triangle {
         made
     }
 
-    /// Of a grid's cells that are open, each with those at `steps` from it.
+    /// The Laplacian of the open cells of a grid. Each cell is coupled to the cells at `steps` from
+    /// it.
     fn grid(rows: usize, columns: usize, steps: &[(usize, isize)], open: &[bool]) -> Self {
         let mut pairs = vec![];
         for y in 0..rows {
@@ -83,7 +84,7 @@ impl Triangle {
         Cholesky::new(&self.lower(), 1 << 32, &Monitor::default())
     }
 
-    /// Checks that three right sides are solved, and that every unknown is in the order once.
+    /// Checks that three right-hand sides are solved, and that every unknown is in the order once.
     fn check(&self) {
         let size = self.starts.len() - 1;
         let wanted: Vec<f64> = (0..3 * size)
@@ -114,7 +115,7 @@ impl Triangle {
     }
 }
 
-/// What a splice's energy couples.
+/// Couplings of the energy of a splice.
 const WIDE: [(usize, isize); 6] = [(0, 1), (0, 2), (1, -1), (1, 0), (1, 1), (2, 0)];
 const NEAR: [(usize, isize); 2] = [(0, 1), (1, 0)];
 
@@ -142,7 +143,7 @@ proptest! {
 
 #[test]
 fn what_is_no_grid_is_solved() {
-    // Chains, stars, combs, cyclic grids, a volume, and what has to do with all else.
+    // Chains, stars, combs, cyclic grids, a volume, and a full matrix.
     let chain: Vec<_> = (1..5000).map(|i| (i - 1, i, 1.0)).collect();
     let star: Vec<_> = (1..3000).map(|i| (0, i, 1.0)).collect();
     let comb: Vec<_> = (1..2000)
@@ -170,7 +171,7 @@ fn what_is_no_grid_is_solved() {
     let all: Vec<_> = (0..60)
         .flat_map(|i| (0..i).map(move |j| (i, j, 1.0)))
         .collect();
-    // Each of these has to do with one or both of two.
+    // Each unknown is coupled to two hubs.
     let hubs: Vec<_> = (2..4000).flat_map(|i| [(0, i, 1.0), (1, i, 1.0)]).collect();
     for (size, pairs) in [
         (4000, hubs),
@@ -188,7 +189,7 @@ fn what_is_no_grid_is_solved() {
 
 #[test]
 fn separators_are_few() {
-    // Aslant, half as many unknowns as along the lines of a grid part what lies beside them.
+    // Diagonal separators need half as many unknowns as axis-aligned ones.
     let made = Triangle::grid(96, 96, &WIDE, &[true; 96 * 96]);
     let entries = made.factor().unwrap().entries();
     assert!(entries < 64 * 96 * 96, "{entries}");
@@ -263,7 +264,7 @@ fn what_is_not_definite_is_refused() {
                 .contains("positive definite")
         );
         made.values[at] = f64::MAX;
-        // Larger than all others, but a number.
+        // This entry is larger than all others, but finite.
         assert!(made.factor().is_ok());
         made.values[at] = kept;
     }

@@ -1,9 +1,13 @@
-//! Pictures warped by moved points, and shapes moved as a whole: where each pixel of the output comes from.
+//! Images warped by moved points, and shapes moved as a whole: the source coordinates of each
+//! output pixel.
 //!
-//! [`mesh`] carries a dense mesh, a vertex a pixel of the source; [`scattered`] triangulates scattered points. Both move
-//! triangles to where their corners go and rasterise them there: a pixel comes from the barycentric mix of the source
-//! corners. Of several triangles over a pixel the one whose corners weigh most is seen, one that is not turned over before
-//! one that is, then the first. A [`Motion`] moves one shape by an affine map, to be cut in among others.
+//! [`mesh`] warps a dense mesh with one vertex for each source pixel. [`scattered`] triangulates
+//! scattered points. Both move triangles to the targets of their corners and rasterise them there.
+//! The source of a pixel is the barycentric interpolation of the source corners.
+//!
+//! If several triangles cover a pixel, the one with the largest weight is visible. Ties go to a
+//! triangle that is not flipped, then to the first. A [`Motion`] moves one shape by an affine map,
+//! to be inserted among others.
 
 mod placed;
 mod raster;
@@ -13,21 +17,21 @@ pub use placed::{Motion, Placed, Shape, Window};
 pub use raster::{Mesh, mesh};
 pub use scattered::scattered;
 
-/// A place, (row, column).
+/// A point as (row, column).
 pub type Point = [f64; 2];
 
-/// Where the pixels of an output come from.
+/// Source coordinates of the pixels of an output.
 #[derive(Debug, Clone)]
 pub struct Warped {
-    /// Source of each pixel; NaN where no triangle covers it.
+    /// Source coordinates of each pixel. They are NaN if no triangle covers the pixel.
     pub places: Vec<[f32; 2]>,
-    /// Triangle over each pixel, counted from 1; 0 where there is none.
+    /// Number of the visible triangle of each pixel, counted from 1, or 0 if no triangle covers it.
     pub triangle: Vec<u32>,
-    /// Triangles that were drawn.
+    /// Number of drawn triangles.
     pub drawn: usize,
-    /// Those of them that the warp turned over.
+    /// Number of drawn triangles that the warp flips or flattens.
     pub flipped: usize,
-    /// Those turned over whose corners all weigh something.
+    /// Number of flipped triangles whose corners all have a weight.
     pub flipped_heavy: usize,
 }
 

@@ -1,4 +1,4 @@
-//! A shape moved by an affine map: where the pixels of the window come from that it may cover.
+//! A shape moved by an affine map: the source coordinates of the pixels that it may cover.
 
 use super::Point;
 use crate::foundation::grid::Grid;
@@ -7,18 +7,18 @@ use crate::foundation::par::Monitor;
 use crate::kernels::gather::{Exemplar, Interpolation, gather};
 use crate::{Error, Result};
 
-/// A shape as the signed distance to its outline, positive inside, over a box.
+/// A shape as the signed distance to its outline over a box. Distances are positive inside.
 #[derive(Debug, Clone, Copy)]
 pub struct Shape<'a> {
-    /// In pixels, row by row.
+    /// Distances in pixels, row by row.
     pub distance: &'a [f32],
-    /// Of the box.
+    /// Shape of the box.
     pub grid: Grid<2>,
-    /// Where the box begins in the source.
+    /// First pixel of the box in the source.
     pub origin: Point,
 }
 
-/// An affine map `p -> centre + shift + matrix (p - centre)`, and how it goes back.
+/// An affine map `p -> centre + shift + matrix (p - centre)`, and the inverse of its matrix.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
     centre: Point,
@@ -30,32 +30,32 @@ pub struct Motion {
 /// The window of a canvas that a moved shape may cover.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    /// Its first pixel.
+    /// First pixel.
     pub low: [usize; 2],
     /// Rows and columns.
     pub shape: [usize; 2],
 }
 
-/// A shape where it has come to; all arrays have an entry a pixel of the window.
+/// A moved shape. All arrays have one entry for each pixel of the window.
 #[derive(Debug, Clone)]
 pub struct Placed {
-    /// Where each pixel comes from.
+    /// Source coordinates of each pixel.
     pub places: Vec<[f32; 2]>,
-    /// The distance to the outline there, in pixels of the source.
+    /// Distance to the outline at the source, in source pixels.
     pub distance: Vec<f32>,
-    /// Whether the canvas's own box, which the source shares, has that place.
+    /// Whether the source coordinates are on the canvas, which the source shares.
     pub inside: Vec<bool>,
-    /// Inside, and deeper in the shape than was asked.
+    /// Whether the source is on the canvas and deeper in the shape than requested.
     pub deep: Vec<bool>,
-    /// Pixels inside, and of the shape.
+    /// Number of pixels inside whose source belongs to the shape.
     pub count: usize,
 }
 
 impl Motion {
-    /// A map of some linear part about a centre, and a shift after it.
+    /// Returns a map with a linear part about a centre, followed by a shift.
     ///
     /// # Errors
-    /// Values that are not finite, and a linear part that has no inverse.
+    /// A value is not finite, or the linear part is not invertible.
     pub fn new(centre: Point, shift: Point, matrix: [[f64; 2]; 2]) -> Result<Self> {
         let given = centre.iter().chain(&shift).chain(matrix.as_flattened());
         let inverse = invert(matrix).filter(|_| given.clone().all(|x| x.is_finite()));
@@ -73,7 +73,7 @@ impl Motion {
         })
     }
 
-    /// The linear part of the way back.
+    /// The linear part of the inverse map.
     pub fn inverse(&self) -> [[f64; 2]; 2] {
         self.inverse
     }
@@ -86,14 +86,16 @@ impl Motion {
         })
     }
 
-    /// Whether whole pixels come to lie on whole pixels.
+    /// Whether the map sends whole pixels to whole pixels.
     fn is_whole(&self) -> bool {
         let mut parts = self.matrix.as_flattened().iter().chain(&self.shift);
         parts.all(|x| x.round_ties_even() == *x)
     }
 
-    /// The window of a canvas that a shape may cover; `None` where it leaves it.
+    /// Returns the window of a canvas that a shape may cover, or `None` if the shape is outside the
+    /// canvas.
     pub fn window(&self, shape: &Shape<'_>, canvas: [usize; 2]) -> Option<Window> {
+        // Map the corners of the box, and clip their bounding box to the canvas.
         let [rows, columns] = shape.grid.shape().map(|n| (n - 1) as f64);
         let corners = [[0.0, 0.0], [0.0, columns], [rows, 0.0], [rows, columns]]
             .map(|away| self.apply([shape.origin[0] + away[0], shape.origin[1] + away[1]]));
@@ -102,7 +104,7 @@ impl Motion {
             let along = corners.map(|corner| corner[axis]);
             let least = along.into_iter().fold(f64::INFINITY, f64::min);
             let most = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            // A cast brings what lies below zero to it.
+            // A cast clamps negative values to zero.
             let (first, last) = (least.floor() as usize, (most.ceil() + 1.0) as usize);
             let last = last.min(canvas[axis]);
             if last <= first {
@@ -114,10 +116,11 @@ impl Motion {
         Some(Window { low, shape: extent })
     }
 
-    /// Moves a shape: what each pixel of a window shows of it.
+    /// Moves a shape. Returns the source coordinates and distances of the pixels of a window.
     ///
     /// # Errors
-    /// A shape whose distances do not fit its box, a window larger than memory, or a monitor that was cancelled.
+    /// The distances do not fit the box, memory for the window is not available, or the monitor was
+    /// cancelled.
     pub fn place(
         &self,
         shape: &Shape<'_>,
@@ -131,6 +134,7 @@ impl Motion {
         let away = |axis: usize, i: usize| {
             (window.low[axis] + i) as f64 - self.centre[axis] - self.shift[axis]
         };
+        // Compute the source coordinates of the window.
         let whole = self.is_whole();
         let inverse = &self.inverse;
         let columns: Vec<f64> = (0..window.shape[1]).map(|i| away(1, i)).collect();
@@ -140,11 +144,13 @@ impl Motion {
                 std::array::from_fn(|axis| {
                     let back = inverse[axis][0] * row + inverse[axis][1] * column;
                     let at = back + self.centre[axis];
-                    // Whole pixels stay samples; the centre must not spoil them by rounding.
+                    // Round if whole pixels map to whole pixels, because the centre would add
+                    // rounding errors.
                     (if whole { at.round_ties_even() } else { at }) as f32
                 })
             }));
         }
+        // Interpolate the distance to the outline at these coordinates.
         let origin = shape.origin.map(|x| x as f32);
         let within: Vec<[f32; 2]> = places
             .iter()
@@ -154,6 +160,7 @@ impl Motion {
         let outline = Exemplar::new(shape.distance, shape.grid, 1)?;
         let linear = Interpolation::Linear;
         gather(&[outline], &[], &within, linear, &mut distance, monitor)?;
+        // Mark the pixels whose source is on the canvas.
         let last = canvas.map(|n| (n as f32) - 1.0);
         let has = |at: &[f32; 2]| (0..2).all(|axis| (0.0..=last[axis]).contains(&at[axis]));
         let inside: Vec<bool> = places.iter().map(has).collect();
@@ -173,7 +180,8 @@ impl Motion {
     }
 }
 
-/// The inverse of a matrix, by elimination, the larger entry of the first column first; `None` where there is none.
+/// Returns the inverse of a matrix, by elimination with the larger entry of the first column as
+/// pivot, or `None` if it is singular.
 fn invert(matrix: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     let turned = matrix[1][0].abs() > matrix[0][0].abs();
     let (first, second) = if turned {
@@ -187,7 +195,7 @@ fn invert(matrix: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     if !reciprocal.is_finite() || !rest.is_finite() {
         return None;
     }
-    // The solutions for the two columns of the identity, whose rows were exchanged with those of the matrix.
+    // Solve for the two columns of the identity. Their rows are exchanged like those of the matrix.
     let mut inverse = [[0.0; 2]; 2];
     for (column, (a, b)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
         let (a, b) = if turned { (b, a) } else { (a, b) };
@@ -216,7 +224,7 @@ mod tests {
         let shape = shape(&distance);
         let motion = Motion::new([3.1, 2.7], [4.0, -2.0], [[1.0, 0.0], [0.0, 1.0]]).unwrap();
         let window = motion.window(&shape, [20, 20]).unwrap();
-        // The centre rounds: a pixel more may be seen on each side.
+        // The centre causes rounding, so the window may have one more pixel on each side.
         assert!(window.low[0] <= 6 && window.low[0] + window.shape[0] >= 9);
         assert_eq!(window.low[1], 0);
         let placed = motion

@@ -1,28 +1,32 @@
-//! Triangles rasterised in bands of rows. A band looks at every triangle in order, so what a pixel shows cannot depend
-//! on threads; rows of cells that do not reach the band are passed over by their bounds.
+//! Triangles rasterised in bands of rows.
+//!
+//! A band visits every triangle in order, so the visible triangle of a pixel does not depend on
+//! threads. Rows of cells that do not reach the band are skipped by their bounds.
 
 use super::{Point, Warped};
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Rows of a band.
+/// Number of rows of a band.
 const BAND: usize = 32;
-/// A pixel that lies so little outside of a triangle belongs to it: neighbours leave no gap.
+/// Barycentric tolerance. A pixel slightly outside a triangle belongs to it, so that neighbours
+/// leave no gap.
 const SLACK: f64 = -1e-9;
-/// How far beyond its bounds a triangle is looked for.
+/// Margin around the bounds of a triangle, in pixels.
 const REACH: f64 = 1e-6;
-/// Triangles of less area, doubled, are not drawn.
+/// Minimum doubled area of a drawn triangle, in square pixels.
 const FLAT: f64 = 1e-9;
 
-/// A dense mesh: a vertex at the centre of each pixel of a source, two triangles a cell.
+/// A dense mesh: a vertex at the centre of each source pixel, and two triangles for each cell.
 #[derive(Debug, Clone, Copy)]
 pub struct Mesh<'a> {
     /// Rows and columns of the source.
     pub shape: [usize; 2],
-    /// Where each pixel goes.
+    /// Target of each pixel.
     pub target: &'a [Point],
-    /// Which of several layers is seen; void vertices, whose triangles are not drawn, have [`Mesh::VOID`].
+    /// Weight of each vertex. The heaviest of several layers is visible. Triangles with a vertex of
+    /// weight [`Mesh::VOID`] are not drawn.
     pub weight: &'a [u8],
 }
 
@@ -31,7 +35,7 @@ impl Mesh<'_> {
     pub const VOID: u8 = 255;
 }
 
-/// Three corners: where they go, where they come from, and what they weigh.
+/// Three corners: targets, sources and total weight.
 #[derive(Clone, Copy)]
 pub(super) struct Triangle {
     pub target: [Point; 3],
@@ -40,12 +44,13 @@ pub(super) struct Triangle {
 }
 
 impl Triangle {
-    /// Twice the signed area after and before: of opposite signs where the triangle is turned over.
+    /// Returns twice the signed area after and before the warp. The signs differ if the triangle is
+    /// flipped.
     fn areas(&self) -> (f64, f64) {
         (doubled(&self.target), doubled(&self.source))
     }
 
-    /// Whether the warp turns it over, or leaves nothing of it.
+    /// Whether the warp flips or flattens the triangle.
     #[inline(always)]
     pub(super) fn turned(&self) -> bool {
         let (after, before) = self.areas();
@@ -72,13 +77,13 @@ impl Band<'_> {
         [self.first as f64, last as f64]
     }
 
-    /// Draws a triangle, the `number`-th, where nothing heavier was drawn.
+    /// Draws triangle `number` at pixels without a heavier triangle.
     #[inline(always)]
     pub(super) fn draw(&mut self, number: u32, t: &Triangle) {
         let [a, b, c] = t.target;
         let low = |axis: usize| a[axis].min(b[axis]).min(c[axis]) - REACH;
         let high = |axis: usize| a[axis].max(b[axis]).max(c[axis]) + REACH;
-        // Most triangles hold no centre of a pixel, and are done with here.
+        // Most triangles do not contain a pixel centre, so they end here.
         let y = pixels(
             low(0),
             high(0),
@@ -93,6 +98,7 @@ impl Band<'_> {
         if after.abs() < FLAT || after.is_nan() {
             return;
         }
+        // A heavier triangle has a higher rank. With equal weights, an unflipped triangle does.
         let rank = 1 + 2 * t.weight + u32::from((after > 0.0) == (before > 0.0));
         let scale = 1.0 / after;
         for y in y {
@@ -120,7 +126,8 @@ impl Band<'_> {
 }
 
 impl Band<'_> {
-    /// Draws both triangles of a cell, of the numbers `number` and the next, whose first corner is at `corner`.
+    /// Draws both triangles of a cell. They have the numbers `number` and `number + 1`, and the
+    /// cell starts at `corner`.
     #[inline(always)]
     fn draw_cell(&mut self, number: u32, corner: [usize; 2], cell: &Cell) {
         let [a, b, c, d] = cell.target;
@@ -146,7 +153,7 @@ impl Band<'_> {
             let rank = 1 + 2 * weight + u32::from(area < 0.0);
             let scale = 1.0 / area;
             let (b0, b1, c0, c1) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
-            // Steps along a row; exact where the cell moves by whole pixels.
+            // Steps along a row. They are exact if the cell moves by whole pixels.
             let (along_u, along_v) = (-c0 * scale, b0 * scale);
             let px = f64::from(xs.start as i32) - a[1];
             let mut py = f64::from((ys.start + self.first) as i32) - a[0];
@@ -159,7 +166,7 @@ impl Band<'_> {
                     u += along_u;
                     v += along_v;
                     let (u, v) = (here_u, here_v);
-                    // Not so where products overflow, and these are no numbers.
+                    // The test is false for NaN, which results if products overflow.
                     let inside = (u >= SLACK) & (v >= SLACK) & (u + v <= 1.0 - SLACK);
                     if !inside {
                         continue;
@@ -181,11 +188,12 @@ impl Band<'_> {
     }
 }
 
-/// The whole numbers in [low, high], less `first`, that are below `count`. Casts only: rounding functions are calls.
+/// Returns the integers in [low, high], minus `first`, that are below `count`. Only casts are used,
+/// because rounding functions would be calls.
 #[inline(always)]
 fn pixels(low: f64, high: f64, first: usize, count: usize) -> std::ops::Range<usize> {
     let (low, high) = (low - first as f64, high - first as f64);
-    // Also where they are not numbers.
+    // The comparisons also exclude NaN.
     if high < 0.0 || low > count as f64 || high.is_nan() || low.is_nan() {
         return 0..0;
     }
@@ -198,7 +206,8 @@ fn pixels(low: f64, high: f64, first: usize, count: usize) -> std::ops::Range<us
     start..(high.min(count as f64) as i32 as usize + 1).min(count)
 }
 
-/// Draws an output: `draw` gets each band, and draws what reaches its rows in the order of the triangles.
+/// Draws an output. `draw` is called with each band, and draws the triangles that reach its rows in
+/// their order.
 pub(super) fn bands(
     shape: [usize; 2],
     monitor: &Monitor,
@@ -252,7 +261,7 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
             format!("needs 2 to 2^31 pixels, two or more along each axis, got {rows} x {columns}"),
         ));
     }
-    // Bounds of each row of vertices, and what was turned over, row by row.
+    // Compute the bounds of each row of vertices, and count flipped triangles row by row.
     let bounds: Vec<[f64; 2]> = par::map(rows, |y| {
         source.target[y * columns..][..columns]
             .iter()
@@ -266,7 +275,8 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
             let cell = Cell::of(source, y, x);
             for (corners, weight) in cell.triangles() {
                 if let Some(weight) = weight {
-                    // Whether the warp turns it over, or leaves nothing of it: at rest areas are negative.
+                    // The unwarped mesh has negative areas, so other areas mean a flipped or
+                    // flattened triangle.
                     let area = doubled(&corners);
                     let turned = area > -FLAT || area.is_nan();
                     counts[0] += 1;
@@ -277,6 +287,7 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
         }
         counts
     });
+    // Draw the rows of cells that reach each band.
     let (places, triangle) = bands(shape, monitor, |band| {
         let [low, high] = band.rows();
         for y in 0..rows - 1 {
@@ -303,13 +314,13 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
     })
 }
 
-/// A cell of the mesh: where its corners go, row by row, and what they weigh.
+/// A cell of the mesh: targets and weights of its corners, row by row.
 struct Cell {
     target: [Point; 4],
     weight: [u8; 4],
 }
 
-/// Corners of the two triangles of a cell; neighbours share a diagonal.
+/// Corners of the two triangles of a cell, which share a diagonal.
 const HALVES: [[usize; 3]; 2] = [[0, 1, 2], [1, 3, 2]];
 
 impl Cell {
@@ -327,7 +338,7 @@ impl Cell {
         }
     }
 
-    /// Both triangles, with their weights where they are drawn.
+    /// Returns both triangles, with their weights if they are drawn.
     #[inline(always)]
     fn triangles(&self) -> [([Point; 3], Option<u32>); 2] {
         HALVES.map(|half| {

@@ -1,4 +1,4 @@
-//! Scattered points: a Delaunay triangulation of where they are, drawn where they go.
+//! Scattered points: the Delaunay triangulation of the sources, drawn at the targets.
 
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
@@ -7,7 +7,7 @@ use super::{Point, Warped};
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// Largest coordinate: what is drawn lies far within.
+/// Maximum absolute coordinate. Outputs are far smaller.
 const FAR: f64 = 1e7;
 
 struct Vertex {
@@ -22,7 +22,8 @@ impl HasPosition for Vertex {
     }
 }
 
-/// Warps by `source` points that go to `target`, into an output of `shape`; returns the corners of the triangles too.
+/// Warps `source` points to `target`, into an output of `shape`. Also returns the corners of the
+/// triangles.
 pub fn scattered(
     source: &[Point],
     target: &[Point],
@@ -48,6 +49,7 @@ pub fn scattered(
             ));
         }
     }
+    // Triangulate the sources. Duplicate points are an error.
     let mut triangulation = DelaunayTriangulation::<Vertex>::new();
     for (number, &at) in source.iter().enumerate() {
         let before = triangulation.num_vertices();
@@ -64,6 +66,7 @@ pub fn scattered(
             monitor.check()?;
         }
     }
+    // Sort the triangles, so that their order does not depend on the triangulation.
     let mut corners: Vec<[u32; 3]> = triangulation
         .inner_faces()
         .map(|face| {

@@ -46,7 +46,7 @@ fn whole_steps_are_exact_and_the_rest_is_open() {
 
 #[test]
 fn the_heavier_layer_is_seen_and_void_is_not_drawn() {
-    // Columns 4 to 7 slide over columns 0 to 3.
+    // Columns 4 to 7 move over columns 0 to 3.
     let target: Vec<Point> = grid(4, 8)
         .iter()
         .map(|p| if p[1] < 4.0 { *p } else { [p[0], p[1] - 4.0] })
@@ -77,7 +77,7 @@ fn what_is_turned_over_is_counted() {
 }
 
 proptest! {
-    /// The slow twin: every triangle over every pixel, with ranks compared afterwards.
+    /// The result must not depend on the number of threads.
     #[test]
     fn bands_and_threads_do_not_matter(
         moves in prop::collection::vec((-3.0f64..3.0, -3.0f64..3.0, 0u8..3), 72),
@@ -100,7 +100,7 @@ proptest! {
 
     #[test]
     fn scattered_points_agree_with_the_mesh(moves in prop::collection::vec((-0.3f64..0.3, -0.3f64..0.3), 4)) {
-        // An affine map, so that every triangulation gives the same.
+        // With an affine map, every triangulation gives the same result.
         let m = [[1.0 + moves[0].0, moves[0].1], [moves[1].0, 1.0 + moves[1].1]];
         let source = grid(7, 7);
         let target: Vec<Point> = source
