@@ -103,6 +103,7 @@ fn strip(draw: &mut Draw<'_>) {
     let Some(found) = agreed(|monitor| least_seam(&strip, monitor)) else {
         return;
     };
+    // The value must equal the cost of the labels and the maximum flow.
     let grid = Grid::new([rows, columns], [cyclic, false]).unwrap();
     let costs = [&along, &across];
     let sum = parted(&grid, &found.far, |axis, p, _| u64::from(costs[axis][p]));

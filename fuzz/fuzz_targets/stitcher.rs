@@ -152,6 +152,7 @@ fn pasted(draw: &mut Draw<'_>) {
     let most = count as u32 + u32::from(draw.seldom(16));
     let some = draw.mask(n);
     let sample = |draw: &mut Draw<'_>| -> Vec<u32> { draw.numbers(n, most).collect() };
+    // Some points show nothing yet.
     let shown: Vec<u32> = sample(draw)
         .iter()
         .zip(&some)
@@ -174,6 +175,7 @@ fn pasted(draw: &mut Draw<'_>) {
     };
     let patches: Vec<Vec<u32>> = (0..draw.within(1..=2)).map(|_| sample(draw)).collect();
     let views: Vec<&[u32]> = patches.iter().map(|p| &p[..]).collect();
+    // Judged values are numbers, and a cut respects mask and core.
     if let Some(values) = agreed(|monitor| samples.judge(&pasting, &views, monitor)) {
         assert!(values.iter().all(|v| !v.is_nan()));
     }

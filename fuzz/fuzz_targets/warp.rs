@@ -91,6 +91,7 @@ fn moved(draw: &mut Draw<'_>) {
         Ok(motion) => motion,
         Err(error) => return texrs_fuzz::speaks(&error),
     };
+    // The window is on the canvas, and the counts match the flags.
     let canvas = draw.shape(1..=20);
     let Some(window) = motion.window(&shape, canvas) else {
         return;

@@ -23,6 +23,7 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
     let appearance = Appearance::new(&colours, grid, 1, 2).unwrap();
     let region = Region::new(grid, [0; D]).unwrap();
     let sets = similar(&appearance, 3, 7, FEW, &Monitor::default()).unwrap();
+    // Start from coordinates with strong noise, so that the pass has work to do.
     let mut start: Vec<Place<D>> = vec![[side as i32 / 2 * ONE; D]; grid.len()];
     jitter(
         &mut start,
@@ -39,6 +40,7 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
         compensated: false,
     };
     group.throughput(Throughput::Elements(grid.len() as u64));
+    // Measure the sets and the pass separately.
     for threads in [1, 2] {
         let id = BenchmarkId::new(format!("similar, {side}^{D}"), threads);
         group.bench_function(id, |b| {

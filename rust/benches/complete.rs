@@ -22,6 +22,7 @@ pub(crate) fn bench(c: &mut Criterion) {
         let known: Vec<bool> = (0..side * side)
             .map(|i| !(inside(i / side) && inside(i % side)))
             .collect();
+        // Only patches that do not touch the hole are allowed.
         let reach = |r: usize, c: usize| {
             let free = |x: usize| x + patch <= side * 3 / 8 || x >= side * 5 / 8;
             free(r) || free(c)
@@ -40,6 +41,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             separation: 4,
             ratio: 3.0,
         };
+        // Compare the default method with the literal one.
         for (name, paper) in [("inwards", false), ("paper", true)] {
             let options = Options {
                 patch: [patch; 2],

@@ -169,6 +169,7 @@ fn stitching() {
     let side = 96;
     let grid = Grid::new([side; 2], [false; 2]).unwrap();
     let near = |p: [usize; 2]| p.map(|x| (x % 12) as f32 - 5.5);
+    // The elements are discs on a lattice of 12 pixels.
     let depth: Vec<f32> = grid
         .points()
         .map(|p| (5.0 - near(p)[0].hypot(near(p)[1])).max(0.0))
@@ -188,6 +189,7 @@ fn stitching() {
     };
     let source = Source::new(&image(side, 0), grid, 3, elements, classes).unwrap();
     let region = Region::new(grid, [0; 2]).unwrap();
+    // The weights are typical of the Python defaults.
     let options = stitcher::Options {
         patch: 32.0,
         overlap: 0.4,
@@ -223,6 +225,7 @@ fn correction() {
     let monitor = Monitor::default();
     let sets = coherence::similar(&appearance, 3, 7, FEW, &monitor).unwrap();
     let mut places: Vec<Place<2>> = vec![[side as i32 / 2 * ONE; 2]; grid.len()];
+    // Start from coordinates with strong noise, so that the pass has work to do.
     let far = (side as i32 / 2 * ONE) as u32;
     coherence::jitter(&mut places, &region, &[], far, 1, 0).unwrap();
     let options = coherence::Options {

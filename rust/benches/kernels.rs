@@ -25,6 +25,7 @@ fn bench_gather(c: &mut Criterion) {
     let data: Vec<u8> = (0..side * side * 3)
         .map(|i| noise.words([i as u32, 0, 0, 0])[0] as u8)
         .collect();
+    // The coordinates are between samples, so that they are interpolated.
     let coordinates: Vec<[f32; 2]> = (0..side * side)
         .map(|i| [(i / side) as f32 * 0.9, (i % side) as f32 * 0.9])
         .collect();

@@ -18,6 +18,7 @@ pub(crate) fn bench(c: &mut Criterion) {
         let disc: Vec<bool> = (0..side * side)
             .map(|i| ((i / side) as f32 - centre).hypot((i % side) as f32 - centre) < 0.8 * centre)
             .collect();
+        // The first three are solved directly, the disc by multigrid.
         for (name, edge, mask) in [
             ("fixed", Edge::Fixed, None),
             ("wrap", Edge::Wrap, None),

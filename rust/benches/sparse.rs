@@ -28,6 +28,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             rows: &rows,
             values: &values,
         };
+        // Measure the factorisation and the solution separately.
         let factor = || Cholesky::new(&matrix, 1 << 32, &Monitor::default()).unwrap();
         group.bench_function(BenchmarkId::new("factor", side), |b| b.iter(factor));
         let made = factor();

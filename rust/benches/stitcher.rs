@@ -61,6 +61,7 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
     group.sample_size(10);
     let source = balls::<D>(64);
     let region = Region::new(Grid::new([side; D], [false; D]).unwrap(), [0; D]).unwrap();
+    // The field rotates the texture along the first axis.
     let turned: Vec<Frame<D>> = (0..region.grid.len())
         .map(|p| {
             let angle = region.grid.point(p)[0] as f64 / side as f64;

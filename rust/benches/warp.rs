@@ -31,6 +31,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             .unwrap();
         });
     }
+    // A coarse lattice of 20 x 20 points.
     let points: Vec<Point> = (0..400)
         .map(|i| [(i / 20 * 27) as f64, (i % 20 * 27) as f64])
         .collect();

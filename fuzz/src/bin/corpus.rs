@@ -33,6 +33,7 @@ fn images(folder: &Path) -> io::Result<()> {
                 for side in [1, 3, 17] {
                     let pixels = bytes(side as u64, side * side * channels * sample.size());
                     let shape = [side, side, channels];
+                    // Some formats do not support some samples or channels.
                     let Ok(file) = encode("corpus", format, sample, shape, &pixels) else {
                         continue;
                     };

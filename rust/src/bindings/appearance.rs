@@ -315,6 +315,7 @@ impl Appearance {
             settled,
             seed,
         };
+        // The kernel corrects the caller's array in place.
         let (values, held, places) = (frames.as_slice()?, held.as_slice()?, places.as_slice_mut()?);
         run(py, progress, |monitor| {
             either!(&self.0, a, {

@@ -35,6 +35,7 @@ pub(super) fn smooth<'py>(
             Ok(Axis { weights, edge })
         })
         .collect::<PyResult<Vec<_>>>()?;
+    // The kernel smooths a copy, because the caller's array is read-only.
     match values {
         Numbers::Single(values) => {
             let mut made = memory::copied("values", values.as_slice()?)?;

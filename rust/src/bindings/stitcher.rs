@@ -76,6 +76,7 @@ impl Stitcher {
             classes: classes.as_slice()?,
             costs: costs.as_slice()?,
         };
+        // The number of axes selects the type of the source.
         run(py, None, |_| match shape.len() {
             2 => {
                 let grid = Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?;

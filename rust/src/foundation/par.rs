@@ -45,6 +45,7 @@ fn pool(threads: usize) -> Result<&'static ThreadPool> {
     let mut built = None;
     loop {
         match slot.get() {
+            // The list is append-only, so it can be traversed without a lock.
             Some(link) if link.process == process && link.threads == threads => {
                 return Ok(&link.pool);
             }
@@ -66,6 +67,7 @@ fn pool(threads: usize) -> Result<&'static ThreadPool> {
                     pool,
                     next: OnceLock::new(),
                 });
+                // Another thread may have appended first. Keep the built pool and continue.
                 if let Err(lost) = slot.set(link) {
                     built = Some(lost.pool);
                 }

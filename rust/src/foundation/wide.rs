@@ -27,7 +27,7 @@ pub(crate) fn wide<R>(work: impl FnOnce() -> R) -> R {
 /// Defines a function whose body is compiled for AVX2 and for the baseline, and chosen at run time.
 ///
 /// Its arguments remain function arguments, so the compiler can assume that slices do not overlap.
-/// This makes loops over rows 25 % faster than in a closure, as measured.
+/// As measured, loops over rows then take 25 % less time than in a closure.
 macro_rules! wide_fn {
     (
         $(#[$attribute:meta])*

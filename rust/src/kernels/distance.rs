@@ -46,6 +46,7 @@ pub fn outlines(
             format!("{shape:?} has an empty axis"),
         ));
     }
+    // Check the windows, then measure each piece in a task of its own.
     let fits = |n: &usize| (1..=MOST).contains(n);
     if let Some(piece) = pieces.iter().find(|p| !p.shape.iter().all(fits)) {
         return Err(Error::value(

@@ -175,6 +175,7 @@ fn anywhere(index: &Index, shape: [usize; 2], seed: u64, step: usize) -> Result<
                     })
             })
     };
+    // Count the allowed positions first, because a list of them could be large.
     let total = places().count() as u64;
     if total == 0 {
         let message = format!("of {shape:?}: no exemplar has an allowed place for it");

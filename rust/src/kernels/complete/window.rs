@@ -171,10 +171,12 @@ impl Window {
                 || (c > 0 && !known[r * columns + c - 1])
                 || (c + 1 < columns && !known[r * columns + c + 1])
         };
+        // The core: pixels to keep, and the known rim.
         for (i, core) in self.core.iter_mut().enumerate() {
             let (r, c) = (i / columns, i % columns);
             *core = self.keep[i] || (known[i] && rim(r, c) && !hole_beside(r, c));
         }
+        // The pairs of pixels to keep and holes, which lie outside every overlap.
         self.ends.clear();
         for i in 0..rows * columns {
             let beside = [

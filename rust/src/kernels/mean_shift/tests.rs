@@ -12,6 +12,7 @@ fn naive(image: &[f32], shape: [usize; 3], options: &Options) -> Vec<f32> {
         let mut at = [(i / columns) as isize, (i % columns) as isize];
         for _ in 0..options.max_iterations {
             let (mut count, mut sum, mut moved) = (0.0f32, vec![0.0f32; channels], [0.0f32; 2]);
+            // Sum the samples of the window that are near the current colour.
             for dy in -reach..=reach {
                 for dx in -reach..=reach {
                     let (Some(y), Some(x)) =
@@ -35,6 +36,7 @@ fn naive(image: &[f32], shape: [usize; 3], options: &Options) -> Vec<f32> {
             if count == 0.0 {
                 break;
             }
+            // Move to their mean position and colour.
             let (mut stayed, mut distance) = (true, 0.0f32);
             for (axis, n) in [rows, columns].into_iter().enumerate() {
                 let by = (f64::from(moved[axis]) / f64::from(count)).round_ties_even() as isize;
@@ -116,6 +118,7 @@ fn refuses_what_it_cannot_filter() {
         wrap: [false; 2],
     };
     let monitor = Monitor::default();
+    // Invalid images, then invalid options, then a cancelled monitor.
     assert!(filter(&[0.0; 4], [2, 2, 2], &options, &monitor).is_err());
     assert!(filter(&[], [0, 2, 1], &options, &monitor).is_err());
     assert!(filter(&[f32::NAN; 4], [2, 2, 1], &options, &monitor).is_err());

@@ -13,6 +13,7 @@ fn naive(exemplars: &[Exemplar], channels: usize, query: &Query<'_>) -> Vec<Matc
                 {
                     continue;
                 }
+                // Samples of weight 0 may be NaN, so they are skipped.
                 let mut cost = 0.0;
                 for i in 0..p {
                     for j in 0..q {
@@ -103,6 +104,7 @@ fn half_the_resolution_finds_what_is_there() {
         (58, 49, 16),
         (7, 7, 9),
     ] {
+        // Cut a patch out of the exemplar, and search for it.
         let patch: Vec<f32> = (0..side * side)
             .map(|i| e.data[(row + i / side) * 81 + column + i % side])
             .collect();
@@ -124,6 +126,7 @@ fn half_the_resolution_finds_what_is_there() {
                     .unwrap()
             })
             .into();
+        // The result is the same for any number of threads, and finds the patch.
         assert!(by_pool.iter().all(|found| *found == by_pool[0]));
         let best = by_pool[0][0];
         assert_eq!(

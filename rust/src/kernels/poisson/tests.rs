@@ -54,6 +54,7 @@ impl Owned {
             for x in 0..columns {
                 for c in 0..channels {
                     let at = |y: usize, x: usize| (y * columns + x) * channels + c;
+                    // Add the gradient of each difference and of the screening.
                     let mut edge = |to: usize, wanted: f32| {
                         let lack = f64::from(v[to]) - f64::from(v[at(y, x)]) - f64::from(wanted);
                         slope[to] += lack;
@@ -70,6 +71,7 @@ impl Owned {
                 }
             }
         }
+        // Only free pixels have a gradient of zero. Fixed pixels must not change.
         let mut worst = 0.0f64;
         for y in 0..rows {
             for x in 0..columns {
@@ -238,6 +240,7 @@ fn refuses_what_does_not_fit() {
     let monitor = Monitor::default();
     let right = owned.problem();
     let elsewhere = |domain| Problem { domain, ..right };
+    // Wrong shape, overflowing shape, screening, mask and gradients.
     let wrong = [
         elsewhere(Domain {
             shape: [5, 5, 1],

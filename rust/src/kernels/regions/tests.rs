@@ -78,6 +78,7 @@ fn smoothed(image: &[f32], [rows, columns, channels]: [usize; 3], options: &Opti
         .collect();
     let sum: f64 = taps.iter().sum();
     let taps: Vec<f64> = taps.iter().map(|t| t / sum).collect();
+    // Beyond its ends, an axis wraps or is mirrored.
     let resolve = |i: isize, n: usize, wrap: bool| {
         let n = n as isize;
         if wrap {
@@ -90,6 +91,7 @@ fn smoothed(image: &[f32], [rows, columns, channels]: [usize; 3], options: &Opti
         i as usize
     };
     let mut values: Vec<f64> = image.iter().map(|&x| f64::from(x)).collect();
+    // Smooth along columns, then along rows, in the same order of sums as the kernel.
     for axis in 0..2 {
         let before = values.clone();
         for r in 0..rows {

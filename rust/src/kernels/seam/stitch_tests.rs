@@ -15,6 +15,7 @@ fn value(o: &Overlap<'_, 2>, b: &[bool]) -> f64 {
             let Some(t) = o.grid.next(o.grid.point(s), axis).map(|t| o.grid.index(t)) else {
                 continue;
             };
+            // Only edges inside the overlap have a cost.
             if !both(s) || !both(t) {
                 continue;
             }
@@ -26,6 +27,7 @@ fn value(o: &Overlap<'_, 2>, b: &[bool]) -> f64 {
                 w /= l1(&pixel(o.a, s), &pixel(o.a, t)) + l1(&pixel(o.b, s), &pixel(o.b, t)) + 0.05;
             }
             w += 1e-4;
+            // An old seam replaces the cost of its edge.
             let (mut kept, mut ab, mut ba) = (0.0, w, w);
             if let Some(old) = o.old
                 && old.kept[axis][s] > 0.0

@@ -293,6 +293,7 @@ mod tests {
             cost: Cost::Gradient,
         };
         let cut = |p: Pasted<'_>| cut(&p, &Monitor::default());
+        // Too few pixels, an unknown axis, NaN values and a negative penalty are errors.
         assert!(cut(pasted).is_err());
         assert!(cut(Pasted { axis: 2, ..pasted }).is_err());
         assert!(
@@ -312,6 +313,7 @@ mod tests {
             .is_err()
         );
         assert_eq!(cut(Pasted { axis: 0, ..pasted }).unwrap().edges, 1);
+        // Images without channels can be cut.
         let bare = Pasted {
             axis: 0,
             channels: 0,

@@ -222,6 +222,7 @@ pub(super) fn bands(
     let mut places = memory::filled("the output", [f32::NAN; 2], pixels)?;
     let mut triangle = memory::filled("the output", 0u32, pixels)?;
     monitor.expect(rows.div_ceil(BAND) as u64);
+    // Each band is a task with its own rows of the output.
     let mut pairs: Vec<_> = places
         .chunks_mut(BAND * columns)
         .zip(triangle.chunks_mut(BAND * columns))

@@ -101,6 +101,7 @@ impl Level {
         let shape = [self.rows.div_ceil(2), self.columns.div_ceil(2)];
         let mut coarse = Self::empty(shape, self.sides, 4.0 * self.screening);
         let mut open = coarse.zeros();
+        // The four children of a parent. Children beyond the grid are 0.
         let children = |data: &[f32], r: usize, c: usize| -> [f32; 4] {
             let inside = |r: usize, c: usize| r < self.rows && c < self.columns;
             let at = |r, c| {

@@ -20,6 +20,7 @@ pub(in crate::kernels::seam) fn naive<const D: usize>(graph: &Graph<'_, D>) -> C
     }
     let mut value = 0;
     loop {
+        // Find a shortest augmenting path by breadth-first search.
         let mut from = vec![usize::MAX; n + 2];
         from[source] = source;
         let mut queue = std::collections::VecDeque::from([source]);
@@ -38,6 +39,7 @@ pub(in crate::kernels::seam) fn naive<const D: usize>(graph: &Graph<'_, D>) -> C
             std::iter::successors(Some(sink), |&q| (from[q] != source).then(|| from[q]))
                 .map(|q| (from[q], q))
                 .collect();
+        // Push the bottleneck along the path.
         let flow = path.iter().map(|&(p, q)| capacity[p][q]).min().unwrap();
         for (p, q) in path {
             capacity[p][q] -= flow;
@@ -45,6 +47,7 @@ pub(in crate::kernels::seam) fn naive<const D: usize>(graph: &Graph<'_, D>) -> C
         }
         value += flow;
     }
+    // Collect the nodes that can still reach the sink.
     let mut reaches = vec![false; n + 2];
     reaches[sink] = true;
     let mut stack = vec![sink];
