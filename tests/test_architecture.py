@@ -14,7 +14,7 @@ LAYERS = (
     ("_rust", "errors", "_typing"),
     ("_calls", "_memory", "_notices"),
     ("limits",),
-    ("_cache", "_checks", "_digits", "_progress", "_version"),
+    ("_alpha", "_cache", "_checks", "_digits", "_progress", "_version"),
     ("io",),
     ("_conversion",),
     ("_masks",),

@@ -36,10 +36,10 @@ def draw_normals(dtype: str) -> Array:
 
 EVERY = Material(
     {
-        "albedo": draw("uint8", 4),
+        "albedo": np.maximum(draw("uint8", 4), np.uint8([0, 0, 0, 1])),
         "basecolor": draw("uint16", 3),
         "diffuse": draw("float32", 3),
-        "grey": draw("uint8", 2),
+        "grey": np.maximum(draw("uint8", 2), np.uint8([0, 1])),
         "normal": draw_normals("uint8"),
         "normal_dx": draw_normals("uint16"),
         "nor": draw("float16", 4),
@@ -182,6 +182,7 @@ def test_every_layer_of_a_render_is_used_or_reported(tmp_path: Path) -> None:
         f"{path}: Puddles not used: the name gives no role",
     ]
     assert back.notices.assumed == [
+        f"{path}: Combined: colours are not divided by alpha, because clear pixels have colours",
         f"{path}: Depth, Mist read as other: a distance from the camera is not a height",
         f"{path}: IndexOB read as labels",
         f"{path}: Normal read as tangent-space normals, y up; a render has them in world space",
@@ -190,7 +191,7 @@ def test_every_layer_of_a_render_is_used_or_reported(tmp_path: Path) -> None:
     with pytest.warns(InputWarning):
         stated = Material.read(path, roles={"Depth": "height", "Normal": "vector"})
     assert stated["Depth"].role is Role.HEIGHT
-    assert stated.notices.assumed == [
+    assert stated.notices.assumed[1:] == [
         f"{path}: IndexOB read as labels",
         f"{path}: Mist read as other: a distance from the camera is not a height",
     ]
@@ -284,3 +285,106 @@ def test_bad_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         Material.read(path)
     with pytest.raises(FileError, match=r"pip install texrs\[materials\]"):
         EVERY.save_exr(tmp_path / "b.exr")
+
+
+def draw_leaf(dtype: str, *, clear: bool) -> Array:
+    """Return linear colours with alpha: 0 in some pixels if they may be clear."""
+    pixels = np.dstack([RANDOM.uniform(0.1, 1, (*SHAPE, 3)), RANDOM.uniform(0.05, 1, SHAPE)])
+    if clear:
+        pixels[:5] = 0
+    return pixels.astype(dtype)
+
+
+@pytest.mark.parametrize("clear", [True, False])
+def test_colours_are_multiplied_by_alpha_in_files(clear: bool, tmp_path: Path) -> None:
+    leaf = draw_leaf("float32", clear=clear)
+    opaque = np.float32(leaf[..., :1])
+    made = Material({"albedo": leaf, "height": opaque, "nor": leaf}, spaces={"albedo": "linear"})
+    channels, _ = read_layers(made.save_exr(tmp_path / "a.exr"))
+    for k, letter in enumerate("RGB"):
+        np.testing.assert_allclose(channels[f"albedo.{letter}"], leaf[..., k] * leaf[..., 3], atol=1e-7)
+    assert (channels["albedo.A"] == leaf[..., 3]).all()
+    # The fourth channel of normals is not their transparency.
+    assert (channels["nor.0"] == leaf[..., 0]).all()
+    np.testing.assert_allclose(Material.read(tmp_path / "a.exr")["albedo"].pixels, leaf, atol=1e-6)
+    made.save(tmp_path / "folder", suffix=".exr")
+    stored = io.read(tmp_path / "folder" / "albedo.exr")
+    np.testing.assert_allclose(stored[..., :3], leaf[..., :3] * leaf[..., 3:], atol=1e-7)
+    assert (io.read(tmp_path / "folder" / "nor.exr") == leaf).all()
+    back = Material.read(tmp_path / "folder")
+    np.testing.assert_allclose(back["albedo"].pixels, leaf, atol=1e-6)
+    assert (
+        "albedo.exr: colours are divided by alpha, because EXR files have them multiplied by it" in back.notices.assumed
+    )
+    # A file of another program, with and without clear pixels.
+    other = {f"L.Color.{letter}": channels[f"albedo.{letter}"] for letter in "RGBA"}
+    foreign = Material.read(write(tmp_path / "b.exr", [({}, other)]))
+    np.testing.assert_allclose(foreign["L.Color"].pixels, leaf, atol=1e-6)
+
+
+def test_colours_under_no_alpha_are_reported(tmp_path: Path) -> None:
+    leaf = draw_leaf("float32", clear=False)
+    leaf[:7, :, 3] = 0
+    with pytest.warns(InputWarning, match=r"albedo: colours of 33 % of the pixels, whose alpha is 0, are not kept"):
+        Material({"albedo": leaf}).save_exr(tmp_path / "a.exr")
+    straight = {f"L.Color.{letter}": leaf[..., k].copy() for k, letter in enumerate("RGBA")}
+    back = Material.read(write(tmp_path / "b.exr", [({}, straight)]))
+    assert (back["L.Color"].pixels == leaf).all()
+    assert "colours are not divided by alpha, because clear pixels have colours" in back.notices.assumed[0]
+
+
+def test_a_picture_with_alpha_changes_between_exr_and_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """EXR to EXR keeps the values, and other formats have colours that are not multiplied."""
+    leaf = draw_leaf("float32", clear=False)
+    bound = np.dstack([leaf[..., :3] * leaf[..., 3:], leaf[..., 3]])
+    write(tmp_path / "in.exr", [({}, {letter: bound[..., k].copy() for k, letter in enumerate("RGBA")})])
+    io.write(tmp_path / "in.tif", leaf)
+    hole = np.zeros(SHAPE, np.uint8)
+    hole[8:12, 8:12] = 255
+    io.write(tmp_path / "hole.png", hole)
+    for given in ("exr", "tif"):
+        for out in ("exr", "tif"):
+            target = tmp_path / f"{given}-out.{out}"
+            mask = str(tmp_path / "hole.png")
+            assert main(["complete", str(tmp_path / f"in.{given}"), mask, "-o", str(target)]) == 0
+            known = io.read(target)[hole == 0]
+            truth = (bound if out == "exr" else leaf)[hole == 0]
+            np.testing.assert_allclose(known, truth, rtol=0 if given == out else 1e-5)
+            said = "output: colours are divided by alpha" in capsys.readouterr().err
+            assert said is ((given, out) == ("exr", "tif"))
+
+
+def test_layers_keep_their_names(tmp_path: Path) -> None:
+    """A picture without a layer stays the picture that other programs show, and Blender finds its layers again."""
+    one = RANDOM.uniform(0, 1, SHAPE).astype(np.float32)
+    names = [
+        "R",
+        "G",
+        "B",
+        "mask.R",
+        "ViewLayer.Depth.Z",
+        "ViewLayer.Normal.X",
+        "ViewLayer.Normal.Y",
+        "ViewLayer.Normal.Z",
+    ]
+    first = Material.read(write(tmp_path / "a.exr", [({}, {name: one + k for k, name in enumerate(names)})]))
+    second = Material.read(first.save_exr(tmp_path / "b.exr"))
+    channels, _ = read_layers(second.save_exr(tmp_path / "c.exr"))
+    assert sorted(channels) == sorted(names)
+    for k, name in enumerate(names):
+        assert (channels[name] == one + k).all(), name
+    assert {name: each.role.value for name, each in second.items()} == {
+        name: each.role.value for name, each in first.items()
+    }
+
+
+def test_a_channel_without_a_layer_is_called_by_its_word(tmp_path: Path) -> None:
+    one = RANDOM.uniform(0, 1, SHAPE).astype(np.float32)
+    path = write(tmp_path / "a.exr", [({}, {"height": one, "roughness": one / 2})])
+    back = Material.read(path)
+    assert {name: each.role.value for name, each in back.items()} == {"height": "height", "roughness": "roughness"}
+    assert (back["roughness"].pixels == one / 2).all()
+    ids = Material.read(write(tmp_path / "b.exr", [({}, {"id": (one * 9).astype(np.uint32)})]))
+    assert ids["id"].role is Role.LABELS

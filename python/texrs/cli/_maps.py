@@ -79,7 +79,9 @@ def apply_command(
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
                 image = make_map(paths[0], images, places, values, fit(finish, paths, given))
             if places.axes == 2:
-                io.write(temporary, image)
+                packed = find_packed(paths[0]) is not None
+                coloured = not packed and read_kind(paths[0], images, places, values)[0] == "colour"
+                io.write(temporary, image, notes=io.Notes(multiplied=like.multiplied if coloured else None))
             else:
                 _outputs.write_like(temporary, image, _outputs.find_volume(paths[0], 3))
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)

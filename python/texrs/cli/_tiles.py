@@ -120,8 +120,9 @@ def tiles_command(
         made = tiles.window(asked.origin, sides)
     if made.material is None:
         notes = io.read_notes(given["exemplar"]) if os.path.isfile(given["exemplar"]) else io.Notes()
-        with _outputs.write_output(out, like=io.Notes(profile=notes.profile, srgb=notes.srgb)) as temporary:
-            io.write(temporary, made.image)
+        like = io.Notes(profile=notes.profile, srgb=notes.srgb, multiplied=notes.multiplied)
+        with _outputs.write_output(out, like=like) as temporary:
+            io.write(temporary, made.image, notes=like)
     else:
         stack.deliver(made, {"out": out})
     note(f"wrote {out}: {describe(made.image, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)

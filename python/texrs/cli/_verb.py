@@ -29,7 +29,7 @@ from texrs.cli._provenance import check_free
 from texrs.cli._stacks import OPTIONS, SHOWN, Stack
 from texrs.cli._texts import About
 from texrs.errors import LimitExceeded
-from texrs.materials import Material
+from texrs.materials import Material, guess_role
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
@@ -198,6 +198,9 @@ class Verb:
         if self.fills and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
             ignore(f"{os.path.basename(name)}: its georeference is not written, because only TIFF holds it")
         notes = notes if self.fills else replace(notes, georeference=())
+        role = guess_role(Path(name).stem)
+        if role is not None and not role.coloured:
+            notes = replace(notes, multiplied=None)
         return replace(notes, made=None, density=notes.density if self.scaled else None)
 
     def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:

@@ -63,7 +63,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from texrs import _notices
+from texrs import _alpha, _notices
 from texrs._checks import as_instance, as_items, as_limit, try_array
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
@@ -326,7 +326,8 @@ def write(
     description : str, optional
         What the file is to say of itself, in letters of ASCII: PNG and TIFF keep it (`read_description`), the others do not.
     notes : Notes, optional
-        Metadata that `annotate` cannot write. TIFF files keep the georeference.
+        Metadata that `annotate` cannot write. TIFF files keep the georeference. Colours are multiplied by alpha in EXR files
+        and divided by it in other files, if ``multiplied`` does not say that they already are. Default: None.
 
     Raises
     ------
@@ -348,7 +349,8 @@ def write(
     """
     if description is not None and not (isinstance(description, str) and description.isascii()):
         raise InvalidInput(f"description: needs letters of ASCII, got {description!r}")
-    said = Notes() if notes is None else as_instance(notes, "notes", Notes)
+    said = Notes(multiplied=None) if notes is None else as_instance(notes, "notes", Notes)
+    array = _alpha.adapt(array, _files.as_path(path), said.multiplied)
     _write(path, array, 2, overwrite, None, description, said.georeference)
 
 

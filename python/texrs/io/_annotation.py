@@ -119,6 +119,8 @@ def read_notes(path: PathLike) -> Notes:
         with suppress(Exception):
             found = _READERS[kind](name)
     with suppress(Exception):
+        found |= {"multiplied": True} if kind == "exr" and "A" in _tags.list_exr_channels(name) else {}
+    with suppress(Exception):
         if (colours := _pillow.read_palette(name, kind)) is not None:
             found["palette"] = colours.tobytes()
     if "made" not in found:

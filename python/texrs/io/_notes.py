@@ -35,6 +35,9 @@ class Notes:
     georeference : tuple of (int, int, int, object)
         Tags of a TIFF file that state the position of its pixels on the earth, and the value that stands for no data.
         Each has a code, a type, a number of values, and a value, as tifffile returns them. `write` writes them.
+    multiplied : bool, optional
+        If True, colours are multiplied by alpha, as in EXR files. None for an image whose alpha is not a transparency.
+        Default: False.
 
     Examples
     --------
@@ -52,6 +55,7 @@ class Notes:
     made: str | None = None
     palette: bytes | None = None
     georeference: tuple[tuple[int, int, int, Any], ...] = ()
+    multiplied: bool | None = False
 
     @property
     def nodata(self) -> float | None:

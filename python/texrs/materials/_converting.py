@@ -25,8 +25,6 @@ __all__ = ["choose_dtype", "convert"]
 
 SPREAD = (Role.HEIGHT, Role.OTHER)
 """Roles whose values have no fixed range."""
-CLEAR = 0.02
-"""Maximum alpha of a pixel that is not seen."""
 WHOLE = 2**24
 """Single precision holds all whole numbers up to this one."""
 
@@ -79,24 +77,12 @@ def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any], axes: int) 
         light[..., -1:] = to_light(each.pixels[..., -1:], "linear")
     if space == "linear":
         return light
-    if clear and is_multiplied(light):
-        assume(f"{name}: colours are divided by alpha, because none is larger than alpha, as in EXR files")
-        light[..., :-1] /= np.where(light[..., -1:] > 0, light[..., -1:], 1)
     if dtype.kind != "f":
         report_cut(name, light)
     shown = encode_srgb(light)
     if clear:
         shown[..., -1] = light[..., -1]
     return shown
-
-
-def is_multiplied(light: Floats) -> bool:
-    """Return whether colours are multiplied by alpha: some pixels are clear, and 99 % have no colour larger than alpha."""
-    alpha, most = light[..., -1], light[..., :-1].max(axis=-1)
-    clear = alpha <= CLEAR
-    if not clear.any() or clear.all():
-        return False
-    return bool((most[clear] <= 2 * CLEAR).mean() >= 0.99 and (most <= alpha + CLEAR).mean() >= 0.99)
 
 
 def to_float(pixels: Array, dtype: np.dtype[Any]) -> Array:

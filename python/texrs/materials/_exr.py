@@ -3,7 +3,7 @@
 ================ ================================ ===========================================================
 Role             Channels of the layer            Values
 ================ ================================ ===========================================================
-colours, others  R G B, R G B A, Y, Y A           linear light; integers as shares of their range
+colours, others  R G B, R G B A, Y, Y A           linear light, multiplied by alpha; integers as shares of their range
 normals, vectors X Y, X Y Z, X Y Z A              integers as -1 to 1, y as the role says
 labels           Y                                whole numbers of 32 bit
 more than 4      0, 1, 2, ...                     as above, also normals without z that have 3 or 4 channels
@@ -18,12 +18,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
+from texrs._alpha import divide, has_alpha, multiply, undo
 from texrs._checks import as_float
 from texrs._colours import encode_srgb, to_light, to_pixels
 from texrs._notices import assume, ignore
@@ -74,8 +75,11 @@ def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: M
         }
         if name in weights:
             said[name]["weight"] = weights[name]
-        for number, letter in enumerate(name_channels(each.role, pixels.shape[-1])):
-            channels[f"{name}.{letter}"] = stored[..., number]
+        names = list(each.layer)
+        if len(names) != pixels.shape[-1]:
+            names = [f"{name}.{letter}" for letter in name_channels(each.role, pixels.shape[-1])]
+        said[name]["names"] = names
+        channels |= {full: stored[..., number] for number, full in enumerate(names)}
     write_layers(target, channels, json.dumps({"maps": said}))
     return target
 
@@ -105,13 +109,17 @@ def store(name: str, pixels: Array, each: Map, depth: int | None) -> Array:
     if each.space == "srgb" and pixels.shape[-1] in (2, 4):
         # Transparency is a share, whatever colours are encoded in.
         light[..., -1:] = to_light(pixels[..., -1:], "linear")
-    return light.astype(wanted)
+    stored = light.astype(wanted)
+    return multiply(stored, name) if each.role.coloured and has_alpha(stored) else stored
 
 
 def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Array:
     """Return the values that a layer was made of."""
     if stored.dtype == np.uint32:
         return stored.view(np.int32).astype(dtype) if dtype.kind == "i" else stored.astype(dtype)
+    if role.coloured and has_alpha(stored):
+        # Half precision would round the quotient.
+        stored = undo(stored.astype(dtype if dtype.kind == "f" else np.float32))
     if dtype == stored.dtype and space == "linear":
         return stored
     values: Array = stored.astype(np.float32)
@@ -130,12 +138,20 @@ def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Arra
 def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role], dict[str, float]]:
     """Return the maps of a file, a layer each, the roles that were said of them, and the weights."""
     channels, words = read_layers(path)
-    known = parse(words)
+    known = parse(words, channels)
+    full_names = {id(pixels): full for full, pixels in channels.items()}
     layers: dict[str, dict[str, Array]] = {}
-    for full, pixels in channels.items():
-        layer, _, letter = full.rpartition(".")
-        layers.setdefault(layer or PICTURE, {})[letter] = pixels
-    if not known:
+    if known:
+        layers = {
+            name: {str(k): channels[full] for k, full in enumerate(told["names"])} for name, told in known.items()
+        }
+    else:
+        for full, pixels in channels.items():
+            title, _, letter = full.rpartition(".")
+            if not title and len(letter) > 1 and letter[0].isalpha():
+                # A whole word is the name of a map, not of a channel.
+                title, letter = letter, "Y"
+            layers.setdefault(title or PICTURE, {})[letter] = pixels
         layers = {name: part for layer, letters in layers.items() for name, part in split_layer(layer, letters).items()}
         layers = dict(zip(shorten(list(layers)), layers.values(), strict=True))
     said = {name: as_role(role, f"roles[{name!r}]") for name, role in roles.items()}
@@ -146,11 +162,14 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
     taken: dict[str, list[str]] = {}
     for name, letters in layers.items():
         stored = join(str(path), name, letters)
+        layer = tuple(full_names[id(pixels)] for pixels in sort_channels(letters))
         if name in known:
             told = known[name]
             first = as_role(told["role"], name)
             pixels = restore(stored, first, told["space"], np.dtype(told["dtype"]))
-            maps[name] = Map(pixels if told["channels"] else pixels[..., 0], said.get(name, first), told["space"])
+            maps[name] = Map(
+                pixels if told["channels"] else pixels[..., 0], said.get(name, first), told["space"], layer=layer
+            )
             continue
         role, why = (said[name], "") if name in said else guess_pass(name, stored)
         if role is None:
@@ -158,7 +177,9 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
             continue
         if why:
             taken.setdefault(why, []).append(name)
-        maps[name] = Map(stored if stored.shape[-1] > 1 else stored[..., 0], role, "linear")
+        if role.coloured and has_alpha(stored):
+            stored = divide(stored, f"{path}: {name}")
+        maps[name] = Map(stored if stored.shape[-1] > 1 else stored[..., 0], role, "linear", layer=layer)
     lines = [f"{show_names(names)} not used: {why}" for why, names in left.items()]
     if not maps:
         raise FileError(f"{path}: no layer has a name that says what it is for; say it by roles ({'; '.join(lines)})")
@@ -204,15 +225,20 @@ def guess_pass(name: str, pixels: Array) -> tuple[Role | None, str]:
     return role, "other: a distance from the camera is not a height" if distance else ""
 
 
-def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
-    """Return the channels of a layer as one array, in the order of their letters or numbers."""
+def sort_channels(letters: Mapping[str, Array]) -> list[Array]:
+    """Return the channels of a layer in the order of their letters or numbers."""
 
     def rank(letter: str) -> tuple[int, int, str]:
         if letter.isdigit():
             return 1, int(letter), ""
         return (0, ORDER.index(letter.upper()), "") if letter.upper() in ORDER and len(letter) == 1 else (2, 0, letter)
 
-    parts = [letters[letter] for letter in sorted(letters, key=rank)]
+    return [letters[letter] for letter in sorted(letters, key=rank)]
+
+
+def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
+    """Return the channels of a layer as one array, in the order of their letters or numbers."""
+    parts = sort_channels(letters)
     if len({p.dtype for p in parts}) > 1:
         if any(p.dtype.kind == "u" for p in parts):
             raise FileError(f"{path}: the layer {name} mixes whole numbers with others")
@@ -220,13 +246,15 @@ def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
     return np.stack(parts, axis=-1)
 
 
-def parse(words: str | None) -> dict[str, dict[str, Any]]:
-    """Return what the header says of maps; nothing where it says something else."""
+def parse(words: str | None, there: Container[str]) -> dict[str, dict[str, Any]]:
+    """Return what the header says of maps and their channels; nothing if it says something else."""
     try:
         maps = json.loads(words or "{}").get("maps", {})
         for each in maps.values():
             as_role(each["role"], "role")
             if np.dtype(each["dtype"]).kind not in "buif" or each["space"] not in ("srgb", "linear"):
+                return {}
+            if not each["names"] or not all(full in there for full in each["names"]):
                 return {}
             each["channels"] = int(each["channels"])
             if "weight" in each:

@@ -13,6 +13,7 @@ from typing import cast
 import numpy as np
 
 from texrs import io
+from texrs._alpha import divide, has_alpha, multiply
 from texrs._checks import as_instance
 from texrs._notices import assume, ignore
 from texrs._threads import SideBySide
@@ -155,6 +156,8 @@ def read_map(file: FilePath, role: Role, axes: int) -> Map:
         if space == "srgb" and notes.gamma == 1 and not notes.srgb:
             space = "linear"
         report_colours(file, notes, space)
+        if file.suffix.lower() == ".exr" and has_alpha(pixels):
+            pixels = divide(pixels, file.name)
     elif role in (Role.NORMAL, Role.NORMAL_DX) and file.suffix.lower() in LOSSY and pixels.ndim == axes + 1 == 3:
         pixels = restore_z(file, pixels)
     return Map(pixels, role, space)
@@ -264,8 +267,16 @@ def write_maps(
                 small.append(smaller / f"{stem}.{level}{endings[name]}")
                 work.append((stack.enter_context(io.atomic(small[-1])), name, less))
         with SideBySide(AT_ONCE) as beside:
-            beside.do(lambda each, _: write(each[0], convert(each[1], each[2], depth, axes).pixels), work)
+            beside.do(
+                lambda each, _: write(each[0], prepare(each[1], convert(each[1], each[2], depth, axes), each[0])), work
+            )
     return files + small
+
+
+def prepare(name: str, each: Map, file: FilePath) -> Array:
+    """Return values as the format of a file has them: in EXR files colours are multiplied by alpha."""
+    multiplied = file.suffix.lower() == ".exr" and each.role.coloured and has_alpha(each.pixels)
+    return multiply(each.pixels, name) if multiplied else each.pixels
 
 
 def choose_suffix(each: Map, depth: int | None, axes: int = 2) -> str:

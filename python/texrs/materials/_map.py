@@ -34,6 +34,9 @@ class Map:
     file : str
         Name of the file that the map was read from, without the suffix; empty for a map made from an array. It is written to
         a file of this name again.
+    layer : tuple of str
+        Full names of the channels in the EXR file that the map was read from, such as ``"ViewLayer.Depth.Z"``. The map is
+        written to channels of these names again. Default: none.
 
     Examples
     --------
@@ -49,6 +52,7 @@ class Map:
     role: Role
     space: Space
     file: str = ""
+    layer: tuple[str, ...] = ()
 
     @property
     def depth(self) -> int:

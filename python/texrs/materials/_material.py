@@ -157,7 +157,9 @@ class Material(Exports):
         if space is not None:
             as_choice(space, f"spaces[{name!r}]", ("srgb", "linear"))
         kept = image if np.ndim(pixels) > self._axes else image[..., 0]
-        return Map(kept, chosen, space or usual, value.file if isinstance(value, Map) else "")
+        if isinstance(value, Map):
+            return replace(value, pixels=kept, role=chosen, space=space or usual)
+        return Map(kept, chosen, space or usual)
 
     def _settle(self, names: Collection[str], said: Collection[str]) -> None:
         """Give normals the role that their values show."""

@@ -1,0 +1,107 @@
+"""Colours and alpha: not multiplied in memory, multiplied in EXR files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from texrs._notices import assume, ignore
+from texrs._typing import Array
+
+__all__ = ["adapt", "divide", "has_alpha", "multiply", "undo"]
+
+CLEAR = 0.01
+"""Minimum level of a colour that is seen. Colours in clear pixels are noise below it."""
+MOST = 0.5
+"""Share of clear pixels with a colour above which a file does not have its colours multiplied by alpha."""
+
+
+def has_alpha(pixels: Array) -> bool:
+    """Return whether the last channel of an image is its alpha.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> has_alpha(np.zeros((4, 4, 4))), has_alpha(np.zeros((4, 4, 3)))
+    (True, False)
+
+    """
+    return pixels.ndim == 3 and pixels.shape[-1] in (2, 4)
+
+
+def multiply(pixels: Array, name: str) -> Array:
+    """Return linear colours multiplied by their alpha; report colours that this loses.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> multiply(np.float32([[[0.8, 0.5]]]), "leaf").tolist()
+    [[[0.4000000059604645, 0.5]]]
+
+    """
+    colours, alpha = pixels[..., :-1], pixels[..., -1:]
+    lost = (alpha[..., 0] == 0) & (np.abs(colours) >= CLEAR).any(axis=-1)
+    if lost.any():
+        share = f"{100 * lost.mean():.2g} % of the pixels"
+        ignore(
+            f"{name}: colours of {share}, whose alpha is 0, are not kept: EXR files have colours multiplied by alpha"
+        )
+    wide = np.result_type(pixels.dtype, np.float32)
+    return np.concatenate([(colours.astype(wide) * alpha).astype(pixels.dtype), alpha], axis=-1)
+
+
+def divide(pixels: Array, name: str) -> Array:
+    """Return linear colours of an EXR file divided by their alpha, unless clear pixels show that they are not multiplied.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> divide(np.float32([[[0.4, 0.5]]]), "leaf").tolist()
+    [[[0.800000011920929, 0.5]]]
+
+    """
+    colours, alpha = pixels[..., :-1], pixels[..., -1:]
+    if not ((alpha > 0) & (alpha < 1)).any():
+        return pixels
+    clear = alpha[..., 0] <= 0
+    if clear.any() and (np.abs(colours[clear]) >= CLEAR).any(axis=-1).mean() > MOST:
+        assume(f"{name}: colours are not divided by alpha, because clear pixels have colours")
+        return pixels
+    assume(f"{name}: colours are divided by alpha, because EXR files have them multiplied by it")
+    return undo(pixels)
+
+
+def undo(pixels: Array) -> Array:
+    """Return linear colours divided by their alpha; clear pixels stay as they are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> undo(np.float32([[[0.4, 0.5], [0, 0]]])).tolist()
+    [[[0.800000011920929, 0.5], [0.0, 0.0]]]
+
+    """
+    colours, alpha = pixels[..., :-1], pixels[..., -1:]
+    wide = np.result_type(pixels.dtype, np.float32)
+    light = np.divide(colours, alpha, out=colours.astype(wide), where=alpha > 0, dtype=wide)
+    return np.concatenate([light.astype(pixels.dtype), alpha], axis=-1)
+
+
+def adapt(array: Array, path: Path, multiplied: bool | None) -> Array:
+    """Return an image as the format of a file has it: EXR files have colours multiplied by alpha, others do not.
+
+    Parameters
+    ----------
+    array : (H, W, C) array_like
+        Linear colours. Only floats with alpha are changed.
+    path : pathlib.Path
+        File that the image is written to.
+    multiplied : bool or None
+        If True, the colours are multiplied by alpha already. None leaves all values as they are.
+
+    """
+    pixels, wanted = np.asarray(array), path.suffix.lower() == ".exr"
+    if multiplied in (None, wanted) or pixels.dtype.kind != "f" or not has_alpha(pixels):
+        return array
+    return multiply(pixels, "output") if wanted else divide(pixels, "output")
