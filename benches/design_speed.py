@@ -73,11 +73,11 @@ def run(image: np.ndarray, options: argparse.Namespace) -> None:
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} at the start; medians of {options.rounds}\n")
     tasks: dict[str, Callable[[], object]] = {
         # One variant costs about the same whatever else is made: the difference of two and one is a further one.
-        "one 256^2 texture of 1 tile": lambda: texrs.design(image, 256, tiles=1),
-        "one 256^2 texture of 2 tiles": lambda: texrs.design(image, 256, tiles=2),
-        "1024^2, cyclic, 8 tiles": lambda: texrs.design(image, 1024, tiles=8),
-        "1024^2, not cyclic, 8 tiles": lambda: texrs.design(image, 1024, tiles=8, wrap=False),
-        "1024^2, cyclic, 8 tiles, screening=0": lambda: texrs.design(image, 1024, tiles=8, screening=0),
+        "one 256^2 texture of 1 tile": lambda: texrs.design(image, 256, copies=1),
+        "one 256^2 texture of 2 tiles": lambda: texrs.design(image, 256, copies=2),
+        "1024^2, cyclic, 8 tiles": lambda: texrs.design(image, 1024, copies=8),
+        "1024^2, not cyclic, 8 tiles": lambda: texrs.design(image, 1024, copies=8, wrap=False),
+        "1024^2, cyclic, 8 tiles, screening=0": lambda: texrs.design(image, 1024, copies=8, screening=0),
     }
     growth = (256, 512, 1024, 2048)
     for size in growth:
@@ -88,7 +88,7 @@ def run(image: np.ndarray, options: argparse.Namespace) -> None:
     for _ in range(options.rounds):
         for name, task in tasks.items():
             times[name].append(timed(task))
-        parts.append(stages_of(image, 1024, tiles=8))
+        parts.append(stages_of(image, 1024, copies=8))
     median = {name: float(np.median(t)) for name, t in times.items()}
     print("| task | seconds | Mpixel/s |\n|---|---|---|")
     for name, seconds in median.items():
@@ -105,7 +105,7 @@ def run(image: np.ndarray, options: argparse.Namespace) -> None:
         print(f"| {name} | {np.median([p.get(stage, 0.0) for p in parts]):.2f} |")
     if not options.quick:
         before = peak()
-        seconds = timed(lambda: texrs.design(image, 4096, tiles=8))
+        seconds = timed(lambda: texrs.design(image, 4096, copies=8))
         print(f"\n4096^2, cyclic, 8 tiles, once: {seconds:.1f} s ({4096**2 / seconds / 1e6:.2f} Mpixel/s), ")
         print(f"peak of memory {peak():.0f} MiB ({before:.0f} MiB before).")
 

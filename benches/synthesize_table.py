@@ -28,7 +28,7 @@ import evaluators
 import texrs
 
 SIDE = 256
-STILL = texrs.DeformationOptions(operations=0, mirror=False)
+STILL = texrs.DeformationOptions(operations=0, allow_mirror=False)
 
 
 def middle(image: np.ndarray, side: int = SIDE) -> np.ndarray:
@@ -73,7 +73,7 @@ def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[st
             made = texrs.synthesize(image, size, seed=seed, quality=options.quality).image
         yield "texrs", seed, made
         if options.peers:
-            plain = texrs.design(image, size, seed=seed, tiles=1, deformation=STILL, screening=None)
+            plain = texrs.design(image, size, seed=seed, copies=1, deformation=STILL, screening=None)
             yield "quilting", seed, plain.image
     if options.resynthesizer:
         yield "resynthesizer", 1, by_resynthesizer(options.resynthesizer, image)

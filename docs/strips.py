@@ -31,8 +31,8 @@ def design() -> Iterator[Strip]:
     cloth, buttons = samples.weave((144, 144)).image, samples.dots((144, 144)).image
 
     def rotate(angle: float) -> Picture:
-        options = texrs.DeformationOptions(rotate=angle, mirror=False)
-        return texrs.design(pebbles, 192, deformation=options, plan="move", seed=1).image
+        options = texrs.DeformationOptions(rotate=angle, allow_mirror=False)
+        return texrs.design(pebbles, 192, deformation=options, motion="move", seed=1).image
 
     def mix(share: float) -> Picture:
         return texrs.design([leaves, pebbles], 192, weights=[1 - share, share], seed=1).image
@@ -91,14 +91,14 @@ def complete() -> Iterator[Strip]:
         return texrs.complete(wall, hole, seed=1, **options).image
 
     yield (
-        "boundary",
+        "boundary_width",
         "How many known pixels around the hole may change, which hides the seam.",
-        several([0, 2, 4, 8, 16], lambda n: fill(boundary=n)),
+        several([0, 2, 4, 8, 16], lambda n: fill(boundary_width=n)),
     )
     yield (
-        "patch",
+        "patch_size",
         "How large the patches are, in pixels; by default several sizes are tried.",
-        several([9, 17, 33, 49, 65], lambda n: fill(patch=n)),
+        several([9, 17, 33, 49, 65], lambda n: fill(patch_size=n)),
     )
     yield (
         "method",
@@ -310,13 +310,13 @@ def batch() -> Iterator[Strip]:
     pebbles = samples.pebbles((144, 144)).image
     presets = {
         "calm": {"rotate": 0.0},
-        "turned": {"rotate": 180.0, "mirror": False},
+        "turned": {"rotate": 180.0, "allow_mirror": False},
         "mixed sizes": {"rotate": 180.0, "scale": (0.6, 1.5)},
     }
 
     def make(seed: int, preset: str) -> Picture:
         return texrs.design(
-            pebbles, 160, deformation=texrs.DeformationOptions(**presets[preset]), plan="move", seed=seed
+            pebbles, 160, deformation=texrs.DeformationOptions(**presets[preset]), motion="move", seed=seed
         ).image
 
     for preset, options in presets.items():

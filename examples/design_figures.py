@@ -33,13 +33,13 @@ def draw_cyclic() -> np.ndarray:
 def draw_comparison() -> np.ndarray:
     """Figure 4: a texture, image quilting, corner tiles, patches of graph cuts that nothing deforms, as printed, and ours."""
     source = example("pebbles", SIDE)
-    size, still = (LARGE, LARGE), DeformationOptions(operations=0, mirror=False)
+    size, still = (LARGE, LARGE), DeformationOptions(operations=0, allow_mirror=False)
     return beside(
         [
             source,
             quilt(source, LARGE, seed=1),
             lay_tiles(make_tiles(source), size),
-            texrs.design(source, size, seed=1, plan="still", tiles=1, deformation=still, screening=None).image,
+            texrs.design(source, size, seed=1, motion="keep", copies=1, deformation=still, screening=None).image,
             texrs.design(source, size, seed=1, method="paper").image,
             texrs.design(source, size, seed=1).image,
         ]
@@ -75,7 +75,7 @@ def draw_deformed() -> np.ndarray:
     for name in NAMES:
         source = example(name)
         for method in (None, "paper"):
-            variants = texrs.design_variants(source, 4, SMALL, seed=1, plan="move", tiles=1, method=method)
+            variants = texrs.design_variants(source, 4, SMALL, seed=1, motion="move", copies=1, method=method)
             rows.append(beside([source, *(made.image for made in variants)]))
     return below(rows)
 

@@ -14,11 +14,11 @@ import texrs
 from texrs import _html as html
 
 CROP, SEED = 256, 7
-STILL = texrs.DeformationOptions(operations=0, mirror=False)
+STILL = texrs.DeformationOptions(operations=0, allow_mirror=False)
 BUILT_IN = ("pebbles", "leaves_and_flowers", "beans", "dots", "tilted_discs", "bark")
 WAYS = {
     "texrs.design": {},
-    "plain quilting (nothing deformed)": {"deformation": STILL, "tiles": 1, "screening": None},
+    "plain quilting (nothing deformed)": {"deformation": STILL, "copies": 1, "screening": None},
     "as printed (method=paper)": {"method": "paper"},
 }
 

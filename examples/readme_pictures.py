@@ -45,7 +45,7 @@ def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     texrs.io.write(FOLDER / "four.jpg", four())
     flowers = texrs.samples.leaves_and_flowers((192, 192)).image
-    made = texrs.design(flowers, (384, 768), seed=3, plan="move")
+    made = texrs.design(flowers, (384, 768), seed=3, motion="move")
     left = below(
         [beside([flowers, made.stages["deformed"]], 188), beside([made.stages["holes"], made.stages["completed"]], 188)]
     )

@@ -40,7 +40,7 @@ def draw_decoupling() -> np.ndarray:
     """
     wall, layout = entry("bricks"), entry("pebbles")
     net = Elements(wall.image, wall.points, ~wall.mask, wall.box, Layout.CONNECTED, wall.scores)
-    bent = [texrs.splice(a, layout, seed=1, cells=False, nets=False).image for a in (wall, net)]
+    bent = [texrs.splice(a, layout, seed=1, use_cells=False, use_nets=False).image for a in (wall, net)]
     made = [texrs.splice(wall, layout, seed=1, method=method).image for method in (None, "paper")]
     return beside([wall.image, *bent, *made])
 

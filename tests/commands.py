@@ -20,7 +20,7 @@ from texrs import samples
 Capture = pytest.CaptureFixture[str]
 COLOURS = samples.load("dots", size=(64, 64)).image
 GREY = np.ascontiguousarray(COLOURS[..., 1])
-TINY = ("--size", "48", "--tiles", "1")
+TINY = ("--size", "48", "--copies", "1")
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -67,18 +67,24 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     assert said("made/sheet.png")["verb"] == "batch"
     one = said("made/dots-turned-4.png")
     assert one["arguments"] == ["../stones/dots.png"]
-    assert one["options"] == {"--size": "48", "--rotate": "180.0", "--no-mirror": True, "--tiles": "1", "--seed": "4"}
+    assert one["options"] == {
+        "--size": "48",
+        "--rotate": "180.0",
+        "--no-allow-mirror": True,
+        "--copies": "1",
+        "--seed": "4",
+    }
     # As the command alone makes it, from anywhere.
     alone = [
         "design",
         "stones/dots.png",
         "--size",
         "48",
-        "--tiles",
+        "--copies",
         "1",
         "--rotate",
         "180",
-        "--no-mirror",
+        "--no-allow-mirror",
         "--seed",
         "4",
     ]
@@ -314,7 +320,7 @@ def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> Non
         image = samples.load("dots", size=(48, 48), seed=len(name)).image
         io.write(f"stacks/{name}/{name}_albedo.png", image)
         io.write(f"stacks/{name}/{name}_height.png", image[..., 0].astype(np.uint16))
-    words = ["batch", "design", "-o", "made", "--seeds", "0:2", "--set", "size=48", "--set", "tiles=1"]
+    words = ["batch", "design", "-o", "made", "--seeds", "0:2", "--set", "size=48", "--set", "copies=1"]
     for inputs in (["stacks/*"], ["stacks"]):
         assert main([*words, *inputs]) == 0, capsys.readouterr().err
         made = sorted(str(p.relative_to(here)) for p in Path("made").resolve().rglob("*.png"))

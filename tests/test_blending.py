@@ -162,7 +162,7 @@ def test_seams_of_a_design_are_as_sharp_as_the_example():
     from scipy.ndimage import distance_transform_edt
 
     image = samples.pebbles((128, 128)).image
-    result = texrs.design(image, 160, seed=1, tiles=2, plan="still")
+    result = texrs.design(image, 160, seed=1, copies=2, motion="keep")
     parted = np.zeros((160, 160), bool)
     for axis in range(2):
         crosses = ~result.source.continues(axis, wrap=True)
@@ -374,7 +374,7 @@ def test_visibility_does_not_depend_on_bands(monkeypatch, patchwork, exemplar, w
 @pytest.fixture(scope="module", params=["pebbles", "beans"])
 def designed(request):
     sample = samples.load(request.param, size=(144, 144)).image
-    return sample, texrs.design(sample, 256, seed=5, tiles=2)
+    return sample, texrs.design(sample, 256, seed=5, copies=2)
 
 
 def test_seams_disappear(designed):
@@ -413,7 +413,7 @@ def test_away_from_seams_differences_stay(designed):
 
 def test_blending_can_be_left_out(designed):
     sample, result = designed
-    plain = texrs.design(sample, 256, seed=5, tiles=2, screening=None)
+    plain = texrs.design(sample, 256, seed=5, copies=2, screening=None)
     np.testing.assert_array_equal(plain.image, plain.stages["composite"])
     np.testing.assert_array_equal(plain.stages["composite"], result.stages["composite"])
     assert plain.report["screening"] == 0

@@ -26,10 +26,8 @@ from texrs.elements import Elements
 
 def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
     options = "--seed 3 --wrap x --element-layers 2 --element-segmentation grid"
-    options += " --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-mirror"
-    more = (
-        "--start 0.3 --growth-rate 1.9 --patch 12 --tiles 2 --operations 1 --stages stages --map source.npz -o out.png"
-    )
+    options += " --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-allow-mirror"
+    more = "--start 0.3 --growth-rate 1.9 --patch-size 12 --copies 2 --operations 1 --stages stages --map source.npz -o out.png"
     assert main(["design", "in.png", "--size", "56x40", *options.split(), *more.split()]) == 0
     expected = texrs.design(
         COLOURS,
@@ -38,10 +36,10 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
         wrap=(False, True),
         elements=texrs.ElementOptions(layers=2, segmentation="grid"),
         deformation=texrs.DeformationOptions(
-            operations=1, translate=0.1, rotate=20.0, scale=(0.9, 1.1), mirror=False, start=0.3, growth_rate=1.9
+            operations=1, translate=0.1, rotate=20.0, scale=(0.9, 1.1), allow_mirror=False, start=0.3, growth_rate=1.9
         ),
-        patch=12,
-        tiles=2,
+        patch_size=12,
+        copies=2,
     )
     assert (iio.imread("out.png") == expected.image).all()
     assert (SourceMap.load("source.npz").coordinates == expected.source.coordinates).all()
@@ -168,7 +166,7 @@ def test_analysed_elements_as_example(here: Path, capsys: Capture) -> None:
 
 def test_sample_as_example(here: Path) -> None:
     assert main(["design", "sample:dots", *TINY, "-o", "out.png", "-q"]) == 0
-    expected = texrs.design(samples.load("dots").image, 48, tiles=1).image
+    expected = texrs.design(samples.load("dots").image, 48, copies=1).image
     assert (iio.imread("out.png") == expected).all()
 
 

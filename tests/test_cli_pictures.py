@@ -72,9 +72,11 @@ def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, argume
 
 
 def test_complete_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    options = "--patch 10 --boundary 2 --no-mirror --wrap x --seed 4 --stages stages --map s.npz"
+    options = "--patch-size 10 --boundary-width 2 --no-allow-mirror --wrap x --seed 4 --stages stages --map s.npz"
     assert main(["complete", "in.png", "hole.png", "-o", "out.png", *options.split()]) == 0
-    expected = texrs.complete(COLOURS, HOLE, patch=10, boundary=2, mirror=False, wrap=(False, True), seed=4)
+    expected = texrs.complete(
+        COLOURS, HOLE, patch_size=10, boundary_width=2, allow_mirror=False, wrap=(False, True), seed=4
+    )
     assert (iio.imread("out.png") == expected.image).all()
     assert (SourceMap.load("s.npz").label == expected.source.label).all()
     assert (iio.imread("stages/01-known.png")[HOLE] == COLOURS[~HOLE].min()).all()
@@ -150,9 +152,9 @@ REFUSED = {
     "complete in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
     "complete in.png white.png": "white.png: covers the whole image",
     "complete in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
-    "complete in.png hole.png --patch 65": "--patch: needs an integer from 4 to 64, got 65",
-    "complete in.png hole.png --patch 60": "--patch: 60 has no place",
-    "complete in.png hole.png --boundary -1": "--boundary: needs",
+    "complete in.png hole.png --patch-size 65": "--patch-size: needs an integer from 4 to 64, got 65",
+    "complete in.png hole.png --patch-size 60": "--patch-size: 60 has no place",
+    "complete in.png hole.png --boundary-width -1": "--boundary-width: needs",
     "complete in.png hole.png --seed -1": "--seed: needs",
     "complete in.png hole.png --wrap yes": "--wrap: allowed are",
     "complete in.png hole.png --from hole.png": "hole.png: needs the dtype and channels of the image",

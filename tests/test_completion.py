@@ -45,7 +45,7 @@ def test_periodic_pattern_is_restored_exactly():
         for mirror in (True, False):
             image = whole.copy()
             image[hole] = 128
-            np.testing.assert_array_equal(texrs.complete(image, hole, mirror=mirror).image, whole)
+            np.testing.assert_array_equal(texrs.complete(image, hole, allow_mirror=mirror).image, whole)
 
 
 def test_holes_at_the_border_are_filled_across_it():
@@ -62,12 +62,12 @@ def test_holes_at_the_border_are_filled_across_it():
     "hole", [HOLE, disc((96, 112), (0, 0), 0.5), np.random.default_rng(0).random((96, 112)) < 0.01]
 )
 def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, boundary):
-    result = texrs.complete(PEBBLES, hole, boundary=boundary, seed=3)
+    result = texrs.complete(PEBBLES, hole, boundary_width=boundary, seed=3)
     row, column = places(result)
     assert not hole[row, column].any()
     own = (row == np.indices(row.shape)[0]) & (column == np.indices(row.shape)[1])
     assert not own[hole].any()
-    far = texrs.complete(PEBBLES, hole, boundary=0).source.label == 0
+    far = texrs.complete(PEBBLES, hole, boundary_width=0).source.label == 0
     assert (far == ~hole).all()
     kept = result.source.label == 0
     assert own[kept].all()
@@ -78,7 +78,7 @@ def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, boundary):
 def test_the_boundary_is_not_exceeded():
     from scipy.ndimage import binary_dilation
 
-    result = texrs.complete(PEBBLES, HOLE, boundary=4)
+    result = texrs.complete(PEBBLES, HOLE, boundary_width=4)
     assert (result.source.label[~binary_dilation(HOLE, np.ones((3, 3)), 4)] == 0).all()
 
 
@@ -110,7 +110,7 @@ def test_large_elements_are_not_torn_at_the_far_border():
     image = np.where((columns + rows // 3) % 56 < 28, 200, 40).astype(np.uint8)
     hole = np.zeros(image.shape, bool)
     hole[50:110, 50:110] = True
-    result = texrs.complete(np.where(hole, 128, image).astype(np.uint8), hole, mirror=False)
+    result = texrs.complete(np.where(hole, 128, image).astype(np.uint8), hole, allow_mirror=False)
     assert (result.image != image)[hole].mean() < 0.01
 
 
@@ -185,7 +185,7 @@ def test_mirrored_patches_turn_normals():
     result = texrs.complete(PEBBLES, HOLE)
     turned = (result.source.frames() != np.eye(2)).any(axis=(2, 3))
     assert turned.any()
-    plain = texrs.complete(PEBBLES, HOLE, mirror=False).source
+    plain = texrs.complete(PEBBLES, HOLE, allow_mirror=False).source
     assert (plain.frames() == np.eye(2)).all()
     # Along a patch coordinates run as its frame says.
     joined = result.source.continues(1)[:, :-1]
@@ -211,8 +211,8 @@ def test_the_patches_are_kept_whose_seams_show_least():
     tried = dict(report["tried"])
     assert len(tried) >= 3
     assert list(tried) == sorted(tried, reverse=True)
-    assert 0.97 * tried[report["patch"]] <= min(tried.values())
-    again = texrs.complete(PEBBLES, HOLE, patch=report["patch"])
+    assert 0.97 * tried[report["patch_size"]] <= min(tried.values())
+    again = texrs.complete(PEBBLES, HOLE, patch_size=report["patch_size"])
     np.testing.assert_array_equal(texrs.complete(PEBBLES, HOLE).image, again.image)
     assert again.report["tried"] == []
 
@@ -238,7 +238,7 @@ def test_sizes_for_large_holes_are_tried_in_a_small_copy(monkeypatch):
     hole[200:430, 210:440] = True
     report = texrs.complete(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole).report
     assert [shape for shape, _ in seen] == [(320, 320)] * (len(seen) - 1) + [(640, 640)]
-    assert seen[-1][1] == report["patch"]
+    assert seen[-1][1] == report["patch_size"]
     assert sorted((2 * side for _, side in seen[:-1]), reverse=True) == [side for side, _ in report["tried"]]
 
 
@@ -303,12 +303,12 @@ def test_smaller_patches_where_few_places_are_free():
     grid = np.zeros((96, 112), bool)
     grid[::9], grid[:, ::9] = True, True
     result = texrs.complete(PEBBLES, grid)
-    assert result.report["patch"] == 8
+    assert result.report["patch_size"] == 8
     assert mark_corners(~grid, 8).sum() >= PLACES > mark_corners(~grid, 9).sum()
     dense = np.zeros((96, 112), bool)
     dense[::5], dense[:, ::5] = True, True
-    assert texrs.complete(PEBBLES, dense).report["patch"] == 4
-    assert 12 <= texrs.complete(PEBBLES, HOLE).report["patch"] <= 64
+    assert texrs.complete(PEBBLES, dense).report["patch_size"] == 4
+    assert 12 <= texrs.complete(PEBBLES, HOLE).report["patch_size"] <= 64
 
 
 def test_corners():
@@ -342,11 +342,21 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
             "hole: covers the whole image, so there is nothing to copy from; give an exemplar",
         ),
         (PEBBLES, EVERY_THIRD, {}, "hole: leaves no 4 x 4 pixels in one piece to copy from; give an exemplar"),
-        (PEBBLES, HOLE, {"patch": 3}, "patch: needs an integer from 4 to 96, got 3"),
-        (PEBBLES, HOLE, {"patch": 97}, "patch: needs an integer from 4 to 96, got 97"),
-        (PEBBLES, HOLE, {"patch": 60}, "patch: 60 has no place in the image that is free of holes; at most 42 has one"),
-        (PEBBLES, EVERY_THIRD, {"patch": 12}, "nor has any other; give an exemplar"),
-        (PEBBLES, HOLE, {"patch": 40, "exemplar": PEBBLES[:30]}, "patch: needs an integer from 4 to 30, got 40"),
+        (PEBBLES, HOLE, {"patch_size": 3}, "patch_size: needs an integer from 4 to 96, got 3"),
+        (PEBBLES, HOLE, {"patch_size": 97}, "patch_size: needs an integer from 4 to 96, got 97"),
+        (
+            PEBBLES,
+            HOLE,
+            {"patch_size": 60},
+            "patch_size: 60 has no place in the image that is free of holes; at most 42 has one",
+        ),
+        (PEBBLES, EVERY_THIRD, {"patch_size": 12}, "nor has any other; give an exemplar"),
+        (
+            PEBBLES,
+            HOLE,
+            {"patch_size": 40, "exemplar": PEBBLES[:30]},
+            "patch_size: needs an integer from 4 to 30, got 40",
+        ),
         (
             PEBBLES,
             HOLE,
@@ -356,8 +366,8 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
         (PEBBLES, HOLE, {"exemplar": PEBBLES / 255}, "got float64 and 3"),
         (PEBBLES, HOLE, {"exemplar": PEBBLES[:3]}, "exemplar: each side must be at least 4"),
         (PEBBLES, HOLE, {"method": "heal"}, "method: allowed are 'patch' and 'optimise', got 'heal'"),
-        (PEBBLES, HOLE, {"boundary": -1}, "boundary: needs an integer from 0"),
-        (PEBBLES, HOLE, {"mirror": 1}, "mirror: needs True or False"),
+        (PEBBLES, HOLE, {"boundary_width": -1}, "boundary_width: needs an integer from 0"),
+        (PEBBLES, HOLE, {"allow_mirror": 1}, "allow_mirror: needs True or False"),
         (PEBBLES, HOLE, {"seed": -1}, "seed: needs"),
         (PEBBLES, HOLE, {"wrap": "xy"}, "wrap: needs"),
         (PEBBLES[:3], HOLE[40:43], {}, "image: each side must be at least 4"),
@@ -406,7 +416,7 @@ def test_same_bytes_for_any_number_of_threads():
     made = []
     for count in (1, 2, 7):
         with texrs.threads(count):
-            made.append(texrs.complete(PEBBLES, HOLE, boundary=2, seed=9))
+            made.append(texrs.complete(PEBBLES, HOLE, boundary_width=2, seed=9))
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
         assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()
@@ -424,7 +434,7 @@ def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
     assert [len(choose_mirrors([lit], hole, said)) for said in (True, False)] == [4, 1]
     for picture, mirrored in ((noise, True), (lit, False)):
         result = texrs.complete(picture, hole)
-        assert result.report["mirror"] is mirrored
+        assert result.report["allow_mirror"] is mirrored
         frames = result.source.frames()
         assert mirrored or (np.diagonal(frames, axis1=-2, axis2=-1) == 1).all()
     assert len(choose_mirrors([noise], np.ones((96, 96), bool), None)) == 4

@@ -152,11 +152,11 @@ def test_sheets_of_a_texture_differ() -> None:
     one, two = (texrs.design(wall, 256, seed=seed).image for seed in (1, 2))
     assert (one != two).mean() > 0.5
     # Below each other lie stones of other courses.
-    assert texrs.design(wall, 256, seed=1, tiles=1).image.shape == one.shape
+    assert texrs.design(wall, 256, seed=1, copies=1).image.shape == one.shape
 
 
 def test_elements_of_a_wall_move_when_that_is_asked() -> None:
-    moved = texrs.design(lay_wall(seed=9), 224, plan="move")
+    moved = texrs.design(lay_wall(seed=9), 224, motion="move")
     assert moved.report["courses"] == [None]
 
 

@@ -40,7 +40,7 @@ class Page(HTMLParser):
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the demo make small textures, and each volume and picture at the least size."""
     designed: Callable[..., Texture] = Workshop.design
-    monkeypatch.setattr(Workshop, "design", lambda self, name, *sizes, **o: designed(self, name, 64, 64, tiles=1, **o))
+    monkeypatch.setattr(Workshop, "design", lambda self, name, *sizes, **o: designed(self, name, 64, 64, copies=1, **o))
     monkeypatch.setattr("texrs.demo._pictures.SIDE", 64)
     monkeypatch.setattr("texrs.demo._maps.SIZE", 64)
     monkeypatch.setattr("texrs.demo._maps.LARGE", 256)

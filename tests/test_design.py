@@ -51,7 +51,7 @@ def test_stages_are_pictures_in_order(result):
     assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "composite"]
     assert result.stages["holes"].dtype == bool
     # What lies apart leaves a hole where it was.
-    apart = texrs.design(samples.dots((96, 96)).image, 96, tiles=1).stages
+    apart = texrs.design(samples.dots((96, 96)).image, 96, copies=1).stages
     assert (apart["completed"][apart["holes"]] != apart["deformed"][apart["holes"]]).any()
 
 
@@ -62,15 +62,15 @@ def test_the_composite_is_what_the_source_map_shows_in_every_dtype(pebbles):
         "float32": pebbles.astype(np.float32) * (4 / 255),
     }
     for name, exemplar in stack.items():
-        made = texrs.design(exemplar, 96, seed=2, tiles=2)
+        made = texrs.design(exemplar, 96, seed=2, copies=2)
         assert made.image.dtype == np.dtype(name)
         expected = view(made.source, exemplar)
         np.testing.assert_allclose(made.stages["composite"], expected, rtol=1e-6 * (name == "float32"))
 
 
 def test_depth_does_not_change_the_decisions(pebbles):
-    eight = texrs.design(pebbles, 96, seed=2, tiles=2).source
-    sixteen = texrs.design(pebbles.astype(np.uint16) * 257, 96, seed=2, tiles=2).source
+    eight = texrs.design(pebbles, 96, seed=2, copies=2).source
+    sixteen = texrs.design(pebbles.astype(np.uint16) * 257, 96, seed=2, copies=2).source
     np.testing.assert_array_equal(eight.coordinates, sixteen.coordinates)
 
 
@@ -78,7 +78,7 @@ def test_depth_does_not_change_the_decisions(pebbles):
 def test_any_number_of_channels(pebbles, channels):
     grey = pebbles[:80, :80].mean(axis=-1).astype(np.uint8)
     exemplar = grey if channels is None else np.stack([np.roll(grey, c, axis=0) for c in range(channels)], axis=-1)
-    made = texrs.design(exemplar, (90, 70), tiles=1)
+    made = texrs.design(exemplar, (90, 70), copies=1)
     assert made.image.shape == ((90, 70) if channels is None else (90, 70, channels))
 
 
@@ -105,7 +105,7 @@ def test_elements_really_move(pebbles, result):
 
 
 def test_an_image_without_elements_takes_the_grid_and_says_so():
-    made = texrs.design(samples.grit().image, 128, tiles=1)
+    made = texrs.design(samples.grit().image, 128, copies=1)
     assert made.report["segmentation"] == "grid"
     assert made.report["reason"]
 
@@ -117,7 +117,7 @@ def test_a_constant_image_gives_a_constant_result():
 
 def test_labels_by_hand(pebbles):
     truth = samples.pebbles((128, 128)).labels
-    made = texrs.design(pebbles, 128, elements=ElementOptions(labels=truth), tiles=1)
+    made = texrs.design(pebbles, 128, elements=ElementOptions(labels=truth), copies=1)
     assert made.report["segmentation"] == "labels"
     assert made.report["elements"] == truth.max()
 
@@ -126,7 +126,7 @@ def test_labels_by_hand(pebbles):
 def test_the_segmentation_is_shown_in_colours_on_the_exemplar(pebbles, channels):
     truth = samples.pebbles((128, 128)).labels
     marked = ElementOptions(labels=truth)
-    shown = texrs.design(pebbles[..., channels], 64, elements=marked, tiles=1).stages["segmentation"]
+    shown = texrs.design(pebbles[..., channels], 64, elements=marked, copies=1).stages["segmentation"]
     assert shown.shape == (128, 128, 3)
     assert shown.dtype == np.uint8
     outline = np.zeros(truth.shape, bool)
@@ -174,7 +174,7 @@ def test_drawn_operations_obey_their_limits():
             if operation.kind == "S":
                 assert 0.8 <= operation.amount <= 1.2
     assert min(counts.values()) >= 40
-    still = Moves(DeformationOptions(rotate=0, scale=(1, 1), mirror=False))
+    still = Moves(DeformationOptions(rotate=0, scale=(1, 1), allow_mirror=False))
     drawn = [still.draw_operations(still.draw_values(1, 0, e), (False, False), 100) for e in range(50)]
     kinds = {o.kind for operations in drawn for o in operations}
     assert kinds == {"T"}
@@ -188,7 +188,7 @@ def test_what_is_lit_from_one_side_is_not_mirrored():
         ("bark", samples.bark((128, 128)).image),
         ("noise", noise),
     ):
-        made = list(texrs.design_variants(example, 3, 64, seed=2, tiles=4))
+        made = list(texrs.design_variants(example, 3, 64, seed=2, copies=4))
         log = [entry for result in made for tile in result.report["operations"] for entry in tile]
         mirrors[name] = {tuple(entry["mirror"]) for entry in log if "mirror" in entry}
         assert name == "noise" or not any(o[0] == "M" for entry in log for o in entry.get("operations") or [])
@@ -201,9 +201,9 @@ def test_what_is_lit_from_one_side_is_not_mirrored():
     [
         ({}, "own"),
         ({"rotate": 0}, 1),
-        ({"rotate": 0, "mirror": True}, 4),
-        ({"mirror": True}, 4),
-        ({"mirror": False}, 1),
+        ({"rotate": 0, "allow_mirror": True}, 4),
+        ({"allow_mirror": True}, 4),
+        ({"allow_mirror": False}, 1),
     ],
 )
 def test_who_forbids_turning_forbids_mirrors_unless_asked_for(options, expected):
@@ -259,7 +259,7 @@ def test_segmentation_finds_the_pebbles():
 SCRIPT = """
 import hashlib, os, sys, texrs
 def digest():
-    made = texrs.design(texrs.samples.pebbles((96, 96)).image, (100, 120), seed=4, tiles=2)
+    made = texrs.design(texrs.samples.pebbles((96, 96)).image, (100, 120), seed=4, copies=2)
     parts = (made.image, made.source.coordinates, made.source.label, made.source.frame)
     return hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest()
 print(digest(), flush=True)
@@ -301,7 +301,7 @@ def test_a_forked_child_finishes_with_the_same_bytes():
 def test_progress_is_reported_and_raising_stops():
     seen = []
     pebbles = samples.pebbles((64, 64)).image
-    texrs.design(pebbles, 64, tiles=2, progress=lambda stage, share: seen.append((stage, share)))
+    texrs.design(pebbles, 64, copies=2, progress=lambda stage, share: seen.append((stage, share)))
     assert seen[0][0] == "segment"
     assert seen[-1] == ("done", 1.0)
     assert all(0 <= share <= 1 for _, share in seen)
@@ -335,8 +335,8 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
         ((PICTURE,), {"seed": 1.5}, "seed"),
         ((PICTURE,), {"wrap": "xy"}, "wrap"),
         ((PICTURE,), {"wrap": (True,)}, "wrap"),
-        ((PICTURE,), {"tiles": 0}, "tiles"),
-        ((PICTURE,), {"patch": 64}, "patch"),
+        ((PICTURE,), {"copies": 0}, "copies"),
+        ((PICTURE,), {"patch_size": 64}, "patch_size"),
         ((PICTURE,), {"screening": -0.1}, "screening"),
         ((PICTURE,), {"screening": "strong"}, "screening"),
     ],
@@ -366,7 +366,7 @@ def test_bad_input_names_the_argument(arguments, options, names):
         (DeformationOptions, {"scale": 1.0}),
         (DeformationOptions, {"scale": "12"}),
         (DeformationOptions, {"scale": (0.4, 1)}),
-        (DeformationOptions, {"mirror": "no"}),
+        (DeformationOptions, {"allow_mirror": "no"}),
         (DeformationOptions, {"start": 0.5}),
         (DeformationOptions, {"start": 1}),
         (DeformationOptions, {"growth_rate": 2.5}),
@@ -402,10 +402,10 @@ def test_variants_are_checked_at_once_and_made_when_they_are_asked_for():
     with pytest.raises(InvalidInput, match="^count"):
         texrs.design_variants(PICTURE, 0)
     with pytest.raises(InvalidInput, match="^tiles"):
-        texrs.design_variants(PICTURE, 2, tiles=0)
+        texrs.design_variants(PICTURE, 2, copies=0)
     seen = []
     found = texrs.design_variants(
-        samples.pebbles((64, 64)).image, 2, 64, seed=2**64 - 1, tiles=1, progress=lambda *step: seen.append(step)
+        samples.pebbles((64, 64)).image, 2, 64, seed=2**64 - 1, copies=1, progress=lambda *step: seen.append(step)
     )
     assert not seen
     first = next(found)
@@ -420,10 +420,10 @@ def test_variants_are_checked_at_once_and_made_when_they_are_asked_for():
 
 
 def test_variants_are_those_of_their_seeds(pebbles):
-    made = list(texrs.design_variants(pebbles, 2, 96, seed=7, tiles=1))
+    made = list(texrs.design_variants(pebbles, 2, 96, seed=7, copies=1))
     assert len(made) == 2
     for seed, result in enumerate(made, start=7):
-        np.testing.assert_array_equal(result.image, texrs.design(pebbles, 96, seed=seed, tiles=1).image)
+        np.testing.assert_array_equal(result.image, texrs.design(pebbles, 96, seed=seed, copies=1).image)
 
 
 def test_an_exemplar_is_analysed_once(pebbles, monkeypatch):
@@ -434,10 +434,10 @@ def test_an_exemplar_is_analysed_once(pebbles, monkeypatch):
     monkeypatch.setattr(_exemplar, "segment", lambda *given, **options: calls.append(1) or segment(*given, **options))
     fresh = np.roll(pebbles, 17, axis=0)
     exemplar = texrs.Exemplar(fresh)
-    made = [texrs.design(e, 96, tiles=1).image for e in (exemplar, exemplar, fresh.copy())]
+    made = [texrs.design(e, 96, copies=1).image for e in (exemplar, exemplar, fresh.copy())]
     assert len(calls) == 1
     assert all((image == made[0]).all() for image in made)
-    texrs.design(exemplar, 96, tiles=1, elements=ElementOptions(layers=3))
+    texrs.design(exemplar, 96, copies=1, elements=ElementOptions(layers=3))
     assert len(calls) == 2
 
 

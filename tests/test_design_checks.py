@@ -136,7 +136,7 @@ def test_d9_the_log_and_the_frames_of_results_obey_them(name):
 
 def test_d10_several_exemplars():
     several = [exemplar(name) for name in ("pebbles", "dots", "grit")]
-    result = texrs.design(several, (320, 320), seed=0, tiles=2)
+    result = texrs.design(several, (320, 320), seed=0, copies=2)
     found = checks.d10(several, result.image, result.source)
     assert found.passed, found
     composite = result.stages["composite"]
@@ -148,9 +148,9 @@ def test_d11_threads_and_starts():
     by_threads = {}
     for count in (1, 2, 8):
         with texrs.threads(count):
-            by_threads[count] = texrs.design(pebbles, 160, seed=1, tiles=2).image
+            by_threads[count] = texrs.design(pebbles, 160, seed=1, copies=2).image
     starts = [
-        texrs.design(pebbles, 160, seed=1, tiles=2, deformation=texrs.DeformationOptions(start=0.76234783 + d)).image
+        texrs.design(pebbles, 160, seed=1, copies=2, deformation=texrs.DeformationOptions(start=0.76234783 + d)).image
         for d in (0, 1e-8)
     ]
     found = checks.d11(by_threads, *starts)

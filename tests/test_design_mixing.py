@@ -24,7 +24,7 @@ def share_of(result, count):
 def test_shares_are_kept(three, weights):
     asked = np.ones(3) if weights is None else np.array(weights, float)
     for seed in (0, 1):
-        result = texrs.design(three, SIZE, weights=weights, tiles=1, seed=seed)
+        result = texrs.design(three, SIZE, weights=weights, copies=1, seed=seed)
         assert share_of(result, 3) == pytest.approx(asked / asked.sum(), rel=0.03)
 
 
@@ -34,7 +34,7 @@ def test_a_map_is_obeyed_to_within_an_element(three, count):
     where = (np.hypot(rows - 90, columns - 100) < 60).astype(int)
     if count == 3:
         where[:80, :90] = 2
-    result = texrs.design(three[:count], SIZE, weights=where, tiles=1, wrap=False)
+    result = texrs.design(three[:count], SIZE, weights=where, copies=1, wrap=False)
     shown = result.source.exemplar
     away = np.stack([distance_transform_edt(where != which) for which in range(count)])
     away = np.take_along_axis(away, shown[np.newaxis].astype(int), axis=0)[0]
@@ -49,7 +49,7 @@ def test_a_map_is_obeyed_to_within_an_element(three, count):
 def test_a_map_of_weights_is_kept_place_by_place(three):
     ramp = np.linspace(0, 1, SIZE[1]) * np.ones((SIZE[0], 1))
     weights = np.stack([1 - ramp, ramp], axis=-1)
-    shown = np.stack([texrs.design(three[:2], SIZE, weights=weights, tiles=1, seed=s).source.exemplar for s in (1, 2)])
+    shown = np.stack([texrs.design(three[:2], SIZE, weights=weights, copies=1, seed=s).source.exemplar for s in (1, 2)])
     assert shown.mean(axis=(1, 2)) == pytest.approx([0.5, 0.5], rel=0.03)
     assert shown[..., : SIZE[1] // 3].mean() < 0.3 < 0.7 < shown[..., -(SIZE[1] // 3) :].mean()
 
@@ -89,7 +89,7 @@ def test_borders_go_round_things_whole():
 
 def test_one_exemplar_does_not_stain_another():
     flat = [np.full((64, 64, 3), value, np.uint8) for value in (40, 220)]
-    result = texrs.design(flat, 96, tiles=1)
+    result = texrs.design(flat, 96, copies=1)
     assert set(np.unique(result.image)) == {40, 220}
     across = texrs.blend(result.source, flat, wrap=True)
     assert len(np.unique(across)) > 2

@@ -25,7 +25,7 @@ def pebbles():
 
 @pytest.fixture(scope="module")
 def result(pebbles):
-    return texrs.design(pebbles, (160, 192), seed=1, tiles=2, method="paper")
+    return texrs.design(pebbles, (160, 192), seed=1, copies=2, method="paper")
 
 
 def apart(a, b):
@@ -87,7 +87,7 @@ def test_u_v_and_xi_choose_the_range():
 def test_layers_are_moved_as_often_as_asked(pebbles, result):
     def log(operations):
         asked = DeformationOptions(operations=operations)
-        made = texrs.design(pebbles, (160, 192), seed=1, tiles=1, deformation=asked, method="paper")
+        made = texrs.design(pebbles, (160, 192), seed=1, copies=1, deformation=asked, method="paper")
         return [entry["operations"] for entry in made.report["operations"][0]]
 
     drawn = [choose_operation(h, min(pebbles.shape[:2])).describe() for h in iterate(START, count=6)]
@@ -141,15 +141,15 @@ def test_whole_layers_leave_large_holes(result, pebbles):
     assert all(0.0 < share < 0.6 for share in result.report["holes"])
     assert [entry["element"] for entry in result.report["operations"][0]] == [0, 1]
     assert result.report["method"] == "paper"
-    assert texrs.design(pebbles, 64, tiles=1).report["method"] == "default"
+    assert texrs.design(pebbles, 64, copies=1).report["method"] == "default"
 
 
 def test_it_can_hand_back_its_input_and_the_default_does_not(pebbles):
     unit = to_unit(pebbles)
-    literal = texrs.design(pebbles, 128, seed=1, tiles=1, deformation=DeformationOptions(start=WEAK), method="paper")
+    literal = texrs.design(pebbles, 128, seed=1, copies=1, deformation=DeformationOptions(start=WEAK), method="paper")
     assert nearest(literal.stages["completed"], unit) < 0.01
     for start in (None, WEAK, 0.3, -0.61):
-        default = texrs.design(pebbles, 128, seed=1, tiles=1, deformation=DeformationOptions(start=start))
+        default = texrs.design(pebbles, 128, seed=1, copies=1, deformation=DeformationOptions(start=start))
         # In a heap few stones move, so a single variant keeps much of its input; the texture does not.
         assert nearest(default.stages["completed"], unit) > 0.05
         assert nearest(default.image, pebbles) >= 0.4
@@ -160,10 +160,10 @@ def test_options_of_elements_play_no_part(pebbles, result):
         pebbles,
         (160, 192),
         seed=1,
-        tiles=2,
+        copies=2,
         method="paper",
         elements=ElementOptions(segmentation="grid"),
-        deformation=DeformationOptions(translate=0.0, rotate=10.0, mirror=False),
+        deformation=DeformationOptions(translate=0.0, rotate=10.0, allow_mirror=False),
         screening=0.5,
     )
     np.testing.assert_array_equal(other.image, result.image)
@@ -187,7 +187,7 @@ def test_completion_takes_the_best_match_of_a_centred_window():
         ]
     )
     best = np.unravel_index(costs.argmin(), costs.shape)
-    filled = complete(picture, known, PatchIndex([image], max_patch=9), patch=9, count=1, paper=True)
+    filled = complete(picture, known, PatchIndex([image], max_patch=9), patch_size=9, count=1, paper=True)
     np.testing.assert_array_equal(filled.coordinates[11, 9], np.array(best) + 4)
 
 
@@ -225,16 +225,16 @@ def test_screening_keeps_the_colours(result, pebbles):
 
 
 def test_other_seeds_give_other_textures(pebbles, result):
-    other = texrs.design(pebbles, (160, 192), seed=2, tiles=2, method="paper")
+    other = texrs.design(pebbles, (160, 192), seed=2, copies=2, method="paper")
     assert (other.image != result.image).mean() > 0.5
     assert other.report["operations"][0] == result.report["operations"][0]
 
 
 def test_layers_by_hand_and_several_exemplars(pebbles):
     labels = (samples.pebbles((128, 128)).labels > 0).astype(int)
-    made = texrs.design(pebbles, 96, elements=ElementOptions(labels=labels), tiles=1, method="paper")
+    made = texrs.design(pebbles, 96, elements=ElementOptions(labels=labels), copies=1, method="paper")
     assert len(made.report["operations"][0]) == 2
-    two = texrs.design([pebbles, 255 - pebbles], 96, tiles=1, method="paper")
+    two = texrs.design([pebbles, 255 - pebbles], 96, copies=1, method="paper")
     assert min(two.report["shares"]) > 0
 
 

@@ -17,19 +17,19 @@ def gravel():
 
 @pytest.fixture(scope="module")
 def chosen(gravel):
-    return {plan: texrs.design(gravel, 160, seed=5, plan=plan) for plan in ("auto", "move", "still")}
+    return {plan: texrs.design(gravel, 160, seed=5, motion=plan) for plan in ("auto", "move", "keep")}
 
 
 def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
     [tried] = chosen["auto"].report["tried"]
-    assert sorted(tried) == ["move", "still"]
-    clearly = tried["still"]["score"] < CLEARLY * tried["move"]["score"]
-    assert chosen["auto"].report["plan"] == ["still" if clearly else "move"]
-    for plan in ("move", "still"):
-        assert chosen[plan].report["plan"] == [plan]
+    assert sorted(tried) == ["move", "keep"]
+    clearly = tried["keep"]["score"] < CLEARLY * tried["move"]["score"]
+    assert chosen["auto"].report["motion"] == ["keep" if clearly else "move"]
+    for plan in ("move", "keep"):
+        assert chosen[plan].report["motion"] == [plan]
         assert chosen[plan].report["tried"] == [None]
-    np.testing.assert_array_equal(chosen["auto"].image, chosen[chosen["auto"].report["plan"][0]].image)
-    assert (chosen["move"].image != chosen["still"].image).any()
+    np.testing.assert_array_equal(chosen["auto"].image, chosen[chosen["auto"].report["motion"][0]].image)
+    assert (chosen["move"].image != chosen["keep"].image).any()
 
 
 def test_what_wins_small_wins_large(gravel, chosen):
@@ -40,8 +40,8 @@ def test_what_wins_small_wins_large(gravel, chosen):
 def test_still_elements_are_taken_where_moved_ones_are_torn():
     """Blades of grass are no elements that could be cut out."""
     grass = np.ascontiguousarray(samples.photograph("grass").image[:160, :160])
-    auto, move = (texrs.design(grass, 192, plan=plan) for plan in ("auto", "move"))
-    assert auto.report["plan"] == ["still"]
+    auto, move = (texrs.design(grass, 192, motion=plan) for plan in ("auto", "move"))
+    assert auto.report["motion"] == ["keep"]
     still, moved = (judge(grass, r.source, r.image, wrap=True) for r in (auto, move))
     assert still.torn < 0.8 * moved.torn, (still, moved)
     assert still.broken < 0.8 * moved.broken, (still, moved)
@@ -49,11 +49,11 @@ def test_still_elements_are_taken_where_moved_ones_are_torn():
 
 def test_deformation_is_kept_where_it_does_no_harm():
     """Buttons on plain cloth, each surely found: moved ones lie as well."""
-    assert texrs.design(samples.dots((96, 96)).image, 64).report["plan"] == ["move"]
+    assert texrs.design(samples.dots((96, 96)).image, 64).report["motion"] == ["move"]
 
 
 def test_still_elements_are_copied_as_they_are(chosen):
-    still = chosen["still"]
+    still = chosen["keep"]
     assert still.report["holes"] == [0.0] * len(still.report["holes"])
     assert all(not entry.get("operations") for log in still.report["operations"] for entry in log)
     frames = np.abs(still.source.frames())
@@ -65,10 +65,10 @@ def test_still_elements_are_copied_as_they_are(chosen):
 
 def test_who_says_how_to_deform_is_obeyed(gravel):
     asked = texrs.DeformationOptions(translate=0.1)
-    found = texrs.design(gravel, 64, deformation=asked, tiles=1)
-    assert (found.report["plan"], found.report["tried"]) == (["move"], [None])
-    paper = texrs.design(gravel, 64, method="paper", plan="still", tiles=1)
-    assert (paper.report["plan"], paper.report["tried"]) == (["move"], [None])
+    found = texrs.design(gravel, 64, deformation=asked, copies=1)
+    assert (found.report["motion"], found.report["tried"]) == (["move"], [None])
+    paper = texrs.design(gravel, 64, method="paper", motion="keep", copies=1)
+    assert (paper.report["motion"], paper.report["tried"]) == (["move"], [None])
 
 
 def test_plans_are_tried_once_an_exemplar():
@@ -89,10 +89,10 @@ def test_each_exemplar_of_several_has_a_plan(gravel):
     dots = samples.dots((128, 128)).image
     grey = np.repeat(gravel[..., np.newaxis], 3, axis=-1) if gravel.ndim == 2 else gravel
     found = texrs.design([dots, grey], 128, seed=1)
-    assert len(found.report["plan"]) == len(found.report["tried"]) == 2
-    assert found.report["plan"][0] == texrs.design(dots, 128).report["plan"][0]
+    assert len(found.report["motion"]) == len(found.report["tried"]) == 2
+    assert found.report["motion"][0] == texrs.design(dots, 128).report["motion"][0]
 
 
 def test_plans_are_checked(gravel):
     with pytest.raises(InvalidInput, match="^plan"):
-        texrs.design(gravel, 64, plan="fly")
+        texrs.design(gravel, 64, motion="fly")

@@ -38,7 +38,7 @@ def covered(result, which):
 @pytest.mark.parametrize("density", [0.05, 0.15, 0.3, 0.45])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_densities_are_kept(grit, pebbles, density, seed):
-    result = texrs.design([grit, pebbles], SIZE, density=density, seed=seed, tiles=1)
+    result = texrs.design([grit, pebbles], SIZE, density=density, seed=seed, copies=1)
     [said] = result.report["density"]
     assert covered(result, 1) == pytest.approx(density, rel=0.03)
     assert (said["asked"], said["reached"]) == (density, pytest.approx(covered(result, 1), abs=1e-4))
@@ -46,7 +46,7 @@ def test_densities_are_kept(grit, pebbles, density, seed):
 
 
 def test_things_are_whole_and_apart(grit, pebbles):
-    result = texrs.design([grit, pebbles], SIZE, density=0.15, deformation=COPIED, tiles=1, screening=None)
+    result = texrs.design([grit, pebbles], SIZE, density=0.15, deformation=COPIED, copies=1, screening=None)
     source = result.source
     whole = {e.label: int((e.distance > EDGE).sum()) for e in measure_elements(pebbles.labels) if not any(e.touches)}
     lies = source.exemplar == 1
@@ -65,7 +65,7 @@ def test_things_are_whole_and_apart(grit, pebbles):
 def test_a_map_says_where_how_much_lies(grit, pebbles):
     density = np.zeros(SIZE)
     density[:, 112:] = 0.3
-    result = texrs.design([grit, pebbles], SIZE, density=density, tiles=1, wrap=False)
+    result = texrs.design([grit, pebbles], SIZE, density=density, copies=1, wrap=False)
     lies = result.source.exemplar == 1
     assert lies.mean() == pytest.approx(0.15, rel=0.03)
     # A thing reaches over by less than its half.
@@ -75,14 +75,14 @@ def test_a_map_says_where_how_much_lies(grit, pebbles):
 
 def test_a_map_may_rise_slowly(grit, flowers):
     density = 0.4 * np.linspace(0, 1, 384) * np.ones((256, 1))
-    result = texrs.design([grit, flowers], (256, 384), density=density, tiles=1, wrap=False)
+    result = texrs.design([grit, flowers], (256, 384), density=density, copies=1, wrap=False)
     lies, parts = result.source.exemplar == 1, [np.s_[:, k : k + 128] for k in (0, 128, 256)]
     for part in parts:
         assert lies[part].mean() == pytest.approx(density[part].mean(), abs=0.06)
 
 
 def test_later_exemplars_lie_above(grit, flowers, pebbles):
-    result = texrs.design([grit, flowers, pebbles], SIZE, density=[0.3, 0.15], deformation=COPIED, tiles=1)
+    result = texrs.design([grit, flowers, pebbles], SIZE, density=[0.3, 0.15], deformation=COPIED, copies=1)
     assert [covered(result, k) for k in (1, 2)] == pytest.approx([0.3, 0.15], rel=0.03)
     whole = {e.label: int((e.distance > EDGE).sum()) for e in measure_elements(pebbles.labels)}
     top = result.source.exemplar == 2
@@ -93,20 +93,20 @@ def test_later_exemplars_lie_above(grit, flowers, pebbles):
 
 
 def test_nothing_is_scattered_at_a_density_of_nothing(grit, pebbles):
-    alone = texrs.design(grit, SIZE, tiles=1)
-    none = texrs.design([grit, pebbles], SIZE, density=0, tiles=1)
+    alone = texrs.design(grit, SIZE, copies=1)
+    none = texrs.design([grit, pebbles], SIZE, density=0, copies=1)
     np.testing.assert_array_equal(alone.image, none.image)
 
 
 def test_what_cannot_be_reached_is_said(grit, pebbles):
-    result = texrs.design([grit, pebbles], (96, 64), density=1.0, tiles=1)
+    result = texrs.design([grit, pebbles], (96, 64), density=1.0, copies=1)
     [said] = result.report["density"]
     assert 0.3 < said["reached"] < 1
     assert said["reached"] == pytest.approx(covered(result, 1), abs=1e-4)
 
 
 def test_things_go_around_the_ends_of_cyclic_axes(grit, pebbles):
-    result = texrs.design([grit, pebbles], 96, density=0.3, tiles=1, wrap=(True, False), seed=2)
+    result = texrs.design([grit, pebbles], 96, density=0.3, copies=1, wrap=(True, False), seed=2)
     labels = np.where(result.source.exemplar == 1, result.source.label, 0)
     around = (labels[0] == labels[-1]) & (labels[0] > 0)
     aside = (labels[:, 0] == labels[:, -1]) & (labels[:, 0] > 0)

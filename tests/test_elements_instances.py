@@ -162,8 +162,8 @@ def test_splice_divides_elements_alike() -> None:
 
 
 def test_design_takes_an_entry_for_exemplar_or_elements() -> None:
-    marked = texrs.design(ENTRY.image, 64, tiles=1, elements=ElementOptions(labels=ENTRY.labels))
-    for made in (texrs.design(ENTRY, 64, tiles=1), texrs.design(ENTRY.image, 64, tiles=1, elements=ENTRY)):
+    marked = texrs.design(ENTRY.image, 64, copies=1, elements=ElementOptions(labels=ENTRY.labels))
+    for made in (texrs.design(ENTRY, 64, copies=1), texrs.design(ENTRY.image, 64, copies=1, elements=ENTRY)):
         np.testing.assert_array_equal(made.image, marked.image)
         assert made.report["segmentation"] == "labels"
         assert made.report["elements"] == 6
@@ -171,14 +171,14 @@ def test_design_takes_an_entry_for_exemplar_or_elements() -> None:
 
 def test_what_is_said_of_elements_stands_above_the_entry() -> None:
     assert (
-        texrs.design(ENTRY, 64, tiles=1, elements=ElementOptions(segmentation="grid")).report["segmentation"] == "grid"
+        texrs.design(ENTRY, 64, copies=1, elements=ElementOptions(segmentation="grid")).report["segmentation"] == "grid"
     )
 
 
 def test_entries_and_pictures_are_mixed() -> None:
     plain = 255 - ENTRY.image
     labels = [ENTRY.labels, np.zeros_like(ENTRY.labels)]
-    options = {"tiles": 1, "plan": "still"}
+    options = {"copies": 1, "motion": "keep"}
     made = texrs.design([ENTRY, replace(ENTRY, image=plain, mask=np.zeros_like(MASK))], 64, **options)
     marked = texrs.design([ENTRY.image, plain], 64, elements=ElementOptions(labels=labels), **options)
     np.testing.assert_array_equal(made.image, marked.image)
@@ -188,7 +188,7 @@ def test_entries_and_pictures_are_mixed() -> None:
 def test_design_parts_what_lies_across_a_border() -> None:
     centres = np.array([[2.0, 40], [50, 1], [50, 50]])
     entry = make_entry(centres, draw_discs(centres, np.array([RADIUS] * 3), wrap=True), wrap=(True, True))
-    assert texrs.design(entry, 64, tiles=1, plan="move").report["elements"] == 5
+    assert texrs.design(entry, 64, copies=1, motion="move").report["elements"] == 5
 
 
 @pytest.mark.parametrize("exemplar", [ENTRY.image[:64], [ENTRY.image, ENTRY.image]], ids=["shape", "several"])

@@ -90,7 +90,9 @@ def test_a_doubtful_plane_is_not_followed() -> None:
 def test_again_and_otherwise() -> None:
     again = texrs.extend(FLOOR, left=64, right=80, bottom=24, view=PLANE, seed=2)
     np.testing.assert_array_equal(again.image, LARGER.image)
-    grey = texrs.extend(FLOOR[..., 0].astype(np.uint16), top=16, view=View(slant=40, tilt=100, fov=55), boundary=2)
+    grey = texrs.extend(
+        FLOOR[..., 0].astype(np.uint16), top=16, view=View(slant=40, tilt=100, fov=55), boundary_width=2
+    )
     assert grey.image.shape == (176, 176)
     assert grey.image.dtype == np.uint16
     assert grey.stages["composite"].shape == (176, 176)
@@ -104,7 +106,7 @@ def test_again_and_otherwise() -> None:
         (lambda: texrs.extend(FLOOR, right=10**6), "right: "),
         (lambda: texrs.extend(FLOOR, top=300, view=PLANE), "reach the plane's horizon"),
         (lambda: texrs.extend(FLOOR, top=8, view=View(corners=[[0, 0]] * 4)), "corners: needs the four of a convex"),
-        (lambda: texrs.extend(FLOOR, top=8, view=PLANE, boundary=65), "boundary: "),
+        (lambda: texrs.extend(FLOOR, top=8, view=PLANE, boundary_width=65), "boundary: "),
         (lambda: texrs.extend(FLOOR[:40], top=8), "each side must be at least 64"),
     ],
 )

@@ -99,7 +99,7 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
             "colours": NOISE,
             "known": ~INSIDE,
             "index": INDEX,
-            "patch": (3, 4),
+            "patch_size": (3, 4),
             "keep": None,
             **PICK,
             "wrap": (True, False),

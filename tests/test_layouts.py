@@ -185,7 +185,7 @@ def test_corrections_go_before_known_elements() -> None:
 
 
 def test_a_drawn_layout_serves_a_database_and_a_net(tmp_path: Path) -> None:
-    net = texrs.splice(WALL, layouts.lattice(96, *OBLIQUE), 96, nets=True)
+    net = texrs.splice(WALL, layouts.lattice(96, *OBLIQUE), 96, use_nets=True)
     assert net.report["method"] == "nets"
     assert net.report["continued"] == "lattice"
     assert texrs.splice(DOTS, layouts.courses(96, 24, 32), 96, method="preview").image.shape == (96, 96, 3)

@@ -275,7 +275,9 @@ def test_remove_grows_and_feathers() -> None:
     floor = samples.tilted_discs((128, 128)).image
     marked = np.zeros((128, 128), np.uint8)
     marked[60:80, 50:70] = 255
-    made = texrs.remove(floor, Mask(marked, grow=2, feather=3), view=texrs.View(slant=35, fov=60), margin=0, boundary=0)
+    made = texrs.remove(
+        floor, Mask(marked, grow=2, feather=3), view=texrs.View(slant=35, fov=60), margin=0, boundary_width=0
+    )
     inner = widen(marked > 0, 2)
     assert made.report["filled"] == widen(inner, 3).mean()
     np.testing.assert_array_equal(texrs.apply(made.source, floor), made.image)

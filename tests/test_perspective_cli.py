@@ -63,7 +63,10 @@ def test_holes_are_filled_by_scale(files):
         made, floor, hole = (io.read(files / n) for n in ("out.png", "floor.png", "hole.png"))
         np.testing.assert_array_equal(made[hole == 0], floor[hole == 0])
     assert (
-        run(files, "complete @floor.png @hole.png -o @out.png --method optimise --scale-map @scale.npy --boundary 4 -q")
+        run(
+            files,
+            "complete @floor.png @hole.png -o @out.png --method optimise --scale-map @scale.npy --boundary-width 4 -q",
+        )
         == 0
     )
     changed = (io.read(files / "out.png") != floor).any(axis=-1)
@@ -97,7 +100,10 @@ def test_holes_are_filled_by_scale(files):
         ),
         ("complete @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
         ("complete @floor.png @hole.png -o @out.png --method heal", "--method: allowed are"),
-        ("complete @floor.png @hole.png -o @out.png --method optimise --patch 9", "--patch: method 'optimise' has no"),
+        (
+            "complete @floor.png @hole.png -o @out.png --method optimise --patch-size 9",
+            "--patch-size: method 'optimise' has no",
+        ),
     ],
 )
 def test_bad_input_is_named(files, capsys, line, words):

@@ -169,7 +169,7 @@ def test_optimisation_may_replace_the_boundary(floor, boundary):
     image, scale = floor
     hole = hole_in(image.shape[:2], (60, 90, 60, 100))
     wide = ndimage.distance_transform_edt(~hole) <= boundary
-    result = fill(image, hole, method="optimise", scale_map=scale, boundary=boundary)
+    result = fill(image, hole, method="optimise", scale_map=scale, boundary_width=boundary)
     np.testing.assert_array_equal(result.source.label > 0, wide)
     np.testing.assert_array_equal(result.image[~wide], image[~wide])
     assert (result.image != image)[wide & ~hole].any()
@@ -209,7 +209,7 @@ def test_an_output_that_wraps(floor):
         ),
         ({"screening": "soft"}, "screening: needs a number"),
         ({"hole": "alpha"}, "hole: 'alpha' needs an image with an alpha channel"),
-        ({"method": "optimise", "patch": 12}, "patch: method 'optimise' has no patches"),
+        ({"method": "optimise", "patch_size": 12}, "patch_size: method 'optimise' has no patches"),
         ({"method": "optimise", "hole": np.ones((64, 64), bool)}, "hole: covers the whole image"),
         ({"method": "optimise", "hole": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "hole: leaves no part"),
     ],

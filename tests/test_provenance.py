@@ -20,7 +20,7 @@ from texrs.io._formats import FORMATS
 
 Capture = pytest.CaptureFixture[str]
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
-SMALL = ("--size", "48", "--tiles", "1", "-q")
+SMALL = ("--size", "48", "--copies", "1", "-q")
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ WRITERS = {
     "complete": "complete in.png hole.png -o {}.png",
     "database matrix": "database db matrix -o {}.png",
     "database splice": "database db splice dots dots -o {}.png",
-    "design": "design in.png --size 48 --tiles 1 -o {}.png",
+    "design": "design in.png --size 48 --copies 1 -o {}.png",
     "check": "check in.png -o {}.png",
     "extend": "extend in.png --left 8 --slant 0 -o {}.png",
     "paint": "paint in.obj in.tif --vertices --voxels 2 -o {}.glb",
@@ -70,7 +70,7 @@ WRITERS = {
     "splice": "splice in.png in.png -o {}.png",
     "synthesize": "synthesize in.png --size 48 -o {}.png",
     "tile": "tile in.png -o {}.png",
-    "tiles": "tiles in.png --side 48 --pictures 1 --plan still --size 40 -o {}.png",
+    "tiles": "tiles in.png --side 48 --pictures 1 --motion keep --size 40 -o {}.png",
 }
 """A command of each kind that writes one file."""
 
@@ -224,7 +224,7 @@ def begin(*arguments: str) -> subprocess.Popen[bytes]:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_variants_that_are_done_stay(here: Path, number: int) -> None:
     before = files(here)
-    with begin("design", "in.png", "--size", "48", "--tiles", "1", "--variants", "4000", "-o", "v.png") as process:
+    with begin("design", "in.png", "--size", "48", "--copies", "1", "--variants", "4000", "-o", "v.png") as process:
         for _ in range(600):
             if Path("v-1.png").exists():
                 break
@@ -256,7 +256,7 @@ AGAIN = {
     "analyse": "analyse in.png --mask mask.png --layout disjoint -o r.npz --stages st --page r.html",
     "complete": "complete in.png hole.png -o r.jpg --map r.npz",
     "database": "database db matrix -o r.png --each each --cell 32",
-    "design": "design in.png --size 64x48 --tiles 1 --seed 3 --element-labels mask.png -o r.exr --map r.npz --stages st",
+    "design": "design in.png --size 64x48 --copies 1 --seed 3 --element-labels mask.png -o r.exr --map r.npz --stages st",
     "sample": "tile sample:weave -o r.webp --wrap x",
     "scale-map": "scale-map in.png --slant 40 --tilt 80 -o r.png --stages st",
     "scale-map npy": "scale-map in.png --slant 30 -o r.npy",
@@ -264,7 +264,7 @@ AGAIN = {
     "turntable": "slice in.tif --turntable --frames 3 --size 32 -o r.gif",
     "solid": "solid in.tif --size 16 -o r.vti --map r.npz",
     "tile": "tile in.png -o r.bmp --stages st",
-    "variants": "design in.png --size 48 --tiles 1 --variants 2 --seed 7 -o r.png --map r.npz --stages st",
+    "variants": "design in.png --size 48 --copies 1 --variants 2 --seed 7 -o r.png --map r.npz --stages st",
     "samples": "samples weave dots -o st --size 48",
     "add": "database db add in.png --name again --mask mask.png --layout disjoint",
 }

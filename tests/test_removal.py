@@ -108,7 +108,7 @@ def test_a_large_tile_is_no_thing() -> None:
 
 def test_what_goes_is_filled_from_the_ground_alone() -> None:
     picture, ground, marked = see("beans", sky=True, thing=True)
-    made = texrs.remove(picture, marked, boundary=0, seed=1)
+    made = texrs.remove(picture, marked, boundary_width=0, seed=1)
     assert made.report["planes"][0]["found"]
     assert made.report["beyond"] == 0
     wide = made.stages["known"] != picture
@@ -186,7 +186,7 @@ def test_parts_that_meet_in_no_line_go_on_where_they_are_nearer() -> None:
 
 def test_seams_may_run_a_little_around_it() -> None:
     rows, columns = np.nonzero(
-        (texrs.remove(FLOOR, MARKED, view=PLANE, margin=2, boundary=5).image != FLOOR).any(axis=2)
+        (texrs.remove(FLOOR, MARKED, view=PLANE, margin=2, boundary_width=5).image != FLOOR).any(axis=2)
     )
     assert 63 <= rows.min() <= 68
     assert 91 <= columns.max() <= 97
@@ -260,8 +260,8 @@ MARKED[70:90, 60:90] = True
         ),
         (lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, View(ground=MARKED | True)]), "ground: the others leave"),
         (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
-        (lambda: texrs.remove(FLOOR, MARKED, patch=2), "patch: "),
-        (lambda: texrs.remove(FLOOR, MARKED, boundary=65), "boundary: "),
+        (lambda: texrs.remove(FLOOR, MARKED, patch_size=2), "patch: "),
+        (lambda: texrs.remove(FLOOR, MARKED, boundary_width=65), "boundary: "),
         (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: needs a texrs.View"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: nothing"),

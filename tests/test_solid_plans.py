@@ -17,36 +17,40 @@ def beans():
 
 
 def test_the_usual_plan_is_what_is_made_where_nothing_is_said(beans):
-    default, usual = (texrs.synthesize(beans, 128, seed=2, **said) for said in ({}, {"plan": "usual"}))
+    default, usual = (texrs.synthesize(beans, 128, seed=2, **said) for said in ({}, {"patches": "default"}))
     np.testing.assert_array_equal(default.image, usual.image)
-    assert (default.report["plan"], default.report["tried"]) == ("usual", None)
+    assert (default.report["patches"], default.report["tried"]) == ("default", None)
 
 
 def test_large_patches_are_fewer(beans):
-    usual, large = (texrs.synthesize(beans, 192, seed=1, plan=plan).report["stitched"] for plan in ("usual", "large"))
+    usual, large = (
+        texrs.synthesize(beans, 192, seed=1, patches=plan).report["stitched"] for plan in ("default", "large")
+    )
     assert large["patches"] < usual["patches"]
 
 
 def test_seams_of_a_plain_texture_run_through_things():
     heap = texrs.Exemplar(samples.pebbles((128, 128)).image)
     torn = {
-        plan: np.mean([judge(heap, texrs.synthesize(heap, 192, seed=seed, plan=plan).source).torn for seed in range(2)])
-        for plan in ("usual", "plain")
+        plan: np.mean(
+            [judge(heap, texrs.synthesize(heap, 192, seed=seed, patches=plan).source).torn for seed in range(2)]
+        )
+        for plan in ("default", "unmasked")
     }
-    assert torn["usual"] < torn["plain"]
+    assert torn["default"] < torn["unmasked"]
 
 
 def test_what_is_judged_clearly_best_is_taken(monkeypatch):
-    scores = {"usual": 1.0, "large": 0.9, "plain": 0.8, "plain-large": 1.2}
+    scores = {"default": 1.0, "large": 0.9, "unmasked": 0.8, "unmasked-large": 1.2}
     exemplars = [texrs.Exemplar(samples.pebbles((64, 64), seed=seed).image) for seed in range(2)]
-    for exemplar, best, score in ((exemplars[0], "plain", 0.8), (exemplars[1], "usual", 0.86)):
-        given = scores | {"plain": score}
+    for exemplar, best, score in ((exemplars[0], "unmasked", 0.8), (exemplars[1], "default", 0.86)):
+        given = scores | {"unmasked": score}
         names = {plan: name for name, plan in plans.PLANS.items()}
         monkeypatch.setattr(plans, "judge", lambda exemplar, name, given=given: given[name])
         monkeypatch.setattr(plans, "average", lambda figures: {"score": figures[0]})
         monkeypatch.setattr("texrs.papers.solid.try_plan", lambda asked, progress, plan, seed, names=names: names[plan])
-        found = texrs.synthesize(exemplar, 64, plan="auto").report
-        assert found["plan"] == best
+        found = texrs.synthesize(exemplar, 64, patches="auto").report
+        assert found["patches"] == best
         assert {name: figures["score"] for name, figures in found["tried"].items()} == given
 
 
@@ -55,7 +59,7 @@ def test_plans_are_tried_once_an_exemplar():
     tried = []
     made = [
         texrs.synthesize(
-            exemplar, 64, seed=seed, plan="auto", progress=lambda stage, _, s=seed: tried.append((s, stage))
+            exemplar, 64, seed=seed, patches="auto", progress=lambda stage, _, s=seed: tried.append((s, stage))
         )
         for seed in range(2)
     ]
@@ -63,33 +67,33 @@ def test_plans_are_tried_once_an_exemplar():
     assert tried.count((1, "try")) == 0
     assert made[0].report["tried"] == made[1].report["tried"]
     assert set(made[0].report["tried"]) == set(plans.PLANS)
-    assert set(made[0].report["tried"]["usual"]) == {"score", "torn", "broken", "fog", "repetition", "share"}
+    assert set(made[0].report["tried"]["default"]) == {"score", "torn", "broken", "fog", "repetition", "share"}
 
 
 def test_without_elements_there_is_nothing_to_be_plain_about():
     noise = np.random.default_rng(3).random((64, 64, 3)).astype(np.float32)
-    assert set(texrs.synthesize(noise, 64, plan="auto").report["tried"]) == {"usual", "large"}
+    assert set(texrs.synthesize(noise, 64, patches="auto").report["tried"]) == {"default", "large"}
 
 
 def test_labels_are_not_tried():
     labels = texrs.Exemplar(samples.beans((64, 64)).labels.astype(np.uint8), labels=True)
-    found = texrs.synthesize(labels, 64, plan="auto").report
-    assert (found["plan"], found["tried"]) == ("usual", None)
+    found = texrs.synthesize(labels, 64, patches="auto").report
+    assert (found["patches"], found["tried"]) == ("default", None)
 
 
 def test_the_command_takes_a_plan(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["synthesize", "sample:dots", "--size", "72", "--plan", "large", "-o", "out.png", "-q"]) == 0
-    expected = texrs.synthesize(samples.load("dots").image, 72, plan="large").image
+    assert main(["synthesize", "sample:dots", "--size", "72", "--patches", "large", "-o", "out.png", "-q"]) == 0
+    expected = texrs.synthesize(samples.load("dots").image, 72, patches="large").image
     np.testing.assert_array_equal(texrs.io.read("out.png"), expected)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"plan": "fly"}, "^plan: "),
-        ({"plan": "large", "quality": "fast"}, "^plan: quality='fast' puts no patches together"),
-        ({"plan": "auto", "method": "paper"}, "^plan: method='paper' puts no patches together"),
+        ({"patches": "fly"}, "^patches: "),
+        ({"patches": "large", "quality": "fast"}, "^patches: quality='fast' puts no patches together"),
+        ({"patches": "auto", "method": "paper"}, "^patches: method='paper' puts no patches together"),
     ],
 )
 def test_plans_are_checked(beans, options, message):

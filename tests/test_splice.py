@@ -36,7 +36,7 @@ def spliced() -> Callable[[str, str], texrs.Synthesis]:
 
     def get(a: str, b: str) -> texrs.Synthesis:
         if (a, b) not in made:
-            made[a, b] = texrs.splice(ENTRIES[a], ENTRIES[b], cells=False, seed=1, screening=None)
+            made[a, b] = texrs.splice(ENTRIES[a], ENTRIES[b], use_cells=False, seed=1, screening=None)
         return made[a, b]
 
     return get
@@ -268,7 +268,7 @@ def test_pictures_are_analysed() -> None:
 
 def test_maps_in_register_come_out_in_register() -> None:
     mine = ENTRIES["bricks"]
-    result = texrs.splice(mine, ENTRIES["pebbles"], 128, cells=False, seed=1)
+    result = texrs.splice(mine, ENTRIES["pebbles"], 128, use_cells=False, seed=1)
     height = np.linspace(0, 1, mine.mask.size, dtype=np.float32).reshape(mine.mask.shape)
     rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
     assert (result.source.render(height) == height[rows, columns]).all()
@@ -386,7 +386,7 @@ def test_bad_options() -> None:
 @pytest.mark.parametrize("name", ["dots", "bricks"])
 def test_no_strength_leaves_the_layout_as_it_is(name: str) -> None:
     mine = ENTRIES[name]
-    result = texrs.splice(mine, ENTRIES["pebbles"], cells=False, strength=0.0, seed=1)
+    result = texrs.splice(mine, ENTRIES["pebbles"], use_cells=False, strength=0.0, seed=1)
     matches = result.report["matches"]
     assert {m["realised"] for m in matches} == {None}
     assert result.report["realised"] == 1

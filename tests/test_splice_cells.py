@@ -154,38 +154,38 @@ def test_same_bytes_for_any_pool_and_seed_decides() -> None:
 
 
 def test_turns_only_where_allowed() -> None:
-    turned = texrs.splice(STONES, DOTS, 128, turns=True).report
+    turned = texrs.splice(STONES, DOTS, 128, allow_rotation=True).report
     assert any(m["turn"] for m in turned["matches"])
-    upright = texrs.splice(STONES, DOTS, 128, turns=False).report
+    upright = texrs.splice(STONES, DOTS, 128, allow_rotation=False).report
     assert not any(m["turn"] for m in upright["matches"])
 
 
 def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
-    assert texrs.splice(STONES, DOTS, 96, cells=False).report["method"] == "default"
+    assert texrs.splice(STONES, DOTS, 96, use_cells=False).report["method"] == "default"
     noise = np.random.default_rng(0).integers(0, 255, SIZE).astype(np.uint8)
-    assert texrs.splice(replace(STONES, image=noise), DOTS, 96, nets=False).report["method"] == "default"
+    assert texrs.splice(replace(STONES, image=noise), DOTS, 96, use_nets=False).report["method"] == "default"
     assert texrs.splice(STONES, DOTS, 96, method="paper").report["method"] == "paper"
     with pytest.raises(InvalidInput, match="cells"):
-        texrs.splice(replace(STONES, image=noise), DOTS, 96, cells=True)
+        texrs.splice(replace(STONES, image=noise), DOTS, 96, use_cells=True)
     with pytest.raises(InvalidInput, match="separate"):
-        texrs.splice(DOTS, STONES, 96, cells=True)
+        texrs.splice(DOTS, STONES, 96, use_cells=True)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"cells": 1}, "cells: needs True or False"),
-        ({"turns": "no"}, "turns: needs True or False"),
+        ({"use_cells": 1}, "use_cells: needs True or False"),
+        ({"allow_rotation": "no"}, "allow_rotation: needs True or False"),
         ({"strength": 1.5}, "strength"),
         ({"strength": "half"}, "strength"),
-        ({"cells": True, "method": "paper"}, "bends"),
-        ({"cells": True, "method": "preview"}, "bends"),
+        ({"use_cells": True, "method": "paper"}, "bends"),
+        ({"use_cells": True, "method": "preview"}, "bends"),
     ],
 )
 def test_wrong_options_are_told(options: Any, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
         texrs.splice(STONES, DOTS, 96, **options)
-    assert texrs.splice(STONES, DOTS, 96, cells=np.False_).report["method"] == "default"
+    assert texrs.splice(STONES, DOTS, 96, use_cells=np.False_).report["method"] == "default"
 
 
 def test_boxes_of_any_size_are_taken() -> None:
@@ -236,12 +236,12 @@ def test_own_layouts_have_any_size(size: tuple[int, int]) -> None:
 
 
 def test_the_report_says_how_much_of_each_way_was_gone(spliced: Any) -> None:
-    for result in (spliced("stones", "dots"), texrs.splice(STONES, DOTS, cells=False), texrs.splice(DOTS, STONES)):
+    for result in (spliced("stones", "dots"), texrs.splice(STONES, DOTS, use_cells=False), texrs.splice(DOTS, STONES)):
         parts = [m["realised"] for m in result.report["matches"]]
         assert all(part is None or 0 <= part <= 1 for part in parts)
         assert sum(part is not None for part in parts) > len(parts) / 2
         assert 0 <= result.report["realised"] <= 1
-    assert spliced("stones", "dots").report["realised"] > texrs.splice(STONES, DOTS, cells=False).report["realised"]
+    assert spliced("stones", "dots").report["realised"] > texrs.splice(STONES, DOTS, use_cells=False).report["realised"]
 
 
 def test_layouts_go_on_without_mirrors() -> None:

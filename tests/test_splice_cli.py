@@ -52,14 +52,16 @@ def test_splice(tmp_path: Path) -> None:
 
 def test_splice_by_cells(tmp_path: Path) -> None:
     made = []
-    for number, options in enumerate((["--cells"], ["--no-cells"], ["--cells", "--turns", "--strength", "0.5"])):
+    for number, options in enumerate(
+        (["--use-cells"], ["--no-use-cells"], ["--use-cells", "--allow-rotation", "--strength", "0.5"])
+    ):
         stages = tmp_path / str(number)
         line = ["splice", "bricks.npz", "pebbles.npz", "-o", str(tmp_path / "out.png"), "--size", "96", "-q"]
         assert main([*line, *options, "--stages", str(stages)]) == 0
         made.append(json.loads((stages / "report.json").read_text()))
     assert [report["method"] for report in made] == ["cells", "default", "cells"]
     assert [made[0]["strength"], made[2]["strength"]] == [1.0, 0.5]
-    assert made[2]["turns"] is True
+    assert made[2]["allow_rotation"] is True
 
 
 def test_self_splice_and_its_replay(tmp_path: Path) -> None:
@@ -101,7 +103,7 @@ def test_entries_are_taken(tmp_path: Path) -> None:
         (["splice", "dots.png", "pebbles.png", "--method", "fast"], "--method"),
         (["splice", "dots.png", "pebbles.png", "--size", "4"], "--size"),
         (["splice", "dots.png", "pebbles.png", "--strength", "2"], "--strength"),
-        (["splice", "dots.png", "pebbles.npz", "--cells"], "--cells"),
+        (["splice", "dots.png", "pebbles.npz", "--use-cells"], "--use-cells"),
         (["self-splice", "dots.png", "--edit", "melt"], "--edit"),
         (["self-splice", "dots.png", "--edit", "[3"], "not JSON"),
         (["self-splice", "dots.png", "--size", "4"], "--size"),

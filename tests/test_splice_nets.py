@@ -51,7 +51,7 @@ DOTS = Elements.of_sample(samples.dots((144, 144)))
 
 @pytest.fixture(scope="module")
 def spliced() -> texrs.Synthesis:
-    return texrs.splice(NET, LAYOUT, SIZE, seed=1, nets=True)
+    return texrs.splice(NET, LAYOUT, SIZE, seed=1, use_nets=True)
 
 
 def test_knots_are_where_they_are_wanted(spliced: texrs.Synthesis) -> None:
@@ -81,7 +81,7 @@ def test_a_ring_is_seen_around_every_found_knot(spliced: texrs.Synthesis) -> Non
 
 
 def test_bending_misses_where_nets_do_not(spliced: texrs.Synthesis) -> None:
-    bent = texrs.splice(NET, LAYOUT, SIZE, seed=1, nets=False, cells=False)
+    bent = texrs.splice(NET, LAYOUT, SIZE, seed=1, use_nets=False, use_cells=False)
     assert bent.report["method"] == "default"
     assert spliced.report["realised"] > bent.report["realised"]
 
@@ -104,8 +104,8 @@ def test_labels_are_targets(spliced: texrs.Synthesis) -> None:
 
 
 def test_the_same_seed_makes_the_same_picture(spliced: texrs.Synthesis) -> None:
-    assert (texrs.splice(NET, LAYOUT, SIZE, seed=1, nets=True).image == spliced.image).all()
-    assert (texrs.splice(NET, LAYOUT, SIZE, seed=2, nets=True).image != spliced.image).any()
+    assert (texrs.splice(NET, LAYOUT, SIZE, seed=1, use_nets=True).image == spliced.image).all()
+    assert (texrs.splice(NET, LAYOUT, SIZE, seed=2, use_nets=True).image != spliced.image).any()
 
 
 def test_stages_are_drawn(spliced: texrs.Synthesis) -> None:
@@ -128,12 +128,12 @@ def test_nets_are_chosen_where_no_cells_are_found() -> None:
 
 @pytest.mark.parametrize("shape", [(48, 200), (16, 16)])
 def test_any_size_is_filled(shape: tuple[int, int]) -> None:
-    made = texrs.splice(NET, DOTS, shape, nets=True)
+    made = texrs.splice(NET, DOTS, shape, use_nets=True)
     assert made.image.shape == (*shape, 3)
 
 
 def test_half_of_the_way_lies_between() -> None:
-    report = texrs.splice(NET, LAYOUT, SIZE, nets=True, strength=0.0).report
+    report = texrs.splice(NET, LAYOUT, SIZE, use_nets=True, strength=0.0).report
     own = np.array([m["target"] for m in report["matches"] if all(0 <= v <= 143 for v in m["target"])])
     apart = np.hypot(*(own[:, None] - NET.points[None]).transpose(2, 0, 1)).min(axis=1)
     assert np.median(apart) < 1e-3
@@ -185,13 +185,13 @@ def test_places_say_how_far_knots_and_lines_are() -> None:
 @pytest.mark.parametrize(
     ("entry", "options", "words"),
     [
-        (NET, {"nets": 1}, "nets: needs True or False"),
-        (NET, {"nets": True, "cells": True}, "one of the two"),
-        (NET, {"nets": True, "method": "paper"}, "nets: .*bends"),
-        (NET, {"nets": True, "method": "preview"}, "nets: .*bends"),
-        (DOTS, {"nets": True}, "separate elements"),
-        (replace(NET, points=NET.points[:4]), {"nets": True}, "six knots"),
-        (replace(NET, points=NET.points[:6] / 20), {"nets": True}, "8 pixels"),
+        (NET, {"use_nets": 1}, "use_nets: needs True or False"),
+        (NET, {"use_nets": True, "use_cells": True}, "one of the two"),
+        (NET, {"use_nets": True, "method": "paper"}, "use_nets: .*bends"),
+        (NET, {"use_nets": True, "method": "preview"}, "use_nets: .*bends"),
+        (DOTS, {"use_nets": True}, "separate elements"),
+        (replace(NET, points=NET.points[:4]), {"use_nets": True}, "six knots"),
+        (replace(NET, points=NET.points[:6] / 20), {"use_nets": True}, "8 pixels"),
     ],
 )
 def test_wrong_options_are_told(entry: Elements, options: Any, words: str) -> None:
@@ -202,7 +202,7 @@ def test_wrong_options_are_told(entry: Elements, options: Any, words: str) -> No
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
 def test_any_picture_keeps_its_type(dtype: Any) -> None:
     grey = NET.image[..., 0].astype(dtype)
-    made = texrs.splice(replace(NET, image=grey if dtype != np.float32 else grey / 255), LAYOUT, 64, nets=True)
+    made = texrs.splice(replace(NET, image=grey if dtype != np.float32 else grey / 255), LAYOUT, 64, use_nets=True)
     assert made.image.dtype == dtype
 
 
@@ -212,4 +212,4 @@ def test_work_can_be_stopped() -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        texrs.splice(NET, LAYOUT, 64, nets=True, progress=stop)
+        texrs.splice(NET, LAYOUT, 64, use_nets=True, progress=stop)

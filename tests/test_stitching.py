@@ -103,10 +103,10 @@ def test_separate_elements_are_turned_and_courses_are_bent():
 @pytest.mark.parametrize("bend", [True, False])
 def test_bend_overrules_what_the_exemplar_says(bend):
     bricks = samples.bricks((96, 96)).image
-    made = texrs.synthesize(bricks, 128, field=fields.circular(axes=2), bend=bend)
+    made = texrs.synthesize(bricks, 128, field=fields.circular(axes=2), bend_patches=bend)
     assert made.report["stitched"]["bent"] == bend
     with pytest.raises(InvalidInput, match="bend: needs True, False or None, got 'no'"):
-        texrs.synthesize(bricks, 128, bend="no")
+        texrs.synthesize(bricks, 128, bend_patches="no")
 
 
 def test_the_frames_of_rigid_patches_are_their_own():
@@ -127,7 +127,7 @@ def test_bent_patches_follow_the_field():
     field = fields.circular(axes=2)
     errors = {}
     for bend in (True, False):
-        source = texrs.synthesize(bricks, 160, field=field, bend=bend, seed=1).source
+        source = texrs.synthesize(bricks, 160, field=field, bend_patches=bend, seed=1).source
         expected = field.over((160, 160)).lattice((160, 160))
         step, same = np.diff(source.coordinates, axis=1), np.diff(source.label, axis=1) == 0
         errors[bend] = np.linalg.norm(step - expected[:, :-1, :, 1], axis=-1)[same].mean()

@@ -86,7 +86,7 @@ def test_known_voxels_change_within_the_boundary_alone() -> None:
 
     volume = make_noise()
     hole = make_ball(volume.shape, 8)
-    result = texrs.complete(volume, hole, boundary=3)
+    result = texrs.complete(volume, hole, boundary_width=3)
     far = distance_transform_edt(~hole) > 3
     assert (result.image[far] == volume[far]).all()
     assert result.report["replaced_outside"] > 0
@@ -121,8 +121,8 @@ def test_holes_of_any_shape() -> None:
         ({"scale_map": "auto"}, "scale_map: is for pictures"),
         ({"method": "optimise"}, "method: is for pictures"),
         ({"wrap": True}, "wrap: is for pictures"),
-        ({"patch": 3}, "patch: "),
-        ({"patch": 41}, "patch: "),
+        ({"patch_size": 3}, "patch_size: "),
+        ({"patch_size": 41}, "patch_size: "),
         ({"screening": -1}, "screening: "),
         (
             {"image": np.zeros((40, 40, 8), np.uint8), "hole": np.ones((40, 40, 8), bool)},

@@ -40,7 +40,7 @@ def extend(
     right: int = 0,
     to: int | Sequence[int] | None = None,
     view: View | Plane | Sequence[View | Plane] | None = None,
-    boundary: int = 0,
+    boundary_width: int = 0,
     screening: float | None = 0.1,
     light: bool = True,
     seed: int = 0,
@@ -62,7 +62,7 @@ def extend(
         plane is seen from the front, things are as large as they are seen anywhere. What is no ground, as the sky above a
         floor, goes on as it lies, but nothing that stands on it. Of several planes, as a floor and a wall, each goes on by
         itself, up to the line in which they meet; all but one need a ground.
-    boundary : int
+    boundary_width : int
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
     screening : float, optional
         Weight of the values when the colours of what is added are corrected, as in `texrs.complete`; None or 0: no correction.
@@ -78,7 +78,7 @@ def extend(
     -------
     Synthesis
         The larger picture, in the dtype and with the channels of the photograph, of which no pixel changes but those within
-        ``boundary``. Its source map leads to the photograph. The report has the planes and what was added.
+        ``boundary_width``. Its source map leads to the photograph. The report has the planes and what was added.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def extend(
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
     check_work("extend", [pixels], size, "top, bottom, left, right" if to is None else "to")
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
-    rim, number, follow = as_int(boundary, "boundary", 0, 64), as_seed(seed), as_bool(light, "light")
+    rim, number, follow = as_int(boundary_width, "boundary_width", 0, 64), as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)
     views = as_views(view)
     settled = [v.settle((rows, columns)) for v in views]
@@ -171,7 +171,7 @@ def extend(
         "added": added,
         "patches": list(made.counts),
         "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
-        "boundary": rim,
+        "boundary_width": rim,
         "screening": screening,
         "light": follow,
         "seed": number,

@@ -42,8 +42,8 @@ def remove(
     *,
     view: View | Plane | Sequence[View | Plane] | None = None,
     margin: int | None = None,
-    boundary: int | None = None,
-    patch: int | None = None,
+    boundary_width: int | None = None,
+    patch_size: int | None = None,
     screening: float | None = 0.1,
     light: bool = True,
     seed: int = 0,
@@ -64,10 +64,10 @@ def remove(
         planes, as a floor and a wall, each is filled in by itself; all but one need a ground.
     margin : int, optional
         Pixels by which the mask is widened, 0 to 64; by default 1/150 of the shorter side.
-    boundary : int, optional
+    boundary_width : int, optional
         Pixels around that which may change too, 0 to 64, so that seams run where they show least, between things; by default
         1/40 of the shorter side, of planes whose things lie apart 1/12. Only what seams run around changes.
-    patch : int, optional
+    patch_size : int, optional
         Side of the patches in pixels, as in `texrs.complete`.
     screening : float, optional
         Weight of the values when the colours of what is filled in are corrected, as in `texrs.complete`; None or 0: no
@@ -121,12 +121,12 @@ def remove(
     check_share(marked, "mask", name_marks(asked, "mask"), "remove")
     wide = max(1, round(MARGIN * min(shape))) if margin is None else as_int(margin, "margin", 0, 64)
     rim, things = round(RIM * min(shape)), min(64, round(THINGS * min(shape)))
-    if boundary is not None:
-        rim = things = as_int(boundary, "boundary", 0, 64)
+    if boundary_width is not None:
+        rim = things = as_int(boundary_width, "boundary_width", 0, 64)
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
     number, follow = as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)
-    side = None if patch is None else as_int(patch, "patch", 4, min(shape))
+    side = None if patch_size is None else as_int(patch_size, "patch_size", 4, min(shape))
     views = as_views(view)
     settled = [v.settle(shape) for v in views]
     inner = widen(marked, wide)
@@ -158,7 +158,7 @@ def remove(
         "patches": list(made.counts),
         "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
         "margin": wide,
-        "boundary": rim,
+        "boundary_width": rim,
         "screening": screening,
         "light": follow,
         "seed": number,

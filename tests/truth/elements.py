@@ -33,16 +33,16 @@ def design_of_16_bits_that_does_not_repeat() -> Parts:
         wrap=False,
         screening=None,
         elements=ElementOptions(segmentation="grid"),
-        tiles=3,
+        copies=3,
         deformation=DeformationOptions(rotate=30, translate=0.3),
-        patch=14,
+        patch_size=14,
     )
     return parts_of(result, report=DESIGNED)
 
 
 @case
 def design_on_a_lattice() -> Parts:
-    results = texrs.design_variants(colour("net", 96, 96), 2, (112, 128), wrap=(True, False), tiles=2, seed=9)
+    results = texrs.design_variants(colour("net", 96, 96), 2, (112, 128), wrap=(True, False), copies=2, seed=9)
     first, second = (parts_of(each, report=DESIGNED) for each in results)
     return first | {f"second {name}": part for name, part in second.items()}
 
@@ -54,7 +54,7 @@ def design_of_marked_elements() -> Parts:
         beans.image,
         (112, 112),
         elements=ElementOptions(labels=beans.labels),
-        deformation=DeformationOptions(operations=3, scale=(0.7, 1.4), mirror=False, start=0.3, growth_rate=1.9),
+        deformation=DeformationOptions(operations=3, scale=(0.7, 1.4), allow_mirror=False, start=0.3, growth_rate=1.9),
         screening=0.01,
     )
     return parts_of(result, report=DESIGNED)
@@ -66,13 +66,13 @@ def design_mixed_by_a_map_of_weights() -> Parts:
     size = (112, 128)
     ramp = np.linspace(0, 1, size[1]) * np.ones((size[0], 1))
     weights = np.stack([1 - ramp, ramp], axis=-1)
-    result = texrs.design(several, size, weights=weights, wrap=(False, True), tiles=2, seed=5)
+    result = texrs.design(several, size, weights=weights, wrap=(False, True), copies=2, seed=5)
     return parts_of(result, report=DESIGNED, stages=("composite",))
 
 
 @case
 def design_with_things_scattered() -> Parts:
-    result = texrs.design([clear("grit", 80, 80), clear("pebbles", 80, 96)], (112, 128), density=0.2, tiles=1, seed=3)
+    result = texrs.design([clear("grit", 80, 80), clear("pebbles", 80, 96)], (112, 128), density=0.2, copies=1, seed=3)
     return parts_of(result, report=(*DESIGNED, "density"))
 
 
@@ -107,14 +107,16 @@ def splice_separate_elements() -> Parts:
 
 @case
 def splice_a_connected_figure() -> Parts:
-    result = texrs.splice(entry("net", 128, 128), entry("pebbles", 128, 128, seed=1), (112, 128), cells=False, seed=1)
+    result = texrs.splice(
+        entry("net", 128, 128), entry("pebbles", 128, 128, seed=1), (112, 128), use_cells=False, seed=1
+    )
     return moved_parts_of(result, stages=("filled",))
 
 
 @case
 def splice_jointed_elements() -> Parts:
     result = texrs.splice(
-        entry("bricks", 128, 112), entry("dots", 128, 128, seed=1), snap_rows=True, cells=False, seed=1
+        entry("bricks", 128, 112), entry("dots", 128, 128, seed=1), snap_rows=True, use_cells=False, seed=1
     )
     return moved_parts_of(result, stages=("filled",))
 

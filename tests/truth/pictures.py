@@ -168,13 +168,13 @@ def tile_along_columns() -> Parts:
     return parts_of(texrs.tile(channels("grit", 96, 128), wrap=(False, True), overlap=24), report=("overlap", "joints"))
 
 
-COMPLETED = ("filled", "replaced_outside", "patch", "patches")
+COMPLETED = ("filled", "replaced_outside", "patch_size", "patches")
 
 
 @case
 def complete_with_patches() -> Parts:
     hole = box((128, 144), (40, 90), (50, 100)) | box((128, 144), (0, 30), (120, 144))
-    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, boundary=5, screening=0.003, seed=3)
+    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, boundary_width=5, screening=0.003, seed=3)
     return parts_of(result, report=COMPLETED, stages=("known", "patches", "composite"))
 
 
@@ -183,7 +183,8 @@ def complete_what_is_transparent() -> Parts:
     image = clear("weave", 96, 96).copy()
     image[box(image.shape[:2], (70, 96), (20, 60)), 3] = 0
     return parts_of(
-        texrs.complete(image, texrs.Mask("alpha", threshold=1), wrap=True, mirror=False, patch=12), report=COMPLETED
+        texrs.complete(image, texrs.Mask("alpha", threshold=1), wrap=True, allow_mirror=False, patch_size=12),
+        report=COMPLETED,
     )
 
 
@@ -210,7 +211,7 @@ def complete_with_a_scale_map() -> Parts:
 def complete_with_a_source() -> Parts:
     hole = box((96, 112), (20, 70), (30, 80))
     other = floats("pebbles", 80, 96, seed=5)
-    result = texrs.complete(floats("grit", 96, 112), hole, exemplar=other, screening=0.001, boundary=2, seed=1)
+    result = texrs.complete(floats("grit", 96, 112), hole, exemplar=other, screening=0.001, boundary_width=2, seed=1)
     return parts_of(result, report=COMPLETED, stages=("patches", "composite"))
 
 
@@ -219,7 +220,7 @@ def complete_with_a_source() -> Parts:
 
 def designed(name: str, seed: int) -> texrs.Synthesis:
     """Return a texture with turned and mirrored elements, seams and all."""
-    return texrs.design(colour(name, 96, 96, seed=seed), (112, 128), seed=seed, screening=None, tiles=2)
+    return texrs.design(colour(name, 96, 96, seed=seed), (112, 128), seed=seed, screening=None, copies=2)
 
 
 @case

@@ -40,7 +40,7 @@ KEPT = Options(TextureDatabase.add, only=("name", "similarity", "replace"))
 SIMILAR = Options(TextureDatabase.add, only=("similarity",))
 NAMES = Kind("NAME,NAME,...", lambda text, about: [name.strip() for name in text.split(",")])
 MATRIX = Options(TextureDatabase.matrix, only=("rows", "columns", "cell"), kinds={"rows": NAMES, "columns": NAMES})
-SPLICED = Options(splice, leave={"a": "is named", "b": "is named"})
+SPLICED = Options(splice, leave={"elements": "is named", "layout": "is named"})
 ACTIONS: dict[str, tuple[Option, ...]] = {
     "add": (*ANALYSED, *KEPT),
     "list": (),

@@ -30,7 +30,7 @@ CELLS = 256
 TILED = Options(TileSet, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
 DESIGNED = Options(
     design_variants,
-    only=("elements", "deformation", "plan", "tiles", "patch", "screening"),
+    only=("elements", "deformation", "motion", "copies", "patch_size", "screening"),
     names={"elements": "element"},
 )
 PANEL = "Larger than memory"

@@ -128,11 +128,11 @@ def make_verb(name: str) -> Verb:
         case "splice":
             from texrs.papers.splice import splice
 
-            return Verb(Options(splice, arguments={"a": ENTRY, "b": LAYOUT}), says=count_moved)
+            return Verb(Options(splice, arguments={"elements": ENTRY, "layout": LAYOUT}), says=count_moved)
         case "self-splice":
             from texrs.papers.splice import self_splice
 
-            return Verb(Options(self_splice, arguments={"a": ENTRY}), says=count_moved)
+            return Verb(Options(self_splice, arguments={"elements": ENTRY}), says=count_moved)
         case _:
             from texrs.cli._check import tell_tiling
             from texrs.tiling import tile

@@ -190,7 +190,9 @@ METHODS = (
     Method("as it is", "tile", always(lambda a: a.picture)),
     Method("texrs tile", "tile", always(lambda a: tile(a.picture).image)),
     Method("img2texture", "tile", find_module("img2texture", blend_borders), "pip install img2texture"),
-    Method("texrs complete", "hole", always(lambda a: complete(a.picture, a.hole, boundary=4, seed=a.seed).image)),
+    Method(
+        "texrs complete", "hole", always(lambda a: complete(a.picture, a.hole, boundary_width=4, seed=a.seed).image)
+    ),
     Method(
         "texrs complete, optimised",
         "hole",

@@ -58,9 +58,9 @@ def complete(
     exemplar_scale_map: Array | str | None = None,
     scale_kind: Kind | None = None,
     method: Literal["patch", "optimise"] = "patch",
-    patch: int | None = None,
-    boundary: int = 0,
-    mirror: bool | None = None,
+    patch_size: int | None = None,
+    boundary_width: int = 0,
+    allow_mirror: bool | None = None,
     screening: float | None = None,
     wrap: bool | Sequence[bool] | None = None,
     seed: int = 0,
@@ -72,7 +72,8 @@ def complete(
     ----------
     image : (H, W[, C]) or (D, H, W[, C]) array, or Exemplar
         The picture or the volume, any real dtype, at least 4 pixels or 16 voxels a side. Values in the hole are ignored and
-        may be NaN. A volume takes ``patch``, ``boundary``, ``screening`` and ``seed``; the other options are for pictures.
+        may be NaN. A volume takes ``patch_size``, ``boundary_width``, ``screening`` and ``seed``; the other options
+        are for pictures.
     hole : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
         Mask of the pixels to fill, white where it marks. "alpha": all pixels that are not fully opaque. "nan": all pixels
         that are NaN or infinite. "nodata": the value that the file of the image states for pixels without data. A number:
@@ -99,15 +100,15 @@ def complete(
         ``exemplar``, patches of the plane, seen as they are seen in the hole. "optimise", windows corrected until each is
         like one of the picture, or of ``exemplar``, resized where there is a scale map [2]_: for large holes, where patches
         would repeat what is around.
-    patch : int, optional
+    patch_size : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default several are tried, from three
         quarters to four times a sixth of the shorter side (12 to 32), of large holes in a small copy, and those are kept
         whose seams show least; with a scale map a sixth, of a plane up to a quarter. "optimise" has no patches, and
         refuses one. Volumes: at least 6; by default 12 to 32, by the size of the hole.
-    boundary : int
+    boundary_width : int
         Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
         least. 0 leaves all that is known as it is.
-    mirror : bool, optional
+    allow_mirror : bool, optional
         Whether patches may be mirrored; False for lettered textures. By default along those axes where nothing tells the
         picture beside the hole from its mirror image, as light from one side does; not where there is a scale map: what is
         seen at an angle has an upper side.
@@ -173,22 +174,28 @@ def complete(
             "exemplar_scale_map": exemplar_scale_map is not None,
             "scale_kind": scale_kind is not None,
             "method": method != "patch",
-            "mirror": mirror is not None,
+            "allow_mirror": allow_mirror is not None,
             "wrap": wrap is not None,
         }
         for name in (name for name, given in flat.items() if given):
             raise InvalidInput(f"{name}: is for pictures; leave it out for a volume")
         volume: Any = image
         return complete_volume(
-            volume, hole, patch=patch, boundary=boundary, screening=screening, seed=seed, progress=progress
+            volume,
+            hole,
+            patch_size=patch_size,
+            boundary_width=boundary_width,
+            screening=screening,
+            seed=seed,
+            progress=progress,
         )
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
     if scale_kind is not None and scale_map is None:
         raise InvalidInput("scale_kind: says what a scale map holds, and there is none; give one, or leave it out")
     said = None if scale_kind is None else as_kind(scale_kind)
-    if mirror is not None or scale_map is not None:
-        mirror = False if mirror is None else as_bool(mirror, "mirror")
+    if allow_mirror is not None or scale_map is not None:
+        allow_mirror = False if allow_mirror is None else as_bool(allow_mirror, "allow_mirror")
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
     cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), as_marks(hole)
     picture, marked = find_hole(image.image if isinstance(image, Exemplar) else image, mask, cyclic)
@@ -196,10 +203,14 @@ def complete(
     pictures = check_pictures(picture, marked, open_, exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     usable = check_allowed(allowed, open_, exemplar is None and method == "patch")
-    width = as_int(boundary, "boundary", 0, 1024)
-    if patch is not None and method == "optimise":
-        raise InvalidInput("patch: method 'optimise' has no patches; leave it out, or take method='patch'")
-    chosen = None if patch is None else as_int(patch, "patch", LEAST, min(n for shape in shapes for n in shape))
+    width = as_int(boundary_width, "boundary_width", 0, 1024)
+    if patch_size is not None and method == "optimise":
+        raise InvalidInput("patch_size: method 'optimise' has no patches; leave it out, or take method='patch'")
+    chosen = (
+        None
+        if patch_size is None
+        else as_int(patch_size, "patch_size", LEAST, min(n for shape in shapes for n in shape))
+    )
     watch = progress or (lambda stage, share: None)
 
     check_work("complete", pictures, shapes[0], "image", method=method)
@@ -207,7 +218,7 @@ def complete(
     scales, measured = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)
-    mirrors = choose_mirrors(pictures, open_, mirror) if method == "patch" else (NONE,)
+    mirrors = choose_mirrors(pictures, open_, allow_mirror) if method == "patch" else (NONE,)
     across = (cyclic[0], cyclic[1])
     if method == "optimise":
         places, levels = optimise(pictures, open_, scales, wide, wrap=across, seed=seed, progress=progress)
@@ -261,10 +272,10 @@ def complete(
         "measured": None if measured[0] is None else measured[0].as_dict(),
         "exemplar_measured": None if measured[1] is None else measured[1].as_dict(),
         "replaced_outside": int(np.count_nonzero(~open_[new])),
-        "patch": round(made.side, 3),
+        "patch_size": round(made.side, 3),
         "tried": [[s, round(shown, 3)] for s, shown in made.tried],
         "patches": count,
-        "mirror": len(mirrors) > 1,
+        "allow_mirror": len(mirrors) > 1,
         "screening": screening,
         "wrap": list(cyclic),
     }

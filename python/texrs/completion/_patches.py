@@ -215,7 +215,7 @@ def check_places(free: Bools, side: int) -> None:
     if not mark_corners(free, side).any():
         fits = next((s for s in range(side - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
         hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
-        raise InvalidInput(f"patch: {side} has no place in the image that is free of holes; {hint}")
+        raise InvalidInput(f"patch_size: {side} has no place in the image that is free of holes; {hint}")
 
 
 def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:

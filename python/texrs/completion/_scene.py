@@ -65,7 +65,7 @@ class Scene:
             self.colours,
             self.known,
             index,
-            patch=side,
+            patch_size=side,
             keep=self.keep,
             wrap=self.wrap,
             seed=seed,

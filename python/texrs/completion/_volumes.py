@@ -70,8 +70,8 @@ def complete_volume(
     image: Array | Exemplar,
     hole: object,
     *,
-    patch: int | None,
-    boundary: int,
+    patch_size: int | None,
+    boundary_width: int,
     screening: float | None,
     seed: int,
     progress: Progress | None,
@@ -79,9 +79,9 @@ def complete_volume(
     """Fill a hole in a volume; see `texrs.complete`."""
     volume, hole_ = check_volume(image.image if isinstance(image, Exemplar) else image, hole)
     shape, labels = hole_.shape, image._labels if isinstance(image, Exemplar) else None
-    width, number = as_int(boundary, "boundary", 0, 1024), as_seed(seed)
+    width, number = as_int(boundary_width, "boundary_width", 0, 1024), as_seed(seed)
     weight = None if screening is None else as_float(screening, "screening", 0, 1e6)
-    side = None if patch is None else as_int(patch, "patch", 6, min(shape))
+    side = None if patch_size is None else as_int(patch_size, "patch_size", 6, min(shape))
     watch = progress or (lambda stage, share: None)
     watch("complete", 0.0)
     source, count, seams, side = SourceMap.identity(shape), 0, 0.0, side or 0
@@ -121,7 +121,7 @@ def complete_volume(
         "seed": number,
         "filled": float(hole_.mean()),
         "replaced_outside": int(np.count_nonzero(new_ & ~hole_)),
-        "patch": side,
+        "patch_size": side,
         "patches": count,
         "seams": round(seams, 6),
         "labels": labelled,

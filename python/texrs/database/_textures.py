@@ -53,9 +53,9 @@ class SpliceOptions(TypedDict, total=False):
     strength: float
     align: bool
     snap_rows: bool
-    cells: bool | None
-    nets: bool | None
-    turns: bool | None
+    use_cells: bool | None
+    use_nets: bool | None
+    allow_rotation: bool | None
     refine: bool
     screening: float | None
 
@@ -329,8 +329,8 @@ class TextureDatabase:
 
     def splice(
         self,
-        a: str,
-        b: str,
+        elements: str,
+        layout: str,
         size: Sequence[int] | None = None,
         *,
         progress: Progress | bool | None = None,
@@ -340,15 +340,15 @@ class TextureDatabase:
 
         Parameters
         ----------
-        a, b : str
+        elements, layout : str
             Names of the texture whose elements are shown, and of that whose layout they take.
         size : (rows, columns), optional
-            Of the result, in pixels; that of ``a`` by default.
+            Of the result, in pixels; that of ``elements`` by default.
         progress : callable or True, optional
             Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``screening``.
+            ``align``, ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.
 
         Returns
         -------
@@ -372,7 +372,7 @@ class TextureDatabase:
 
         """
         progress = listen(progress)
-        return splice(self.analyse(a), self.analyse(b), size, progress=progress, **options)
+        return splice(self.analyse(elements), self.analyse(layout), size, progress=progress, **options)
 
     def matrix(
         self,
@@ -402,7 +402,7 @@ class TextureDatabase:
             Called as ``progress("matrix", share)``; raising stops the work. True shows a bar.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``screening``.
+            ``align``, ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.
 
         Returns
         -------

@@ -44,7 +44,7 @@ class Completion:
     >>> stripes = np.tile(np.float32([0, 0, 1, 1]), (24, 6))[..., np.newaxis]
     >>> known = np.ones((24, 24), bool)
     >>> known[8:14, 9:16] = False
-    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch=12)
+    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch_size=12)
     >>> filled.label.shape, int(filled.label[0, 0]), bool((filled.label[~known] >= 0).all())
     ((24, 24), -1, True)
 
@@ -61,7 +61,7 @@ def complete(
     known: Bools,
     index: PatchIndex,
     *,
-    patch: int | tuple[int, int],
+    patch_size: int | tuple[int, int],
     keep: Bools | None = None,
     count: int = 5,
     separation: int = 4,
@@ -86,7 +86,7 @@ def complete(
         False at the holes.
     index : PatchIndex
         The exemplars that patches are taken from, of C channels.
-    patch : int or (rows, columns)
+    patch_size : int or (rows, columns)
         Size of a patch in pixels, 1 to that of the picture, of an exemplar and of ``index.max_patch``.
     keep : (H, W) array_like of bool, optional
         Known pixels that no patch may replace; by default seams may run through all of them.
@@ -135,7 +135,7 @@ def complete(
     >>> stripes = np.tile(np.float32([0, 0, 1, 1]), (24, 6))[..., np.newaxis]
     >>> known = np.ones((24, 24), bool)
     >>> known[8:14, 9:16] = False
-    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch=12)
+    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch_size=12)
     >>> bool((filled.colours == stripes).all())
     True
 
@@ -149,8 +149,8 @@ def complete(
     picture[~mask] = 0
     if not np.isfinite(picture).all():
         raise InvalidInput("colours: known pixels must be finite")
-    sides = as_size(patch, "patch")
-    rows, columns = (as_int(s, "patch", 1, n) for s, n in zip(sides, picture.shape[:2], strict=True))
+    sides = as_size(patch_size, "patch_size")
+    rows, columns = (as_int(s, "patch_size", 1, n) for s, n in zip(sides, picture.shape[:2], strict=True))
     pick = (
         as_int(count, "count", 1, 1000),
         as_int(separation, "separation", 0, 2**31),

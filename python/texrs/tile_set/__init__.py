@@ -77,7 +77,7 @@ class TileSet(InParts):
     progress : callable or True, optional
         Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
     **options
-        Those of `texrs.design_variants`, such as ``plan`` or ``deformation``.
+        Those of `texrs.design_variants`, such as ``motion`` or ``deformation``.
 
     Raises
     ------

@@ -86,7 +86,8 @@ class TextureAugment:
     """Lay a picture anew from pieces of itself, joined along minimum cuts; labels and boxes follow.
 
     For pictures of textures: surfaces, materials, tissue, fields, defects on them. What is far apart in a picture comes to lie
-    side by side, seams avoid what would show them, and things stay whole where they can (`texrs.design` with ``plan="still"``).
+    side by side, seams avoid what would show them, and things stay whole where they can (`texrs.design` with
+    ``motion="keep"``).
     No pixel is made up, and none is interpolated.
 
     Each call without a seed gives another sample. The operating system draws its seed, so forked workers also differ. The same
@@ -167,7 +168,7 @@ class TextureAugment:
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
             raise InvalidInput(f"mask: needs the size of the image, {known.shape}, got {labels.shape[:2]}")
         things = known.remember("things of an augmented picture", lambda: find_things(known))
-        source = design(known, known.shape, seed=number, wrap=False, plan="still", elements=things).source
+        source = design(known, known.shape, seed=number, wrap=False, motion="keep", elements=things).source
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")
         kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.visible)

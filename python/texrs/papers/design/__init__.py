@@ -86,9 +86,9 @@ def design(
     density: Density = None,
     elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
-    plan: Choice = "auto",
-    tiles: int = 4,
-    patch: int | None = None,
+    motion: Choice = "auto",
+    copies: int = 4,
+    patch_size: int | None = None,
     screening: float | None = SCREENING,
     method: Method = None,
     progress: Progress | bool | None = None,
@@ -117,14 +117,14 @@ def design(
         How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
         How elements are deformed.
-    plan : {"auto", "move", "still"}
-        What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
+    motion : {"auto", "move", "keep"}
+        What is done with elements. "move": they are deformed, as the paper has it. "keep": they stay as they are, and
         patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
         judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move. What lies in
         courses is laid course by course unless they move.
-    tiles : int
+    copies : int
         Deformed copies of the exemplar that the result is stitched from, 1 to 64.
-    patch : int, optional
+    patch_size : int, optional
         Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
         default.
     screening : float, optional
@@ -180,9 +180,9 @@ def design(
     >>> result.source.render(heights).shape
     (128, 160)
     >>> stones = texrs.elements.Elements.of_sample(texrs.samples.pebbles((96, 96)))
-    >>> texrs.design(stones, 96, tiles=1, plan="move").report["segmentation"]
+    >>> texrs.design(stones, 96, copies=1, motion="move").report["segmentation"]
     'labels'
-    >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, mirror=False))
+    >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, allow_mirror=False))
 
     """
     progress = listen(progress)
@@ -196,9 +196,9 @@ def design(
         density=density,
         elements=elements,
         deformation=deformation,
-        plan=plan,
-        tiles=tiles,
-        patch=patch,
+        motion=motion,
+        copies=copies,
+        patch_size=patch_size,
         screening=screening,
         method=method,
         progress=progress,
@@ -218,9 +218,9 @@ def design_variants(
     density: Density = None,
     elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
-    plan: Choice = "auto",
-    tiles: int = 4,
-    patch: int | None = None,
+    motion: Choice = "auto",
+    copies: int = 4,
+    patch_size: int | None = None,
     screening: float | None = SCREENING,
     method: Method = None,
     progress: Progress | bool | None = None,
@@ -254,14 +254,14 @@ def design_variants(
         How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
         How elements are deformed.
-    plan : {"auto", "move", "still"}
-        What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
+    motion : {"auto", "move", "keep"}
+        What is done with elements. "move": they are deformed, as the paper has it. "keep": they stay as they are, and
         patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
         judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move. What lies in
         courses is laid course by course unless they move.
-    tiles : int
+    copies : int
         Deformed copies of the exemplar that each texture is stitched from, 1 to 64.
-    patch : int, optional
+    patch_size : int, optional
         Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
         default.
     screening : float, optional
@@ -293,8 +293,8 @@ def design_variants(
     --------
     >>> import texrs
     >>> dots = texrs.samples.dots((64, 64)).image
-    >>> made = [result.image for result in texrs.design_variants(dots, 2, 64, seed=7, tiles=1)]
-    >>> bool((made[1] == texrs.design(dots, 64, seed=8, tiles=1).image).all())
+    >>> made = [result.image for result in texrs.design_variants(dots, 2, 64, seed=7, copies=1)]
+    >>> bool((made[1] == texrs.design(dots, 64, seed=8, copies=1).image).all())
     True
 
     """
@@ -309,9 +309,9 @@ def design_variants(
         density=density,
         elements=elements,
         deformation=deformation,
-        plan=plan,
-        tiles=tiles,
-        patch=patch,
+        motion=motion,
+        copies=copies,
+        patch_size=patch_size,
         screening=screening,
         method=method,
         progress=progress,

@@ -36,7 +36,7 @@ Size: TypeAlias = int | Sequence[int] | None
 Weights: TypeAlias = Sequence[float] | Array | None
 Density: TypeAlias = float | Sequence[float] | Array | None
 Method: TypeAlias = Literal["paper"] | None
-Choice: TypeAlias = Literal["auto", "move", "still"]
+Choice: TypeAlias = Literal["auto", "move", "keep"]
 
 MINIMUM_SIDE = 16
 """An exemplar with a shorter side holds no texture to speak of."""
@@ -60,8 +60,8 @@ class Arguments:
     """Share of the area on which things of each exemplar but the first are seen: (n - 1,), or (rows, columns, n - 1)."""
     elements: ElementOptions
     deformation: DeformationOptions
-    plan: Choice
-    tiles: int
+    motion: Choice
+    copies: int
     side: int | None
     """Of the patches that fill holes."""
     screening: float
@@ -91,9 +91,9 @@ def check_arguments(
     density: Density,
     elements: ElementOptions | Elements,
     deformation: DeformationOptions,
-    plan: Choice,
-    tiles: int,
-    patch: int | None,
+    motion: Choice,
+    copies: int,
+    patch_size: int | None,
     screening: float | None,
     method: Method,
     progress: Progress | None,
@@ -114,7 +114,7 @@ def check_arguments(
     if density is not None and (weights is not None or method is not None):
         other = "weights" if weights is not None else "method"
         raise InvalidInput(f"density: scatters things over the first exemplar, and is not for use with {other}")
-    as_choice(plan, "plan", ("auto", "move", "still"))
+    as_choice(motion, "motion", ("auto", "move", "keep"))
     arguments = Arguments(
         exemplars,
         scale_together(exemplars),
@@ -125,9 +125,9 @@ def check_arguments(
         None if density is None else as_density(density, len(exemplars), (rows, columns)),
         chosen,
         deformation,
-        plan,
-        as_int(tiles, "tiles", 1, 64),
-        None if patch is None else as_int(patch, "patch", 4, min(min(e.shape) for e in exemplars)),
+        motion,
+        as_int(copies, "copies", 1, 64),
+        None if patch_size is None else as_int(patch_size, "patch_size", 4, min(min(e.shape) for e in exemplars)),
         as_float(0.0 if screening is None else screening, "screening", 0, 1e6),
         method == "paper",
         progress or (lambda stage, share: None),

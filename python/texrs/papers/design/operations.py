@@ -149,7 +149,7 @@ class Moves:
         options = self.options
         allowed = {
             "R": self.rotate > 0,
-            "M": options.mirror is not False and any(self.axes),
+            "M": options.allow_mirror is not False and any(self.axes),
             "S": options.scale != (1.0, 1.0),
         }
         return [kind for kind, may in allowed.items() if may]

@@ -31,7 +31,7 @@ class DeformationOptions:
         where the example has directions of its own (bark, brickwork), no separate elements, or a lattice.
     scale : (float, float)
         Least and largest scaling, within 0.5 to 2.
-    mirror : bool, optional
+    allow_mirror : bool, optional
         Whether elements, backgrounds and patches may be mirrored; False for lettered textures, True for both axes whatever
         they show. By default along those axes where nothing tells the example from its mirror image, as light from one side
         or a slant does; along none where ``rotate=0`` is given, which says that the example has an upper side.
@@ -54,7 +54,7 @@ class DeformationOptions:
 
     Examples
     --------
-    >>> DeformationOptions(rotate=20, mirror=False).rotate
+    >>> DeformationOptions(rotate=20, allow_mirror=False).rotate
     20.0
 
     """
@@ -63,7 +63,7 @@ class DeformationOptions:
     translate: float = 0.12
     rotate: float | None = None
     scale: tuple[float, float] = (0.8, 1.2)
-    mirror: bool | None = None
+    allow_mirror: bool | None = None
     start: float | None = None
     growth_rate: float = 2.0
     u: int = 10
@@ -81,7 +81,7 @@ class DeformationOptions:
             "translate": as_float(self.translate, "translate", 0, 0.5),
             "rotate": None if self.rotate is None else as_float(self.rotate, "rotate", 0, 180),
             "scale": (low, high),
-            "mirror": None if self.mirror is None else as_bool(self.mirror, "mirror"),
+            "allow_mirror": None if self.allow_mirror is None else as_bool(self.allow_mirror, "allow_mirror"),
             "growth_rate": as_float(self.growth_rate, "growth_rate", 0, 2),
             "u": as_int(self.u, "u", 1, 256),
             "v": as_int(self.v, "v", 1, 4),

@@ -70,7 +70,7 @@ def make_plan(
 
     """
     if literal:
-        parts, options = replace(parts, kind="none", lattice=None, courses=None), replace(options, mirror=False)
+        parts, options = replace(parts, kind="none", lattice=None, courses=None), replace(options, allow_mirror=False)
     guide, extent = exemplar.guidance, side or choose_usual_side(min(exemplar.shape))
     mirrors = settle_mirrors(exemplar, options)
     moves = settle_moves(exemplar, parts, options, mirrors)
@@ -81,10 +81,10 @@ def make_plan(
 
 def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Flip, ...]:
     """Return the mirror images that may be used: those asked for, else those that nothing tells from the exemplar."""
-    if options.mirror is None:
+    if options.allow_mirror is None:
         # Who forbids turning knows of an upper side, light or letters, that the statistics may not show.
         return (NONE,) if options.rotate == 0 else exemplar.mirrors
-    return ALL if options.mirror else (NONE,)
+    return ALL if options.allow_mirror else (NONE,)
 
 
 def settle_moves(
@@ -94,11 +94,11 @@ def settle_moves(
     axes = ((True, False) in mirrors, (False, True) in mirrors)
     if parts.lattice:
         shifts = parts.lattice.shifts(options.translate * min(exemplar.shape)) if options.translate else []
-        return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), mirror=False), tuple(shifts), axes)
+        return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), allow_mirror=False), tuple(shifts), axes)
     if parts.kind == "grid":
         # Cells are no elements: turned or scaled they would show their outline, and mirrored they would meet the mirror
         # image of what they show.
-        return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), mirror=False), (), axes)
+        return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), allow_mirror=False), (), axes)
     if options.rotate is None:
         options = replace(options, rotate=ROTATE if exemplar.directedness < DIRECTED else 0.0)
     return Moves(options, (), axes)

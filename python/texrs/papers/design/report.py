@@ -60,7 +60,7 @@ def describe(
         "segmentation": first.parts.kind,
         "reason": first.parts.reason,
         "arrangement": ["courses" if p.still and p.parts.courses else classify(p.parts) for p in plans],
-        "plan": ["still" if p.still else "move" for p in plans],
+        "motion": ["keep" if p.still else "move" for p in plans],
         "tried": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "courses": [describe_courses(p) for p in plans],
         "stretched": [describe_closing(p, arguments) for p in plans],

@@ -111,7 +111,7 @@ def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list
         level.shape,
         arguments.size[axis],
         min(level.shape),
-        count=arguments.tiles,
+        count=arguments.copies,
         wrap=arguments.wrap[axis],
         mirror=(axis == 1, axis == 0) in plan.mirrors,
         seed=seed,

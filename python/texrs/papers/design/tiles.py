@@ -54,7 +54,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
             draft.colours,
             draft.covered,
             plan.index,
-            patch=plan.side,
+            patch_size=plan.side,
             keep=None if plan.literal else mark_elements(draft, plan),
             seed=seed,
             count=1 if plan.literal else CANDIDATES,

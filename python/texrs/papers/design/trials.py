@@ -38,7 +38,7 @@ TRIAL = 0
 def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tuple[list[Tile], SourceMap]:
     """Deform the elements of each tile, fill its holes, and stitch the tiles: steps 2 to 5; say how it is finished."""
     tiles = []
-    count = arguments.tiles * len(plans)
+    count = arguments.copies * len(plans)
     for number in range(count):
         arguments.watch("deform and complete", number / count)
         tile, which = divmod(number, len(plans))
@@ -69,12 +69,12 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
 
     """
     still = replace(plan, still=True)
-    if plan.parts.courses and arguments.plan != "move":
+    if plan.parts.courses and arguments.motion != "move":
         return still
-    if plan.literal or arguments.plan != "auto" or arguments.deformation != DeformationOptions():
-        return still if arguments.plan == "still" and not plan.literal else plan
-    ways = {"move": plan, "still": still}
-    key = ("design trials", elements.key, arguments.side, min(TILES, arguments.tiles), arguments.screening)
+    if plan.literal or arguments.motion != "auto" or arguments.deformation != DeformationOptions():
+        return still if arguments.motion == "keep" and not plan.literal else plan
+    ways = {"move": plan, "keep": still}
+    key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
     made: dict[str, list[Tile]] = {}
 
     def judge_each() -> Mapping[str, Mapping[str, float]]:
@@ -84,7 +84,7 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
         return figures
 
     tried = exemplar.remember(key, judge_each)
-    best = "still" if tried["still"]["score"] < CLEARLY * tried["move"]["score"] else "move"
+    best = "keep" if tried["keep"]["score"] < CLEARLY * tried["move"]["score"] else "move"
     return replace(ways[best], tried=tried, tiles=made.get(best, ()))
 
 
@@ -101,7 +101,7 @@ def try_plan(
         wrap=(True, True),
         shares=np.ones(1),
         density=None,
-        tiles=min(TILES, arguments.tiles),
+        copies=min(TILES, arguments.copies),
         watch=lambda stage, share: arguments.watch("try", 0.5 * plan.still),
     )
     tiles, composite = make_composite([plan], small, TRIAL)

@@ -84,7 +84,7 @@ def solid(
     seed: int = 0,
     wrap: bool | Sequence[bool] | None = None,
     quality: Quality = "preserve",
-    bend: bool | None = None,
+    bend_patches: bool | None = None,
     method: Method = None,
     constraints: Constraints | None = None,
     guide: Guide | None = None,
@@ -112,7 +112,7 @@ def solid(
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
-    bend : bool, optional
+    bend_patches : bool, optional
         Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
         elements do; None goes by whether the exemplar has separate elements.
     method : {None, "paper", "paper-compensated"}
@@ -182,7 +182,7 @@ def solid(
         seed=seed,
         wrap=wrap,
         quality=quality,
-        bend=bend,
+        bend_patches=bend_patches,
         method=method,
         constraints=constraints,
         guide=guide,
@@ -202,8 +202,8 @@ def synthesize(
     seed: int = 0,
     wrap: bool | Sequence[bool] | None = None,
     quality: Quality = "preserve",
-    bend: bool | None = None,
-    plan: Choice = "usual",
+    bend_patches: bool | None = None,
+    patches: Choice = "default",
     method: Method = None,
     constraints: Constraints | None = None,
     guide: Guide | None = None,
@@ -230,13 +230,13 @@ def synthesize(
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
-    bend : bool, optional
+    bend_patches : bool, optional
         Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
         elements do; None goes by whether the exemplar has separate elements.
-    plan : {"usual", "large", "plain", "plain-large", "auto"}
-        How patches are put together. "large": a quarter larger than usual, which tears fewer things and copies more in one
-        piece. "plain": seams may run through elements. "auto": each is tried twice at the exemplar's size and judged
-        (`texrs.judging`), and what is clearly better than the usual is taken; the report's "tried" says how each was judged.
+    patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
+        How patches are put together. "large": a quarter larger than the default, which tears fewer things and copies more in
+        one piece. "unmasked": seams may run through elements. "auto": each is tried twice at the exemplar's size and judged
+        (`texrs.judging`), and what is clearly better than the default is taken; the report's "tried" says how each was judged.
     method : {None, "paper", "paper-compensated"}
         Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of
         Lefebvre and Hoppe, which the paper leaves out. They have no ``quality``, take no constraints
@@ -299,8 +299,8 @@ def synthesize(
         seed=seed,
         wrap=wrap,
         quality=quality,
-        bend=bend,
-        plan=plan,
+        bend_patches=bend_patches,
+        patches=patches,
         method=method,
         constraints=constraints,
         guide=guide,
@@ -312,7 +312,7 @@ def synthesize(
 
 def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
     """Grow the source map, coarse to fine or from patches, and look the exemplar up through it."""
-    said: dict[str, Any] = {"plan": None, "tried": None}
+    said: dict[str, Any] = {"patches": None, "tried": None}
     show = partial(show_places, asked.exemplar.pixels)
     if asked.method is not None:
         grown = grow_as_printed(
@@ -339,11 +339,11 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
 
 def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown, dict[str, Any]]:
     """Put patches together along minimum cuts, at full resolution: nothing has to be corrected. Say by which plan."""
-    name, tried = choose_plan(asked.exemplar, asked.plan, asked.quality, partial(try_plan, asked, progress))
-    start = PLANS[name].start(asked.exemplar, asked.seed, asked.quality, asked.bend)
+    name, tried = choose_plan(asked.exemplar, asked.patches, asked.quality, partial(try_plan, asked, progress))
+    start = PLANS[name].start(asked.exemplar, asked.seed, asked.quality, asked.bend_patches)
     frames = partial(to_fixed, asked.field)
     grown = grow(asked.region, 1, start, keep, frames, ask=asked.conditions.at, show=show, progress=progress)
-    return grown, {"plan": name, "tried": tried}
+    return grown, {"patches": name, "tried": tried}
 
 
 def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:

@@ -22,7 +22,7 @@ from texrs.source_map import SourceMap
 
 __all__ = ["PLANS", "Choice", "Plan", "check_plan", "choose_plan"]
 
-Choice: TypeAlias = Literal["usual", "large", "plain", "plain-large", "auto"]
+Choice: TypeAlias = Literal["auto", "default", "large", "unmasked", "unmasked-large"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,10 @@ class Plan:
 LARGE = 1.25
 """Half as large again, patches copy more than a fifth of what they make in one piece."""
 PLANS: Mapping[str, Plan] = {
-    "usual": Plan(),
+    "default": Plan(),
     "large": Plan(LARGE),
-    "plain": Plan(plain=True),
-    "plain-large": Plan(LARGE, plain=True),
+    "unmasked": Plan(plain=True),
+    "unmasked-large": Plan(LARGE, plain=True),
 }
 TRIALS = (0, 1)
 """Seeds of the textures by which a plan is judged: one alone says more of the draw than of the plan."""
@@ -61,17 +61,17 @@ CLEARLY = 0.85
 """Share of the usual plan's score below which another one is taken."""
 
 
-def check_plan(plan: object, method: object, quality: Quality) -> Choice:
+def check_plan(patches: object, method: object, quality: Quality) -> Choice:
     """Check the name of a plan, and that there are patches."""
-    name: Choice = as_choice(plan, "plan", (*PLANS, "auto"))  # type: ignore[assignment]
-    if name != "usual" and (method is not None or quality == "fast"):
+    name: Choice = as_choice(patches, "patches", (*PLANS, "auto"))  # type: ignore[assignment]
+    if name != "default" and (method is not None or quality == "fast"):
         what = f"method={method!r}" if method is not None else "quality='fast'"
-        raise InvalidInput(f"plan: {what} puts no patches together; leave out plan, or {what.partition('=')[0]}")
+        raise InvalidInput(f"patches: {what} puts no patches together; leave out patches, or {what.partition('=')[0]}")
     return name
 
 
 def choose_plan(
-    exemplar: Exemplar, plan: Choice, quality: Quality, make: Callable[[Plan, int], SourceMap]
+    exemplar: Exemplar, patches: Choice, quality: Quality, make: Callable[[Plan, int], SourceMap]
 ) -> tuple[str, Mapping[str, Mapping[str, float]] | None]:
     """Return the name of the plan, as was said or as is judged the best, and how each was judged that was tried.
 
@@ -79,7 +79,7 @@ def choose_plan(
     ----------
     exemplar : Exemplar
         The example.
-    plan : {"usual", "large", "plain", "plain-large", "auto"}
+    patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         What was said.
     quality : {"preserve", "optimise"}
         How many places are tried for a patch.
@@ -89,8 +89,8 @@ def choose_plan(
 
     """
     # Classes without an order have no colours to judge by.
-    if plan != "auto" or exemplar.labels:
-        return ("usual" if plan == "auto" else plan), None
+    if patches != "auto" or exemplar.labels:
+        return ("default" if patches == "auto" else patches), None
     stitcher = exemplar.stitcher
     names = [name for name in PLANS if stitcher.separate or stitcher.guessed or not PLANS[name].plain]
     tried = exemplar.remember(
@@ -98,7 +98,7 @@ def choose_plan(
         lambda: {name: average([judge(exemplar, make(PLANS[name], seed)) for seed in TRIALS]) for name in names},
     )
     best = min(names, key=lambda name: tried[name]["score"])
-    return (best if tried[best]["score"] < CLEARLY * tried["usual"]["score"] else "usual"), tried
+    return (best if tried[best]["score"] < CLEARLY * tried["default"]["score"] else "default"), tried
 
 
 def average(judgements: Sequence[Judgement]) -> Mapping[str, float]:

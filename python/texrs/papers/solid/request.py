@@ -44,9 +44,9 @@ class Request:
         Chooses the texture.
     quality : {"preserve", "fast", "optimise"}
         How much work is done.
-    bend : bool, optional
+    bend_patches : bool, optional
         Whether patches bend with the field; none leaves it to the exemplar.
-    plan : {"usual", "large", "plain", "plain-large", "auto"}
+    patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         How patches are put together.
     method : {None, "paper", "paper-compensated"}
         Which algorithm.
@@ -64,8 +64,8 @@ class Request:
     field: Field | None
     seed: int
     quality: Quality
-    bend: bool | None
-    plan: Choice
+    bend_patches: bool | None
+    patches: Choice
     method: Method
     conditions: Conditions
     interpolation: Interpolation
@@ -82,13 +82,13 @@ class Request:
         seed: int,
         wrap: bool | Sequence[bool] | None,
         quality: Quality,
-        bend: bool | None,
+        bend_patches: bool | None,
         method: Method,
         constraints: Constraints | None,
         guide: Guide | None,
         interpolation: Interpolation | None,
         memory_limit: int | None,
-        plan: Choice = "usual",
+        patches: Choice = "default",
         spacing: Sequence[float] | None = None,
     ) -> Request:
         """Return the request of a caller, or raise what is wrong with it."""
@@ -98,9 +98,9 @@ class Request:
         if method is not None and (constraints is not None or guide is not None):
             what = "constraints" if constraints is not None else "guide"
             raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method={method!r}")
-        if bend is not None and not isinstance(bend, bool):
-            raise InvalidInput(f"bend: needs True, False or None, got {bend!r}")
-        chosen = check_plan(plan, method, as_quality(quality))
+        if bend_patches is not None and not isinstance(bend_patches, bool):
+            raise InvalidInput(f"bend_patches: needs True, False or None, got {bend_patches!r}")
+        chosen = check_plan(patches, method, as_quality(quality))
         how = as_interpolation(interpolation, known, "cubic" if method is None else "nearest")
         turned = as_field(field, axes, region.shape, spacing)
         if turned is not None:
@@ -109,7 +109,17 @@ class Request:
         conditions = Conditions.of(known.pixels, region.shape, constraints, guide)
         steps = None if spacing is None else as_distances(spacing, axes)
         return cls(
-            known, region, turned, as_seed(seed), as_quality(quality), bend, chosen, method, conditions, how, steps
+            known,
+            region,
+            turned,
+            as_seed(seed),
+            as_quality(quality),
+            bend_patches,
+            chosen,
+            method,
+            conditions,
+            how,
+            steps,
         )
 
 

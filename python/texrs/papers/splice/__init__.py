@@ -25,7 +25,7 @@ Departures, with their reasons:
 - Distances are squared in Eq. 4: the best matching then has no crossings.
 - Connected textures whose cells are found are put together from these, each in a cell of B's layout (`cells`): bending a
   figure goes half of the way. Those without, as chainmail, are put together from their knots and what hangs on these (`nets`).
-  What follows of connected figures is for those that show too few knots, for `cells=False` and for `nets=False`.
+  What follows of connected figures is for those that show too few knots, for `use_cells=False` and for `use_nets=False`.
 - Disjoint elements move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
   hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its elements, and
   so smooth that it is solved for at every other pixel.
@@ -92,19 +92,17 @@ from texrs.synthesis import Synthesis
 __all__ = ["self_splice", "splice"]
 
 Method: TypeAlias = Literal["paper", "preview"] | None
-NO_NET = "a has fewer than six knots, or they lie closer than 8 pixels; take a larger picture, or another box"
-NO_CELLS = (
-    "none were found in a that are sure enough; give texrs.elements.analyse a box around one, or a mask of the joints"
-)
+NO_NET = "elements has fewer than six knots, or they lie closer than 8 pixels; take a larger picture, or another box"
+NO_CELLS = "none were found that are sure enough; give texrs.elements.analyse a box around one, or a mask of the joints"
 SCREENING = 0.01
 """Weight of the values when colours are corrected, by default: light that changes slowly is evened out."""
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
-@takes_materials("a", beside=("b",), analysed=True)
+@takes_materials("elements", beside=("layout",), analysed=True)
 def splice(
-    a: Elements | Material | Array,
-    b: Elements | Material | Array,
+    elements: Elements | Material | Array,
+    layout: Elements | Material | Array,
     size: int | Sequence[int] | None = None,
     *,
     seed: int = 0,
@@ -113,9 +111,9 @@ def splice(
     layout_scale: float | None = None,
     align: bool | None = None,
     snap_rows: bool = False,
-    cells: bool | None = None,
-    nets: bool | None = None,
-    turns: bool | None = None,
+    use_cells: bool | None = None,
+    use_nets: bool | None = None,
+    allow_rotation: bool | None = None,
     refine: bool = True,
     screening: float | None = SCREENING,
     progress: Progress | bool | None = None,
@@ -124,12 +122,12 @@ def splice(
 
     Parameters
     ----------
-    a : Elements, or (H, W) or (H, W, C) array
+    elements : Elements, or (H, W) or (H, W, C) array
         The texture whose elements are shown; a picture is analysed by `texrs.elements.analyse`.
-    b : Elements, or array
+    layout : Elements, or array
         The texture whose layout they take, or a layout that was drawn (`texrs.layouts`).
     size : int or (rows, columns), optional
-        Size of the result, in pixels; that of ``a`` by default.
+        Size of the result, in pixels; that of ``elements`` by default.
     seed : int
         Chooses what fills holes, and the noise of the refinement.
     method : {None, "paper", "preview"}
@@ -141,20 +139,21 @@ def splice(
     layout_scale : float, optional
         What the layout is enlarged by, 0.01 to 100: its pixels are those of the result at 1, the middle of the one on that of
         the other. Twice as large, separate elements lie half as dense along each axis; where too dense they are pushed
-        apart. By default it is brought to the spacing, or the size, of the elements of ``a``.
+        apart. By default it is brought to the spacing, or the size, of the elements of ``elements``.
     align : bool, optional
-        Whether to turn the layout so that lines of its points agree with those of ``a``; by default where no ``layout_scale``
-        is given. Cells and nets take it as it lies.
+        Whether to turn the layout so that lines of its points agree with those of ``elements``; by default where no
+        ``layout_scale`` is given. Cells and nets take it as it lies.
     snap_rows : bool
         Whether to bring targets of about one row to one row: for walls that are bent, whose long joints then stay straight.
-    cells : bool, optional
+    use_cells : bool, optional
         Whether a connected texture is put together from its cells; False bends its figure. By default where cells are found.
-    nets : bool, optional
+    use_nets : bool, optional
         Whether a connected texture is put together from its knots and the lines that hang on them; False bends its figure.
-        By default where no cells are found, unless ``cells`` is given, and there are six knots or more in a layout that is
+        By default where no cells are found, unless ``use_cells`` is given, and there are six knots or more in a layout that is
         sure enough. True goes before cells.
-    turns : bool, optional
-        Whether cells may be turned; by default where nothing tells ``a`` from itself upside down, as light and letters do.
+    allow_rotation : bool, optional
+        Whether cells may be turned; by default where nothing tells ``elements`` from itself upside down, as light and
+        letters do.
     refine : bool
         Whether to refine what is not rigid; by cells, what is stretched. Nets, and ground between separate elements, need none.
     screening : float, optional
@@ -169,7 +168,7 @@ def splice(
     Returns
     -------
     Synthesis
-        The picture; a source map of whole pixels of ``a``, whose label is the target (counted from 1, as in the report)
+        The picture; a source map of whole pixels of ``elements``, whose label is the target (counted from 1, as in the report)
         that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report, whose
         "matches" say of each element where it was wanted, where it is, and how much of its way was realised. By cells
         (``report["method"]`` is "cells") the map lies between pixels, and each has its target; by knots ("nets") each has
@@ -202,28 +201,30 @@ def splice(
     enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
     turned = enlarged is None if align is None else as_bool(align, "align")
     if enlarged is not None and method == "paper":
-        raise InvalidInput('layout_scale: method="paper" brings the layout to the spacing of a')
-    given = {"cells": cells, "nets": nets, "turns": turns}
+        raise InvalidInput('layout_scale: method="paper" brings the layout to the spacing of the elements')
+    given = {"use_cells": use_cells, "use_nets": use_nets, "allow_rotation": allow_rotation}
     wanted, net, may_turn = (None if v is None else as_bool(v, n) for n, v in given.items())
     for name, either in (("refine", refine), ("snap_rows", snap_rows)):
         if either is not None:
             as_bool(either, name)
-    for name, asked in (("cells", wanted), ("nets", net)):
+    for name, asked in (("use_cells", wanted), ("use_nets", net)):
         if asked and method is not None:
             raise InvalidInput(f'{name}: method="{method}" bends figures')
     if wanted and net:
         raise InvalidInput(
-            "nets: a texture is put together either from its cells or from its knots; give one of the two"
+            "use_nets: a texture is put together either from its cells or from its knots; give one of the two"
         )
     watch, shape = progress or (lambda stage, share: None), None if size is None else as_size(size, minimum=16)
-    mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
+    mine, theirs = as_elements(elements, "elements", watch), as_elements(layout, "layout", watch)
     rows, columns = shape or as_size(mine.mask.shape, minimum=16)
     check_work("splice", [mine.image, theirs.image], (rows, columns))
     if net and not has_knots(mine):
-        raise InvalidInput(f"nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
+        raise InvalidInput(f"use_nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
     found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
     if wanted and found is None:
-        raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
+        raise InvalidInput(
+            f"use_cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}"
+        )
     if found is not None:
         return splice_cells(
             mine,
@@ -271,9 +272,9 @@ def splice(
     )
 
 
-@takes_materials("a", analysed=True)
+@takes_materials("elements", analysed=True)
 def self_splice(
-    a: Elements | Material | Array,
+    elements: Elements | Material | Array,
     edit: Edit | None = None,
     size: int | Sequence[int] | None = None,
     *,
@@ -287,7 +288,7 @@ def self_splice(
 
     Parameters
     ----------
-    a : Elements, or (H, W) or (H, W, C) array
+    elements : Elements, or (H, W) or (H, W, C) array
         The texture; a picture is analysed by `texrs.elements.analyse`.
     edit : str, mapping, or sequence of mappings, optional
         What is done, step by step: scale, shift, rows, randomise, regularise, move, remove or points. In plain JSON
@@ -299,8 +300,8 @@ def self_splice(
         ``{"op": "points", "points": [[row, column], ...]}``. A name alone is a step with its
         defaults; no step, the default, leaves the layout as it is. The report's "edit" replays.
     size : int or (rows, columns), optional
-        Size of the result, in pixels, sides of at least 16; that of ``a`` by default. In a larger one the texture's own layout
-        goes on, as in a splice with itself, before the steps are done; a smaller one is the middle of the texture. Steps
+        Size of the result, in pixels, sides of at least 16; that of ``elements`` by default. In a larger one the texture's own
+        layout goes on, as in a splice with itself, before the steps are done; a smaller one is the middle of the texture. Steps
         then count the elements as the report's "elements" lists them, whose places they have before the steps.
     seed : int
         Chooses random steps, the elements that come in over a border, what fills holes, and the noise of the refinement.
@@ -320,7 +321,7 @@ def self_splice(
     Returns
     -------
     Synthesis
-        The picture; a source map of whole pixels of ``a``, whose label is the target (counted from 1, as in the report)
+        The picture; a source map of whole pixels of ``elements``, whose label is the target (counted from 1, as in the report)
         that a rigid pixel belongs to, or 0; pictures of the stages; and a report. Where nothing is moved the picture is the
         texture, exactly; of separate elements, all that does not move is.
 
@@ -352,8 +353,8 @@ def self_splice(
     asked, number = None if size is None else as_size(size, minimum=16), as_seed(seed)
     steps, screening = as_steps(() if edit is None else edit, number), _as_screening(screening)
     watch = progress or (lambda stage, share: None)
-    mine = as_elements(a, "a", watch)
-    check_work("self_splice", [mine.image], asked or mine.mask.shape, "a" if asked is None else "size")
+    mine = as_elements(elements, "elements", watch)
+    check_work("self_splice", [mine.image], asked or mine.mask.shape, "elements" if asked is None else "size")
     if asked is not None and asked != mine.mask.shape:
         rest: dict[str, Any] = {
             "seed": number,

@@ -55,7 +55,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
 
     """
     if not len(pins):
-        raise InvalidInput("a: has no element in the picture to move")
+        raise InvalidInput("elements: has no element in the picture to move")
     whole, step = rigid.shape, choose_coarseness(rigid.shape)
     if step > 1:
         rigid, pins = _downsample_mask(rigid, step), pins // step

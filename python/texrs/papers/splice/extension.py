@@ -225,7 +225,7 @@ def _stamp(
     if inside is not None:
         stray &= ~inside
     if not kept:
-        raise InvalidInput("a: the border cuts every element; splicing needs some that are whole")
+        raise InvalidInput("elements: the border cuts every element; splicing needs some that are whole")
     chosen = np.array(kept)
     pieces, count = label(stray)
     where = np.nonzero(pieces)

@@ -57,7 +57,7 @@ def match_literally(a: Elements, b: Elements, size: tuple[int, int], *, align: b
 def _measure_mean_distance(points: Points) -> float:
     count = min(NEIGHBOURS, len(points) - 1)
     if count < 1:
-        raise InvalidInput("a: has too few elements for a layout")
+        raise InvalidInput("elements: has too few elements for a layout")
     return float(nearest_distances(points, count).mean())
 
 

@@ -140,12 +140,12 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
         for angle in turns
     ]
     if not all(len(wanted) for wanted in asked):
-        raise InvalidInput("b: its layout has no point within the output")
+        raise InvalidInput("layout: its layout has no point within the output")
     most = max(len(wanted) for wanted in asked)
     extension = _extend_until(a, size, unit, SPARE * most)
     if len(extension.points) < most:
         raise InvalidInput(
-            f"a: {len(extension.points)} of its elements lie within reach, {most} are needed; "
+            f"elements: {len(extension.points)} of its elements lie within reach, {most} are needed; "
             "take a smaller size or a larger picture"
         )
     best: Match | None = None

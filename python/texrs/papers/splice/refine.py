@@ -140,7 +140,7 @@ def fill_with_patches(
         colours,
         known,
         PatchIndex([guide], allowed=[allowed], max_patch=side),
-        patch=min(side, *known.shape),
+        patch_size=min(side, *known.shape),
         keep=known,
         seed=seed,
         progress=stage(progress, "fill"),

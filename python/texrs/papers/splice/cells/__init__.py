@@ -129,7 +129,7 @@ def splice_cells(
         "size": list(size),
         "layout": a.layout.value,
         "strength": strength,
-        "turns": may_turn,
+        "allow_rotation": may_turn,
         **_report(cells, wanted, charts, joined),
     }
     watch("done", 1.0)

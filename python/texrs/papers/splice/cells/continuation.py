@@ -87,7 +87,9 @@ def continue_cells(
     """
     usable = np.flatnonzero(cells.whole | (cells.area >= NEARLY * cells.size**2))
     if len(usable) < 3:
-        raise InvalidInput(f"b: {len(usable)} of its cells are whole, three or more are needed; take a larger picture")
+        raise InvalidInput(
+            f"layout: {len(usable)} of its cells are whole, three or more are needed; take a larger picture"
+        )
     scale = 1 / cells.size
     centre = (np.array(cells.labels.shape) - 1) / 2
     reach = np.array(far) / scale
@@ -172,7 +174,9 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
         if least <= FINE:
             break
     if not best.any():
-        raise InvalidInput("b: its cells cannot be continued as far as that; take a smaller size or a larger picture")
+        raise InvalidInput(
+            "layout: its cells cannot be continued as far as that; take a smaller size or a larger picture"
+        )
     outlines = trace(best, np.arange(1, int(best.max()) + 1))
     return (outlines - (np.array(size) - 1) / 2) / unit
 

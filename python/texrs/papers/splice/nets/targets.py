@@ -90,7 +90,7 @@ def take_points(
     points, continued = continue_points(layout, b.mask.shape, low, high)
     points = (points - centre) * factor + middle
     if len(points) < 3:
-        raise InvalidInput("b: its layout has fewer than three points around the output; take a larger size")
+        raise InvalidInput("layout: its layout has fewer than three points around the output; take a larger size")
     return Targets(points, factor, continued)
 
 
