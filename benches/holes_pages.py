@@ -4,7 +4,7 @@
     python benches/holes_pages.py OUT --votes votes.json
 
 The first writes `OUT/NUMBER.png`, each one of the pictures with round holes that one method has filled: `texrs.remove` with
-nothing said, `texrs.complete` without scales, OpenCV (`inpaint`), the Resynthesizer, whose program `fillers.py`
+nothing said, `texrs.inpaint` without scales, OpenCV (`inpaint`), the Resynthesizer, whose program `fillers.py`
 describes; and each picture as it is, on which nothing can be found. Numbers are drawn by chance, and so are the places of the
 holes, anew for each page, so that no page tells of another. `OUT/key.json` is not to be read.
 
@@ -44,7 +44,7 @@ def fillers(program: Path | None) -> dict[str, Filler]:
     found: dict[str, Filler] = {
         "untouched": lambda image, hole: image,
         "texrs.remove": lambda image, hole: texrs.remove(image, hole, seed=1).image,
-        "texrs.complete": lambda image, hole: texrs.complete(image, hole, seed=1).image,
+        "texrs.inpaint": lambda image, hole: texrs.inpaint(image, hole, seed=1).image,
     }
     if cv2 is not None:
         found["OpenCV"] = lambda image, hole: cv2.inpaint(image, hole.astype(np.uint8), 5, cv2.INPAINT_TELEA)

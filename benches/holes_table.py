@@ -3,7 +3,7 @@
     TEXRS_TEXTURES=<folder> python benches/holes_table.py [--only NAME] [--resynthesizer PROGRAM] [--pictures DIR]
 
 Textures as in `perspective_table.py`; without a folder a generated floor of discs. Three holes are cut into each, one after
-the other, and filled: by both methods of `texrs.complete` with the true scale map, with one that is measured, with blended
+the other, and filled: by both methods of `texrs.inpaint` with the true scale map, with one that is measured, with blended
 colours, and without regard to scales; by OpenCV (`inpaint`, and xphoto's shift map where its contributed modules are
 installed), and by the Resynthesizer, whose program `fillers.py` describes.
 """
@@ -54,7 +54,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 def ours(options: dict[str, Any]) -> Filler:
     def fill(image: np.ndarray, hole: np.ndarray, scale: np.ndarray, seed: int) -> np.ndarray:
         known = np.where(hole, np.nan, scale).astype(np.float32)
-        return np.asarray(texrs.complete(image, hole, seed=seed, **{"scale_map": known, **options}).image)
+        return np.asarray(texrs.inpaint(image, hole, seed=seed, **{"scale_map": known, **options}).image)
 
     return fill
 

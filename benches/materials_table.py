@@ -4,7 +4,7 @@
 
 Each FOLDER holds the maps of a material by the usual names. A map of the numbers of its pixels, as labels, goes with them.
 Every verb makes the whole material in one command, which also writes a lit preview, a glTF file, a MaterialX document and
-mipmaps; these stay in OUT, to be looked at. Verbs that go on from a picture (complete, extend, remove, rectify, self-splice)
+mipmaps; these stay in OUT, to be looked at. Verbs that go on from a picture (inpaint, extend, remove, rectify, self-splice)
 have what was designed.
 
 Register: the share of pixels whose number is that of the pixel nearest to where the source map looks. Shading: the mean angle,
@@ -46,7 +46,7 @@ def list_commands(stack: Path, designed: Path, hole: Path, size: int) -> Iterato
     yield "synthesize", [str(stack), *wanted, "--wrap", "xy"], stack
     yield "perspective", [str(stack), *wanted, "--target", "plane:slant=45,tilt=90", "--scale-map", "front"], stack
     yield "splice", [str(stack), "sample:pebbles", *wanted], stack
-    yield "complete", [str(designed), str(hole)], designed
+    yield "inpaint", [str(designed), str(hole)], designed
     yield "extend", [str(designed), "--left", str(size // 8), "--slant", "0"], designed
     yield "remove", [str(designed), str(hole), "--slant", "0"], designed
     yield "rectify", [str(designed), "--slant", "20", "--tilt", "90", "--fov", "50"], designed

@@ -82,13 +82,13 @@ def tile() -> Iterator[Strip]:
     )
 
 
-def complete() -> Iterator[Strip]:
+def inpaint() -> Iterator[Strip]:
     wall = samples.photograph("brick").image[:224, :224]
     rows, columns = np.mgrid[:224, :224]
     hole = np.hypot(rows - 112, columns - 112) < 44
 
     def fill(**options: Any) -> Picture:
-        return texrs.complete(wall, hole, seed=1, **options).image
+        return texrs.inpaint(wall, hole, seed=1, **options).image
 
     yield (
         "boundary_width",
@@ -324,7 +324,7 @@ def batch() -> Iterator[Strip]:
         yield (f"presets.{preset}", f"{said}; a seed each.", several([0, 1, 2, 3, 4], lambda s, p=preset: make(s, p)))
 
 
-GUIDES = (design, tile, complete, splice, perspective, rectify, solid, materials, augment, source_map, batch)
+GUIDES = (design, tile, inpaint, splice, perspective, rectify, solid, materials, augment, source_map, batch)
 
 # --- writing ---------------------------------------------------------------------------------------------------------
 

@@ -39,7 +39,7 @@ def rows_of(image: np.ndarray, scale: np.ndarray) -> list[np.ndarray]:
     hole[rows // 3 : rows // 3 * 2, columns // 3 : columns // 3 * 2] = True
     filled = [np.where(hole[..., np.newaxis], 128, image).astype(np.uint8)]
     for options in ({"scale_map": scale}, {"scale_map": scale, "method": "optimise"}, {}):
-        filled.append(texrs.complete(image, hole, seed=1, **options).image)
+        filled.append(texrs.inpaint(image, hole, seed=1, **options).image)
     return [beside(grown), beside(filled)]
 
 

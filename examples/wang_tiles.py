@@ -19,7 +19,7 @@ COLOURS = 2
 def make_tiles(exemplar: np.ndarray, side: int = 96, seed: int = 0) -> dict[tuple[int, int, int, int], np.ndarray]:
     """Return the tiles by the colours of their corners: upper left, upper right, lower left, lower right.
 
-    Holes are filled by `texrs.complete`, from the exemplar.
+    Holes are filled by `texrs.inpaint`, from the exemplar.
     """
     rng, part = np.random.default_rng(seed), side // 3 // 2 * 2
     half = part // 2
@@ -29,7 +29,7 @@ def make_tiles(exemplar: np.ndarray, side: int = 96, seed: int = 0) -> dict[tupl
         return exemplar[row : row + part, column : column + part]
 
     def fill(picture: np.ndarray, hole: np.ndarray) -> np.ndarray:
-        return texrs.complete(picture, hole, exemplar=exemplar, seed=seed).image
+        return texrs.inpaint(picture, hole, exemplar=exemplar, seed=seed).image
 
     def bridge(first: np.ndarray, second: np.ndarray, axis: int) -> np.ndarray:
         """Return a strip from the middle of one patch to the middle of the next one along an axis."""

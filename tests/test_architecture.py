@@ -37,7 +37,7 @@ LAYERS = (
     ("quilting",),
     ("growth",),
     ("tiling",),
-    ("completion",),
+    ("inpainting",),
     ("papers",),
     ("database", "extension", "lazy", "painting", "rectification", "removal", "tile_set", "transforms"),
     ("_napari", "comparison", "demo"),

@@ -12,7 +12,7 @@ RUST = Path(__file__).resolve().parents[1] / "rust" / "src"
 LAYERS = ("foundation", "kernels", "engine", "bindings")
 """The lowest first. A module uses the layers below its own."""
 WITHIN = {
-    "kernels": {"complete": {"seam", "patch_search"}, "warp": {"gather"}},
+    "kernels": {"inpaint": {"seam", "patch_search"}, "warp": {"gather"}},
     "engine": {
         "guide": {"appearance"},
         "blocks": {"appearance", "guide"},

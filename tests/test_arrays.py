@@ -76,8 +76,8 @@ VERBS = {
     "perspective": (PEBBLES, lambda image: texrs.perspective(image, np.ones((64, 64)), 64).image),
     "synthesize": (PEBBLES, lambda image: texrs.synthesize(image, 64).image),
     "solid": (PEBBLES, lambda image: texrs.PlaneTexture(image).window((0, 0), (32, 32)).image),
-    "complete": (PEBBLES, lambda image: texrs.complete(image, HOLE).image),
-    "complete by": (PEBBLES, lambda image: texrs.complete(as_ndarray(image, "image"), HOLE, exemplar=image).image),
+    "inpaint": (PEBBLES, lambda image: texrs.inpaint(image, HOLE).image),
+    "inpaint by": (PEBBLES, lambda image: texrs.inpaint(as_ndarray(image, "image"), HOLE, exemplar=image).image),
     "rectify": (DISCS, lambda image: texrs.rectify(image, view=VIEW).image),
     "extend": (DISCS, lambda image: texrs.extend(image, right=8, view=VIEW).image),
     "remove": (DISCS, lambda image: texrs.remove(image, NEAR, view=VIEW).image),
@@ -198,21 +198,21 @@ def test_a_colour_that_stands_for_transparency_becomes_alpha(mode: str, tmp_path
 
 def test_what_is_masked_is_a_hole():
     known = np.ma.masked_array(PEBBLES, np.repeat(HOLE[..., np.newaxis], 3, axis=-1))
-    expected = texrs.complete(PEBBLES, HOLE).image
-    assert np.array_equal(texrs.complete(known).image, expected)
+    expected = texrs.inpaint(PEBBLES, HOLE).image
+    assert np.array_equal(texrs.inpaint(known).image, expected)
     # In one channel is enough, and what is asked for beside is filled too.
     part = np.ma.masked_array(PEBBLES, np.zeros(PEBBLES.shape, bool))
     part[20:34, 24:40, 1] = np.ma.masked
     upper, lower = HOLE.copy(), HOLE.copy()
     upper[27:], lower[:27] = False, False
-    assert np.array_equal(texrs.complete(part).image, expected)
+    assert np.array_equal(texrs.inpaint(part).image, expected)
     half = np.ma.masked_array(PEBBLES, np.repeat(upper[..., np.newaxis], 3, axis=-1))
-    assert np.array_equal(texrs.complete(half, lower).image, expected)
+    assert np.array_equal(texrs.inpaint(half, lower).image, expected)
     for verb in (texrs.tile, texrs.design, texrs.Exemplar, texrs.elements.analyse):
-        with pytest.raises(InvalidInput, match=r": 672 of 12288 values are masked, which is a hole: texrs.complete"):
+        with pytest.raises(InvalidInput, match=r": 672 of 12288 values are masked, which is a hole: texrs.inpaint"):
             verb(known)
     with pytest.raises(InvalidInput, match="hole: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image"):
-        texrs.complete(PEBBLES)
+        texrs.inpaint(PEBBLES)
 
 
 @pytest.mark.parametrize("shape", [(3, 64, 64), (1, 64, 64), (4, 256, 256), (3, 12, 9)])
@@ -242,7 +242,7 @@ def test_labels_of_64_bits_go_through_and_stay_exact():
         assert set(np.unique(result.image)) <= set(np.unique(classes))
     hole = np.zeros((48, 48), bool)
     hole[20:28, 20:28] = True
-    filled = texrs.complete(classes, hole).image
+    filled = texrs.inpaint(classes, hole).image
     assert np.array_equal(filled[~hole], classes[~hole])
 
 

@@ -152,7 +152,7 @@ def test_patterns_folders_and_places(here: Path, capsys: Capture) -> None:
     Path("masks").mkdir()
     for name in ("dots", "weave"):
         io.write(f"masks/{name}.png", np.pad(np.full((6, 6), 255, np.uint8), 21))
-    recipe = 'verb = "complete"\ninputs = ["stones/dots.png", "stones/weave.png"]\nout = "whole"\n'
+    recipe = 'verb = "inpaint"\ninputs = ["stones/dots.png", "stones/weave.png"]\nout = "whole"\n'
     Path("holes.toml").write_text(recipe + 'arguments = ["{input}", "masks/{name}.png"]\n')
     assert main(["batch", "holes.toml", "-q"]) == 0
     assert said("whole/weave.png")["arguments"] == ["../stones/weave.png", "../masks/weave.png"]

@@ -149,7 +149,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
     put("photos/one.jpg")
     put("photos/a/two.png")
     put("masks/one_mask.png", HOLE)
-    command = ["batch", "complete", "photos", "-o", "out", "--argument", "masks/{folder}/{name}_mask.png"]
+    command = ["batch", "inpaint", "photos", "-o", "out", "--argument", "masks/{folder}/{name}_mask.png"]
     assert main(command) == 2
     assert "1 of 2 inputs lack a file: photos/a/two.png needs masks/a/two_mask.png" in capsys.readouterr().err
     assert not Path("out").exists()
@@ -166,7 +166,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
             ["--argument={input}", "--argument=photos/hole.png"],
         )
     ):
-        assert main(["batch", "complete", "photos", "-o", f"one{number}", *words, "-q"]) == 0
+        assert main(["batch", "inpaint", "photos", "-o", f"one{number}", *words, "-q"]) == 0
         assert made(f"one{number}") == ["a/two.png", "one.jpg"]
     assert main(["batch", "remove", "photos", "-o", "none"]) == 2
     assert "--argument: texrs remove needs MASK for each input" in capsys.readouterr().err
@@ -178,7 +178,7 @@ def test_masks_next_to_the_images_are_not_inputs(here: Path) -> None:
     put("photos/a/two.png")
     put("photos/a/two_mask.png", HOLE)
     words = ["--argument", "photos/{folder}/{name}_mask.png"]
-    assert main(["batch", "complete", "photos", "-o", "out", *words, "-q"]) == 0
+    assert main(["batch", "inpaint", "photos", "-o", "out", *words, "-q"]) == 0
     assert made("out") == ["a/two.png", "one.png"]
 
 

@@ -49,7 +49,7 @@ def pairs() -> list[tuple[str, str, str]]:
 
 def test_all_commands_are_known_to_read_and_write() -> None:
     both = {command for command, _, _ in pairs()}
-    assert both >= {"design", "apply", "tile", "complete", "scale-map", "perspective", "solid", "synthesize", "slice"}
+    assert both >= {"design", "apply", "tile", "inpaint", "scale-map", "perspective", "solid", "synthesize", "slice"}
     assert both >= {"splice", "self-splice", "analyse", "database"}
     assert ("apply", "source", "out") in pairs()
     assert any(command == "solid" and "guide" in read and written == "map" for command, read, written in pairs())

@@ -81,7 +81,7 @@ def test_depth_and_format(here: Path) -> None:
 
 
 VERBS = {
-    "complete": "complete rock hole.png",
+    "inpaint": "inpaint rock hole.png",
     "design": "design rock --size 64",
     "extend": "extend rock --left 8 --slant 0",
     "perspective": "perspective rock --size 64 --scale-map front",

@@ -26,7 +26,7 @@ CALLS = {
     "batch": "tile in.png -o made",
     "check": "in.png -o out.tif",
     "compare": "in.png --task tile --crop 48 --larger 48 --no-seconds -o out.html",
-    "complete": "in.png hole.png -o out.tif",
+    "inpaint": "in.png hole.png -o out.tif",
     "database": "db splice dots dots -o out.png",
     "demo": "-o in.png/folder",
     "design": "in.png -o out.tif",

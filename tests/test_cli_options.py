@@ -246,7 +246,7 @@ def test_a_word_means_the_same_in_every_command() -> None:
 
 def test_commands_are_those_of_the_verbs() -> None:
     drawn = {
-        "complete",
+        "inpaint",
         "design",
         "extend",
         "perspective",

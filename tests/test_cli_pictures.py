@@ -1,4 +1,4 @@
-"""The commands that mend a picture, end to end: ``texrs tile`` and ``texrs complete``."""
+"""The commands that mend a picture, end to end: ``texrs tile`` and ``texrs inpaint``."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, argume
     assert re.fullmatch(last, err.splitlines()[-1])
 
 
-def test_complete_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
+def test_inpaint_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
     options = "--patch-size 10 --boundary-width 2 --no-allow-mirror --wrap x --seed 4 --stages stages --map s.npz"
-    assert main(["complete", "in.png", "hole.png", "-o", "out.png", *options.split()]) == 0
-    expected = texrs.complete(
+    assert main(["inpaint", "in.png", "hole.png", "-o", "out.png", *options.split()]) == 0
+    expected = texrs.inpaint(
         COLOURS, HOLE, patch_size=10, boundary_width=2, allow_mirror=False, wrap=(False, True), seed=4
     )
     assert (iio.imread("out.png") == expected.image).all()
@@ -82,13 +82,13 @@ def test_complete_writes_what_the_function_makes(here: Path, capsys: Capture) ->
     assert (iio.imread("stages/01-known.png")[HOLE] == COLOURS[~HOLE].min()).all()
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.splitlines()[0] == "texrs: complete"
+    assert err.splitlines()[0] == "texrs: inpaint"
 
 
-def test_complete_from_another_picture_and_apply(here: Path) -> None:
-    command = ["complete", "in.png", "hole.png", "--from", "other.png", "-o", "out.png", "--map", "s.npz"]
+def test_inpaint_from_another_picture_and_apply(here: Path) -> None:
+    command = ["inpaint", "in.png", "hole.png", "--from", "other.png", "-o", "out.png", "--map", "s.npz"]
     assert main([*command, "-q"]) == 0
-    expected = texrs.complete(COLOURS, HOLE, exemplar=iio.imread("other.png")).image
+    expected = texrs.inpaint(COLOURS, HOLE, exemplar=iio.imread("other.png")).image
     assert (iio.imread("out.png") == expected).all()
     assert main(["apply", "s.npz", "in.png", "other.png", "-o", "again.png", "-q"]) == 0
     assert (iio.imread("again.png") == expected).all()
@@ -104,7 +104,7 @@ def test_any_mask_is_a_hole(here: Path) -> None:
         ("wide.png", grey.astype(np.uint16) * 257),
     ):
         iio.imwrite(name, mask)
-        assert main(["complete", "in.png", name, "-o", f"out-{name}", "-q"]) == 0
+        assert main(["inpaint", "in.png", name, "-o", f"out-{name}", "-q"]) == 0
         assert (iio.imread(f"out-{name}") == iio.imread("out-rgb.png")).all()
 
 
@@ -112,14 +112,14 @@ def test_floats_may_be_unknown_in_the_hole(here: Path) -> None:
     image = COLOURS.astype(np.float32) / 64
     image[HOLE] = np.nan
     np.save("in.npy", image)
-    assert main(["complete", "in.npy", "hole.png", "-o", "out.exr", "-q"]) == 0
+    assert main(["inpaint", "in.npy", "hole.png", "-o", "out.exr", "-q"]) == 0
     result = texrs.io.read("out.exr")
     assert np.isfinite(result).all()
     assert (result[~HOLE] == image[~HOLE]).all()
 
 
 def test_same_command_same_bytes(here: Path, capsys: Capture) -> None:
-    for command in (["tile", "in.png"], ["complete", "in.png", "hole.png"]):
+    for command in (["tile", "in.png"], ["inpaint", "in.png", "hole.png"]):
         for count in ("1", "2", "7"):
             assert main([*command, "-q", "--threads", count, "-o", f"{count}.png", "--force"]) == 0
         assert len({Path(f"{count}.png").read_bytes() for count in "127"}) == 1
@@ -146,21 +146,21 @@ REFUSED = {
     "tile in.png --threads 0": "--threads: needs",
     "tile in.png hole.png": "--help",
     "tile": "--help",
-    "complete in.png": "HOLE: must be a mask",
-    "complete in.png no.png": "no.png",
-    "complete no.png hole.png": "no.png",
-    "complete in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
-    "complete in.png white.png": "white.png: covers the whole image",
-    "complete in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
-    "complete in.png hole.png --patch-size 65": "--patch-size: needs an integer from 4 to 64, got 65",
-    "complete in.png hole.png --patch-size 60": "--patch-size: 60 has no place",
-    "complete in.png hole.png --boundary-width -1": "--boundary-width: needs",
-    "complete in.png hole.png --seed -1": "--seed: needs",
-    "complete in.png hole.png --wrap yes": "--wrap: allowed are",
-    "complete in.png hole.png --from hole.png": "hole.png: needs the dtype and channels of the image",
-    "complete in.png hole.png --from no.png": "no.png",
-    "complete nan.npy hole.png": "nan.npy",
-    "complete in.png nan.npy": "nan.npy: must be finite",
+    "inpaint in.png": "HOLE: must be a mask",
+    "inpaint in.png no.png": "no.png",
+    "inpaint no.png hole.png": "no.png",
+    "inpaint in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
+    "inpaint in.png white.png": "white.png: covers the whole image",
+    "inpaint in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
+    "inpaint in.png hole.png --patch-size 65": "--patch-size: needs an integer from 4 to 64, got 65",
+    "inpaint in.png hole.png --patch-size 60": "--patch-size: 60 has no place",
+    "inpaint in.png hole.png --boundary-width -1": "--boundary-width: needs",
+    "inpaint in.png hole.png --seed -1": "--seed: needs",
+    "inpaint in.png hole.png --wrap yes": "--wrap: allowed are",
+    "inpaint in.png hole.png --from hole.png": "hole.png: needs the dtype and channels of the image",
+    "inpaint in.png hole.png --from no.png": "no.png",
+    "inpaint nan.npy hole.png": "nan.npy",
+    "inpaint in.png nan.npy": "nan.npy: must be finite",
 }
 
 
@@ -181,19 +181,19 @@ def test_bad_input_gets_one_line_and_leaves_what_was_there(here: Path, capsys: C
     assert main([*command.split(), "-o", "out.png" if "nan.npy hole" not in command else "out.tif"]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    lines = [line for line in err.splitlines() if line not in ("texrs: complete", "texrs: join columns")]
+    lines = [line for line in err.splitlines() if line not in ("texrs: inpaint", "texrs: join columns")]
     assert len(lines) == 1, err
     assert lines[0].startswith("texrs: ")
     assert REFUSED[command] in lines[0]
     assert files(here) == before
 
 
-@pytest.mark.parametrize("command", ["tile in.png", "complete in.png hole.png"])
+@pytest.mark.parametrize("command", ["tile in.png", "inpaint in.png hole.png"])
 @pytest.mark.parametrize("out", ["out.xyz", "no/out.png", ".", "out.exr"])
 def test_outputs_are_checked_before_the_work(
     here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, command: str, out: str
 ) -> None:
-    for name, verb in (("texrs.tiling", "tile"), ("texrs.completion", "complete")):
+    for name, verb in (("texrs.tiling", "tile"), ("texrs.inpainting", "inpaint")):
         module = importlib.import_module(name)
 
         # Would be an internal error.
@@ -207,7 +207,7 @@ def test_outputs_are_checked_before_the_work(
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("command", ["tile in.png", "complete in.png hole.png"])
+@pytest.mark.parametrize("command", ["tile in.png", "inpaint in.png hole.png"])
 def test_failed_writing_leaves_what_was_there(
     here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:

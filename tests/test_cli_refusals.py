@@ -16,7 +16,7 @@ from texrs import cli, io
 from texrs.cli import app, main
 
 COMMANDS = {
-    "complete": "in.png hole.png",
+    "inpaint": "in.png hole.png",
     "design": "in.png",
     "extend": "in.png --left 64 --slant 0",
     "perspective": "in.png --scale-map front",
@@ -120,7 +120,7 @@ SIZES = {
     "solid volume.tif --size 3000x2000x1000": "--size: 3000 x 2000 x 1000 has",
     "extend in.png --slant 0 --to 30000x20000": "--to: 30000 x 20000 has",
     "extend in.png --slant 0 --to 10x5000": "--to: needs 96 x 64 pixels, and what the sides add, at least",
-    "complete in.png small-mask.png": "small-mask.png: needs shape 96 x 64, got 30 x 40",
+    "inpaint in.png small-mask.png": "small-mask.png: needs shape 96 x 64, got 30 x 40",
     "remove in.png small-mask.png --slant 0": "small-mask.png: needs shape 96 x 64, got 30 x 40",
     "apply map.npz small.png": "small.png: number 0 needs size 96 x 64, got 30 x 40",
     "design tiny.png": "tiny.png: each side must be at least 16, got shape 12 x 8",

@@ -389,7 +389,7 @@ def test_options_are_frozen_and_keyword_only():
             setattr(kind(), field, 3)
 
 
-@pytest.mark.parametrize("verb", [texrs.design, texrs.design_variants, texrs.complete, texrs.tile, texrs.blend])
+@pytest.mark.parametrize("verb", [texrs.design, texrs.design_variants, texrs.inpaint, texrs.tile, texrs.blend])
 def test_a_type_checker_knows_every_option(verb):
     """Overloads or ``**options`` would let a misspelt one pass."""
     assert not get_overloads(verb)

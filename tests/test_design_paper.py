@@ -9,7 +9,7 @@ from texrs import DeformationOptions, ElementOptions, samples
 from texrs._arrays import to_unit
 from texrs.errors import InvalidInput
 from texrs.exemplar.symmetry import flip
-from texrs.kernels.complete import complete
+from texrs.kernels.inpaint import inpaint
 from texrs.kernels.patch_search import PatchIndex
 from texrs.papers.design.literal import START, choose_operation, choose_start, stitch_layers
 from texrs.papers.design.logistic_map import iterate
@@ -187,7 +187,7 @@ def test_completion_takes_the_best_match_of_a_centred_window():
         ]
     )
     best = np.unravel_index(costs.argmin(), costs.shape)
-    filled = complete(picture, known, PatchIndex([image], max_patch=9), patch_size=9, count=1, paper=True)
+    filled = inpaint(picture, known, PatchIndex([image], max_patch=9), patch_size=9, count=1, paper=True)
     np.testing.assert_array_equal(filled.coordinates[11, 9], np.array(best) + 4)
 
 

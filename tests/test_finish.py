@@ -28,8 +28,8 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
     "tile and blend": (lambda: texrs.tile(PEBBLES, screening=0.1), PEBBLES),
     "tile in even light": (lambda: texrs.tile(LIT, flatten=True), LIT),
     "tile in even light and blend": (lambda: texrs.tile(LIT, flatten=True, screening=0.1), LIT),
-    "complete": (lambda: texrs.complete(PEBBLES, HOLE), PEBBLES),
-    "complete and blend": (lambda: texrs.complete(PEBBLES, HOLE, screening=0.1), PEBBLES),
+    "inpaint": (lambda: texrs.inpaint(PEBBLES, HOLE), PEBBLES),
+    "inpaint and blend": (lambda: texrs.inpaint(PEBBLES, HOLE, screening=0.1), PEBBLES),
     "synthesize": (lambda: texrs.synthesize(PEBBLES, 64), PEBBLES),
     "perspective": (lambda: texrs.perspective(FLOOR, texrs.scale_maps.from_angles((96, 112), 34, 90), 64), FLOOR),
     "rectify": (lambda: texrs.rectify(FLOOR, view=texrs.View(slant=34, fov=60)), FLOOR),
@@ -110,7 +110,7 @@ def test_another_finish_may_be_asked_for() -> None:
     ids=["no text", "other words", "another hole", "no place of light", "other parts", "another example"],
 )
 def test_a_damaged_finish_is_said(change: dict[str, np.ndarray], tmp_path: Path) -> None:
-    texrs.complete(PEBBLES, HOLE, screening=0.1).source.save(tmp_path / "map.npz")
+    texrs.inpaint(PEBBLES, HOLE, screening=0.1).source.save(tmp_path / "map.npz")
     with np.load(tmp_path / "map.npz") as file:
         parts = {**file, **change}
     np.savez(tmp_path / "map.npz", **parts)

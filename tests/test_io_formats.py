@@ -383,7 +383,7 @@ def test_a_hole_that_is_filled_may_go_to_jpeg(tmp_path, capsys):
     hole[20:30, 20:30] = 255
     tio.write(tmp_path / "hole.png", hole)
     words = [str(tmp_path / "a.png"), str(tmp_path / "hole.png"), "-o", str(tmp_path / "out.jpg")]
-    assert main(["complete", *words]) == 0
+    assert main(["inpaint", *words]) == 0
     assert tio.read(tmp_path / "out.jpg").shape == (64, 64, 3)
     # A design of a picture with holes has holes: it is refused before the work.
     assert main(["design", str(tmp_path / "a.png"), "-o", str(tmp_path / "no.jpg")]) == 2

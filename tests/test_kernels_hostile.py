@@ -22,8 +22,8 @@ from scipy.sparse import eye_array
 from hostile import DTYPES, LAYOUTS, NUMBERS, OTHERS, VALUES, lay_out
 from texrs import kernels
 from texrs.errors import TexrsError
-from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
+from texrs.kernels.inpaint import inpaint
 from texrs.kernels.mean_shift import mean_shift
 from texrs.kernels.ncc import Correlation
 from texrs.kernels.patch_search import PatchIndex
@@ -93,8 +93,8 @@ def cut_old(**fields: Any) -> object:
 
 
 CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
-    "complete.complete": (
-        complete,
+    "inpaint.inpaint": (
+        inpaint,
         {
             "colours": NOISE,
             "known": ~INSIDE,

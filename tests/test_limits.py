@@ -27,7 +27,7 @@ VERBS = {
     "synthesize": lambda: texrs.synthesize(DOTS, 96),
     "solid": lambda: texrs.solid(VOLUME, 40),
     "tile": lambda: texrs.tile(DOTS),
-    "complete": lambda: texrs.complete(DOTS, HOLE),
+    "inpaint": lambda: texrs.inpaint(DOTS, HOLE),
     "extend": lambda: texrs.extend(DOTS, right=32),
     "rectify": lambda: texrs.rectify(DOTS, view=texrs.View(slant=10, fov=50)),
     "remove": lambda: texrs.remove(DOTS, HOLE, view=texrs.View(slant=10, fov=50)),

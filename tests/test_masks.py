@@ -166,18 +166,18 @@ def test_grow_goes_across_cyclic_borders() -> None:
         (lambda: read(np.full(SIZE, np.nan)), "hole: must be finite"),
         (lambda: read(np.dstack([WHITE] * 5)), "hole: needs shape"),
         (lambda: read(WHITE.astype(complex)), "hole: needs bool, integers or floats"),
-        (lambda: texrs.complete(BRICKS, 0 * WHITE), "hole: marks nothing, so there is nothing to fill"),
-        (lambda: texrs.complete(BRICKS, Mask(WHITE, grow=-20)), "hole: marks nothing"),
-        (lambda: texrs.complete(BRICKS, Mask(DISC | True, invert=True)), "hole: marks nothing"),
-        (lambda: texrs.complete(BRICKS, Mask(WHITE, feather=200)), "hole: covers the whole image"),
+        (lambda: texrs.inpaint(BRICKS, 0 * WHITE), "hole: marks nothing, so there is nothing to fill"),
+        (lambda: texrs.inpaint(BRICKS, Mask(WHITE, grow=-20)), "hole: marks nothing"),
+        (lambda: texrs.inpaint(BRICKS, Mask(DISC | True, invert=True)), "hole: marks nothing"),
+        (lambda: texrs.inpaint(BRICKS, Mask(WHITE, feather=200)), "hole: covers the whole image"),
         (lambda: texrs.remove(BRICKS, 0 * WHITE), "mask: marks nothing, so there is nothing to remove"),
-        (lambda: texrs.complete(BRICKS), "hole: must be a mask, 'alpha', 'nan'"),
-        (lambda: texrs.complete(BRICKS, "nan"), "hole: no pixel of the image is NaN or infinite"),
-        (lambda: texrs.complete(BRICKS, 300), "hole: no pixel of the image is 300"),
-        (lambda: texrs.complete(BRICKS, 10**400), "hole: must be a number that a double can hold"),
-        (lambda: texrs.complete(BRICKS, "nodata"), "hole: 'nodata' needs an image of a file"),
-        (lambda: texrs.complete(BRICKS, Mask(7, threshold=0.5)), "threshold: must be given with a mask"),
-        (lambda: texrs.complete(BRICKS, "alpha"), "hole: 'alpha' needs an image with an alpha channel"),
+        (lambda: texrs.inpaint(BRICKS), "hole: must be a mask, 'alpha', 'nan'"),
+        (lambda: texrs.inpaint(BRICKS, "nan"), "hole: no pixel of the image is NaN or infinite"),
+        (lambda: texrs.inpaint(BRICKS, 300), "hole: no pixel of the image is 300"),
+        (lambda: texrs.inpaint(BRICKS, 10**400), "hole: must be a number that a double can hold"),
+        (lambda: texrs.inpaint(BRICKS, "nodata"), "hole: 'nodata' needs an image of a file"),
+        (lambda: texrs.inpaint(BRICKS, Mask(7, threshold=0.5)), "threshold: must be given with a mask"),
+        (lambda: texrs.inpaint(BRICKS, "alpha"), "hole: 'alpha' needs an image with an alpha channel"),
     ],
 )
 def test_what_marks_nothing_is_refused(make: Callable[[], object], words: str) -> None:
@@ -189,14 +189,14 @@ def test_what_marks_nothing_is_refused(make: Callable[[], object], words: str) -
 
 
 def test_the_share_that_is_filled_is_reported() -> None:
-    made = texrs.complete(BRICKS, Mask(WHITE, grow=2))
+    made = texrs.inpaint(BRICKS, Mask(WHITE, grow=2))
     assert made.report["filled"] == widen(DISC, 2).mean()
     assert "assumed" not in made.report
-    much = texrs.complete(BRICKS, 255 - WHITE)
+    much = texrs.inpaint(BRICKS, 255 - WHITE)
     assert much.report["filled"] == (~DISC).mean()
     assert much.report["assumed"] == ["hole: marks 92 % of the image; if the rest is meant, invert the mask (--invert)"]
     np.testing.assert_array_equal(
-        texrs.complete(BRICKS, Mask(255 - WHITE, invert=True)).image, texrs.complete(BRICKS, DISC).image
+        texrs.inpaint(BRICKS, Mask(255 - WHITE, invert=True)).image, texrs.inpaint(BRICKS, DISC).image
     )
 
 
@@ -212,26 +212,26 @@ def test_a_softly_erased_hole_keeps_nothing_of_the_brush(dtype: type) -> None:
     soft = np.dstack([np.rint(painted), np.rint(255 * alpha)])
     assert is_magenta(soft).mean() > 0.1
     full = 1.0 if dtype is np.float32 else np.iinfo(dtype).max
-    made = texrs.complete((soft / 255 * full).astype(dtype), "alpha")
+    made = texrs.inpaint((soft / 255 * full).astype(dtype), "alpha")
     assert not is_magenta(made.image / full * 255).any()
     assert (made.image[..., 3] == full).all()
     assert made.report["filled"] == (soft[..., 3] < 255).mean()
     # A threshold keeps what is hardly transparent.
-    kept = texrs.complete((soft / 255 * full).astype(dtype), Mask("alpha", threshold=0.5))
+    kept = texrs.inpaint((soft / 255 * full).astype(dtype), Mask("alpha", threshold=0.5))
     assert kept.report["filled"] == pytest.approx((alpha <= 0.5).mean(), abs=0.01)
 
 
 def test_an_image_without_an_opaque_pixel_says_what_to_do() -> None:
     veiled = np.dstack([BRICKS, np.where(DISC, 0, 254).astype(np.uint8)])
     with collect() as notices, pytest.raises(InvalidInput, match="hole: covers the whole image"):
-        texrs.complete(veiled, "alpha")
+        texrs.inpaint(veiled, "alpha")
     assert "with a threshold of 1 only fully transparent ones are" in notices.assumed[0]
-    assert texrs.complete(veiled, Mask("alpha", threshold=1)).report["filled"] == DISC.mean()
+    assert texrs.inpaint(veiled, Mask("alpha", threshold=1)).report["filled"] == DISC.mean()
 
 
 def test_a_feathered_filling_fades_into_the_image() -> None:
     base = np.where(DISC, 0, BRICKS[..., 0]).astype(np.uint8)
-    made = texrs.complete(base, Mask(WHITE, feather=5))
+    made = texrs.inpaint(base, Mask(WHITE, feather=5))
     wide = widen(DISC, 5)
     assert made.report["filled"] == wide.mean()
     # The marked area is replaced, what lies beyond the band stays, and the band is between the two.
@@ -249,15 +249,15 @@ def test_a_feathered_filling_fades_into_the_image() -> None:
 
 def test_feather_asks_for_colours_between_those_of_a_palette() -> None:
     checks = np.where((ROWS // 8 + COLUMNS // 8) % 2, 200, 40).astype(np.uint8)
-    assert "palette" in texrs.complete(checks, WHITE).report
-    faded = texrs.complete(checks, Mask(WHITE, feather=6))
+    assert "palette" in texrs.inpaint(checks, WHITE).report
+    faded = texrs.inpaint(checks, Mask(WHITE, feather=6))
     assert "palette" not in faded.report
     assert faded.source.finish is not None
     assert faded.source.finish.fade is not None
 
 
 def test_feathered_normals_keep_their_length_and_the_map_its_fade(tmp_path: Path) -> None:
-    made = texrs.complete(BRICKS, Mask(WHITE, feather=8))
+    made = texrs.inpaint(BRICKS, Mask(WHITE, feather=8))
     made.source.save(tmp_path / "map.npz")
     again = texrs.SourceMap.load(tmp_path / "map.npz")
     np.testing.assert_array_equal(texrs.apply(again, BRICKS), made.image)
@@ -286,7 +286,7 @@ def test_remove_grows_and_feathers() -> None:
 
 def test_one_mask_fills_all_maps_of_a_material() -> None:
     rock = texrs.Material({"color": BRICKS, "height": HEIGHTS}, roles={"color": "color", "height": "height"})
-    made = texrs.complete(rock, Mask(WHITE, feather=4))
+    made = texrs.inpaint(rock, Mask(WHITE, feather=4))
     assert made.material is not None
     assert made.report["filled"] == widen(DISC, 4).mean()
     for name in ("color", "height"):
@@ -299,7 +299,7 @@ def test_one_mask_fills_all_maps_of_a_material() -> None:
 def test_a_hole_of_a_material_is_a_mask(hole: object) -> None:
     rock = texrs.Material({"color": BRICKS, "height": HEIGHTS})
     with pytest.raises(InvalidInput, match="hole: must be a mask, because the image is a material"):
-        texrs.complete(rock, hole)  # type: ignore[arg-type]
+        texrs.inpaint(rock, hole)  # type: ignore[arg-type]
 
 
 # --- pixels without data ---------------------------------------------------------------------------------------------
@@ -309,13 +309,13 @@ def test_a_hole_of_a_material_is_a_mask(hole: object) -> None:
 @pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
 def test_what_is_not_finite_is_filled(dtype: type, missing: float) -> None:
     heights = HEIGHTS.astype(dtype)
-    expected = texrs.complete(heights, DISC)
+    expected = texrs.inpaint(heights, DISC)
     heights[DISC] = missing
     for hole in (None, "nan", Mask("nan"), -9999):
-        made = texrs.complete(heights, hole)
+        made = texrs.inpaint(heights, hole)
         np.testing.assert_array_equal(made.image, expected.image)
         assert np.isfinite(made.image).all()
-    assert texrs.complete(heights).report["assumed"] == [
+    assert texrs.inpaint(heights).report["assumed"] == [
         f"image: {DISC.sum()} pixels are NaN or infinite; they are filled"
     ]
 
@@ -333,16 +333,16 @@ def test_what_is_not_finite_is_filled(dtype: type, missing: float) -> None:
 )
 def test_nodata_is_what_the_file_states(tmp_path: Path, dtype: type, value: float, text: str) -> None:
     heights = HEIGHTS.astype(np.int64).clip(1, 255).astype(dtype)
-    expected = texrs.complete(heights, DISC).image
+    expected = texrs.inpaint(heights, DISC).image
     heights[DISC] = value
     path = tmp_path / "heights.tif"
     tifffile.imwrite(path, heights, extratags=[(42113, 2, len(text) + 1, text, True)])
     assert io.read_notes(path).nodata == pytest.approx(value, nan_ok=True)
     for hole in ("nodata", float(text)):
-        np.testing.assert_array_equal(texrs.complete(path, hole).image, expected)
+        np.testing.assert_array_equal(texrs.inpaint(path, hole).image, expected)
     tifffile.imwrite(path, heights)
     with pytest.raises(InvalidInput, match="states no nodata value"):
-        texrs.complete(path, "nodata")
+        texrs.inpaint(path, "nodata")
 
 
 def test_a_colour_is_nodata_only_in_all_channels() -> None:
@@ -350,7 +350,7 @@ def test_a_colour_is_nodata_only_in_all_channels() -> None:
     image[20:30, 20:30, 0] = 0
     image[DISC] = 0
     expected = DISC & (image == 0).all(axis=-1)
-    assert texrs.complete(image, 0).report["filled"] == expected.mean()
+    assert texrs.inpaint(image, 0).report["filled"] == expected.mean()
 
 
 @pytest.fixture
@@ -375,21 +375,21 @@ def read_tags(path: str) -> dict[int, object]:
 
 @pytest.mark.parametrize("hole", ["", "nodata", "-9999", "-9999.0", "hole.png"])
 def test_georeference_goes_through(here: Path, capsys: Capture, hole: str) -> None:
-    assert main(["complete", "heights.tif", *hole.split(), "-o", "out.tif"]) == 0
+    assert main(["inpaint", "heights.tif", *hole.split(), "-o", "out.tif"]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert f"{100 * DISC.mean():.3g} % filled" in lines[-1]
     words = f"heights.tif: {DISC.sum()} pixels are without data (-9999), NaN or infinite; they are filled"
     assert (words in lines[0]) == (not hole)
     made = io.read("out.tif")
-    np.testing.assert_array_equal(made, texrs.complete("heights.tif", DISC).image)
+    np.testing.assert_array_equal(made, texrs.inpaint("heights.tif", DISC).image)
     assert read_tags("out.tif") == {code: value for code, _, _, value in GEO}
     assert main(["rerun", "out.tif"]) == 0
 
 
 def test_georeference_that_is_not_written_is_reported(here: Path, capsys: Capture) -> None:
-    assert main(["complete", "heights.tif", "hole.png", "-o", "out.exr"]) == 0
+    assert main(["inpaint", "heights.tif", "hole.png", "-o", "out.exr"]) == 0
     assert "heights.tif: its georeference is not written, because only TIFF holds it" in capsys.readouterr().err
-    assert main(["complete", "heights.tif", "hole.png", "-o", "other.exr", "--strict"]) == 2
+    assert main(["inpaint", "heights.tif", "hole.png", "-o", "other.exr", "--strict"]) == 2
     assert not Path("other.exr").exists()
     # The pixels of other results lie elsewhere.
     assert main(["design", "in.png", "-o", "new.tif", "-q"]) == 0
@@ -397,7 +397,7 @@ def test_georeference_that_is_not_written_is_reported(here: Path, capsys: Captur
 
 
 def test_nodata_that_is_used_as_values_is_reported(here: Path, capsys: Capture) -> None:
-    words = f"heights.tif: its nodata value -9999 is not used, so {DISC.sum()} pixels count as data; texrs complete fills them"
+    words = f"heights.tif: its nodata value -9999 is not used, so {DISC.sum()} pixels count as data; texrs inpaint fills them"
     with pytest.warns(InputWarning, match=words):
         made = texrs.tile("heights.tif")
     assert made.report["ignored"] == [words]
@@ -411,7 +411,7 @@ def test_nodata_that_is_used_as_values_is_reported(here: Path, capsys: Capture) 
 # --- commands --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["complete in.png", "remove in.png"])
+@pytest.mark.parametrize("command", ["inpaint in.png", "remove in.png"])
 def test_commands_refuse_what_marks_nothing_and_warn_of_much(here: Path, capsys: Capture, command: str) -> None:
     flat = ["--slant", "0"] if command.startswith("remove") else []
     assert main([*command.split(), "empty.png", "-o", "out.png", *flat]) == 2
@@ -428,13 +428,13 @@ def test_commands_refuse_what_marks_nothing_and_warn_of_much(here: Path, capsys:
 
 
 def test_a_file_that_is_missing_is_named_once(here: Path, capsys: Capture) -> None:
-    for command in ("complete in.png no.png", "remove in.png no.png", "complete in.png hole.png --allowed no.png"):
+    for command in ("inpaint in.png no.png", "remove in.png no.png", "inpaint in.png hole.png --allowed no.png"):
         assert main([*command.split(), "-o", "out.png"]) == 2
         assert capsys.readouterr().err.splitlines()[-1] == "texrs: no.png: there is no such file"
 
 
 def test_an_inverted_mask_is_warned_of(here: Path, capsys: Capture) -> None:
-    assert main(["complete", "in.png", "inverted.png", "-o", "out.png"]) == 0
+    assert main(["inpaint", "in.png", "inverted.png", "-o", "out.png"]) == 0
     said = capsys.readouterr().err
     assert "inverted.png: marks 92 % of the image; if the rest is meant, invert the mask (--invert)" in said
     assert "91.7 % filled" in said
@@ -442,19 +442,19 @@ def test_an_inverted_mask_is_warned_of(here: Path, capsys: Capture) -> None:
 
 def test_options_of_masks_are_those_of_the_class(here: Path, capsys: Capture) -> None:
     options = "--threshold 0.2 --grow 3 --feather 4 --seed 2"
-    assert main(["complete", "in.png", "hole.png", "-o", "out.png", "--map", "map.npz", *options.split()]) == 0
-    expected = texrs.complete(BRICKS, Mask(WHITE, threshold=0.2, grow=3, feather=4), seed=2)
+    assert main(["inpaint", "in.png", "hole.png", "-o", "out.png", "--map", "map.npz", *options.split()]) == 0
+    expected = texrs.inpaint(BRICKS, Mask(WHITE, threshold=0.2, grow=3, feather=4), seed=2)
     np.testing.assert_array_equal(io.read("out.png"), expected.image)
     assert main(["apply", "map.npz", "in.png", "-o", "again.png", "-q"]) == 0
     np.testing.assert_array_equal(io.read("again.png"), expected.image)
-    assert main(["complete", "in.png", "-o", "no.png", "--grow", "3"]) == 2
+    assert main(["inpaint", "in.png", "-o", "no.png", "--grow", "3"]) == 2
     assert "--grow: needs HOLE too" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        "complete in.png hole.png --allowed {}",
+        "inpaint in.png hole.png --allowed {}",
         "extend in.png --right 8 --slant 10 --ground {}",
         "analyse in.png --mask {}",
         "scale-map in.png --mask {}",
@@ -480,4 +480,4 @@ def test_warnings_of_python_are_only_of_what_is_not_used() -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", InputWarning)
-        texrs.complete(BRICKS, as_layer((0, 0, 0), WHITE))
+        texrs.inpaint(BRICKS, as_layer((0, 0, 0), WHITE))

@@ -47,7 +47,7 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], Material]] = {
     "design": (lambda: texrs.design(STONES, (72, 64)), STONES),
     "design variants": (lambda: next(texrs.design_variants(STONES, 2, 64)), STONES),
     "tile": (lambda: texrs.tile(STONES), STONES),
-    "complete": (lambda: texrs.complete(STONES, HOLE), STONES),
+    "inpaint": (lambda: texrs.inpaint(STONES, HOLE), STONES),
     "synthesize": (lambda: texrs.synthesize(STONES, 64), STONES),
     "perspective": (lambda: texrs.perspective(TILTED, texrs.scale_maps.from_angles((96, 112), 34, 90), 64), TILTED),
     "rectify": (lambda: texrs.rectify(TILTED, view=SEEN), TILTED),
@@ -134,7 +134,7 @@ def test_several_materials_are_mixed() -> None:
     assert result.material is not None
     assert len(result.source.shapes) == 2
     assert result.material["normal"].pixels.shape == (96, 96, 3)
-    filled = texrs.complete(STONES, HOLE, exemplar=other).material
+    filled = texrs.inpaint(STONES, HOLE, exemplar=other).material
     assert filled is not None
     kept = ~HOLE & (np.abs(filled["height"].pixels - STONES["height"].pixels) == 0)
     assert kept.mean() > 0.5

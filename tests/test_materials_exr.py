@@ -348,7 +348,7 @@ def test_a_picture_with_alpha_changes_between_exr_and_others(
         for out in ("exr", "tif"):
             target = tmp_path / f"{given}-out.{out}"
             mask = str(tmp_path / "hole.png")
-            assert main(["complete", str(tmp_path / f"in.{given}"), mask, "-o", str(target)]) == 0
+            assert main(["inpaint", str(tmp_path / f"in.{given}"), mask, "-o", str(target)]) == 0
             known = io.read(target)[hole == 0]
             truth = (bound if out == "exr" else leaf)[hole == 0]
             np.testing.assert_allclose(known, truth, rtol=0 if given == out else 1e-5)

@@ -1,4 +1,4 @@
-"""The commands texrs perspective, and texrs complete with a scale map."""
+"""The commands texrs perspective, and texrs inpaint with a scale map."""
 
 import numpy as np
 import pytest
@@ -59,19 +59,19 @@ def test_a_target_is_stretched_to_the_size(files):
 
 def test_holes_are_filled_by_scale(files):
     for given in ("--scale-map @scale.npy", "--scale-map auto", "--method optimise --scale-map @scale.npy"):
-        assert run(files, f"complete @floor.png @hole.png -o @out.png {given} -q") == 0
+        assert run(files, f"inpaint @floor.png @hole.png -o @out.png {given} -q") == 0
         made, floor, hole = (io.read(files / n) for n in ("out.png", "floor.png", "hole.png"))
         np.testing.assert_array_equal(made[hole == 0], floor[hole == 0])
     assert (
         run(
             files,
-            "complete @floor.png @hole.png -o @out.png --method optimise --scale-map @scale.npy --boundary-width 4 -q",
+            "inpaint @floor.png @hole.png -o @out.png --method optimise --scale-map @scale.npy --boundary-width 4 -q",
         )
         == 0
     )
     changed = (io.read(files / "out.png") != floor).any(axis=-1)
     assert changed[hole == 0].any()
-    assert run(files, "complete @clear.png alpha -o @new.png --scale-map @scale.npy -q") == 0
+    assert run(files, "inpaint @clear.png alpha -o @new.png --scale-map @scale.npy -q") == 0
     assert (io.read(files / "new.png")[..., 3] == 255).all()
 
 
@@ -98,10 +98,10 @@ def test_holes_are_filled_by_scale(files):
             "perspective @floor.png --scale-map @scale.npy --detail 3 --foreshortened -o @out.png",
             "--detail and --foreshortened: a scale map is given",
         ),
-        ("complete @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
-        ("complete @floor.png @hole.png -o @out.png --method heal", "--method: allowed are"),
+        ("inpaint @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
+        ("inpaint @floor.png @hole.png -o @out.png --method heal", "--method: allowed are"),
         (
-            "complete @floor.png @hole.png -o @out.png --method optimise --patch-size 9",
+            "inpaint @floor.png @hole.png -o @out.png --method optimise --patch-size 9",
             "--patch-size: method 'optimise' has no",
         ),
     ],

@@ -73,11 +73,11 @@ def test_verbs_say_what_was_measured_and_how_surely(tmp_path: Path, capsys: pyte
     assert grown.report["measured"] == found.as_dict() == json.loads(json.dumps(grown.report["measured"]))
     assert (found.as_dict()["shape"], found.as_dict()["scale_kind"]) == ("plane", "width")
     assert texrs.perspective(floor, "front", 64).report["measured"] is None
-    report = texrs.complete(floor, hole, scale_map="auto").report
+    report = texrs.inpaint(floor, hole, scale_map="auto").report
     assert report["measured"]["shape"] == "plane"
     assert report["measured"]["confidence"] >= SURE
     assert report["exemplar_measured"] is None
-    report = texrs.complete(
+    report = texrs.inpaint(
         floor, hole, exemplar=floor, scale_map=found.scale, exemplar_scale_map="auto", method="optimise"
     ).report
     assert (report["measured"], report["exemplar_measured"]) == (None, found.as_dict())

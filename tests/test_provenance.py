@@ -53,7 +53,7 @@ WRITERS = {
     "analyse": "analyse in.png --mask mask.png --layout disjoint -o {}.npz",
     "apply": "apply map.npz in.png -o {}.png",
     "compare": "compare in.png --task tile --crop 48 --larger 48 --no-seconds -o {}.html",
-    "complete": "complete in.png hole.png -o {}.png",
+    "inpaint": "inpaint in.png hole.png -o {}.png",
     "database matrix": "database db matrix -o {}.png",
     "database splice": "database db splice dots dots -o {}.png",
     "design": "design in.png --size 48 --copies 1 -o {}.png",
@@ -254,7 +254,7 @@ def test_variants_that_are_done_stay(here: Path, number: int) -> None:
 AGAIN = {
     "apply": "apply map.npz in.png -o r.png --interpolation linear",
     "analyse": "analyse in.png --mask mask.png --layout disjoint -o r.npz --stages st --page r.html",
-    "complete": "complete in.png hole.png -o r.jpg --map r.npz",
+    "inpaint": "inpaint in.png hole.png -o r.jpg --map r.npz",
     "database": "database db matrix -o r.png --each each --cell 32",
     "design": "design in.png --size 64x48 --copies 1 --seed 3 --element-labels mask.png -o r.exr --map r.npz --stages st",
     "sample": "tile sample:weave -o r.webp --wrap x",
@@ -340,7 +340,7 @@ def test_made_again_elsewhere_and_from_a_folder_that_moved(here: Path, capsys: C
 
 
 def test_what_changed_is_named(here: Path, capsys: Capture) -> None:
-    assert main(["complete", "in.png", "hole.png", "-o", "r.png", "-q"]) == 0
+    assert main(["inpaint", "in.png", "hole.png", "-o", "r.png", "-q"]) == 0
     whole = Path("r.png").read_bytes()
     io.write("r.png", io.read("r.png"))
     assert main(["rerun", "r.png"]) == 2

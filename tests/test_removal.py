@@ -13,8 +13,8 @@ import texrs
 from plane_checks import dress, look, look_at_room
 from texrs import Plane, View, io, planes
 from texrs.cli import main
-from texrs.completion._sides import share_out
 from texrs.errors import InvalidInput
+from texrs.inpainting._sides import share_out
 
 SIZE = (180, 240)
 PLANE = Plane(SIZE, 48, 90, fov=55)
@@ -265,9 +265,9 @@ MARKED[70:90, 60:90] = True
         (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: needs a texrs.View"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: nothing"),
-        (lambda: texrs.complete(FLOOR, MARKED, allowed=MARKED), "allowed: marks nothing"),
-        (lambda: texrs.complete(FLOOR, MARKED, allowed=~MARKED, method="optimise"), "allowed: is not for use"),
-        (lambda: texrs.complete(FLOOR, MARKED, allowed=~MARKED, exemplar=FLOOR), "allowed: is not for use"),
+        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=MARKED), "allowed: marks nothing"),
+        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, method="optimise"), "allowed: is not for use"),
+        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, exemplar=FLOOR), "allowed: is not for use"),
     ],
 )
 def test_what_cannot_be_done_gets_a_sentence(make: Callable[[], object], words: str) -> None:
@@ -278,7 +278,7 @@ def test_what_cannot_be_done_gets_a_sentence(make: Callable[[], object], words: 
 def test_patches_come_from_where_they_may() -> None:
     allowed = np.zeros(SIZE, bool)
     allowed[100:, :] = True
-    made = texrs.complete(FLOOR, MARKED, allowed=allowed)
+    made = texrs.inpaint(FLOOR, MARKED, allowed=allowed)
     assert (made.source.coordinates[MARKED][:, 0] >= 99.5).all()
 
 

@@ -53,7 +53,7 @@ def test_white_is_zero(here: Path) -> None:
     tifffile.imwrite("mask.tif", 255 - HOLE, photometric="miniswhite")
     Image.fromarray(HOLE).save("mask.png")
     for name in ("mask.tif", "mask.png"):
-        assert main(["complete", "pebbles.png", name, "-o", f"{name}.png", "-q"]) == 0
+        assert main(["inpaint", "pebbles.png", name, "-o", f"{name}.png", "-q"]) == 0
     assert np.array_equal(read("mask.tif.png"), read("mask.png.png"))
     assert np.array_equal(read("mask.tif.png")[HOLE == 0], PEBBLES[HOLE == 0])
     tifffile.imwrite("grey.tif", 65535 - GREY.astype(np.uint16) * 257, photometric="miniswhite")
@@ -152,12 +152,12 @@ def test_a_photograph_that_lies_on_its_side(here: Path) -> None:
     mask = np.zeros((64, 96), np.uint8)
     mask[10:30, 60:80] = 255
     Image.fromarray(mask).save("mask.png")
-    assert main(["complete", "photo.jpg", "mask.png", "-o", "made.png", "-q"]) == 0
+    assert main(["inpaint", "photo.jpg", "mask.png", "-o", "made.png", "-q"]) == 0
     upright, made = np.rot90(read("photo.jpg"), -1), read("made.png")
     assert made.shape == (64, 96, 3)
     assert np.array_equal(made[mask == 0], upright[mask == 0])
     assert (made != upright).any(axis=-1)[mask > 0].mean() > 0.9
-    assert main(["complete", "made.png", "mask.png", "-o", "again.jpg", "-q"]) == 0
+    assert main(["inpaint", "made.png", "mask.png", "-o", "again.jpg", "-q"]) == 0
     with Image.open("again.jpg") as opened:
         assert opened.getexif().get(0x0112, 1) == 1
 

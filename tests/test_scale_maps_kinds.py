@@ -138,23 +138,23 @@ def test_holes_are_filled_by_maps_of_either_kind(tmp_path, monkeypatch, capsys):
     hole[50:70, 40:60] = True
     plane = texrs.planes.find(floor.image)
     wide, areas = plane.scale_map(), plane.scale_map("area")
-    by_widths = texrs.complete(floor.image, hole, scale_map=wide)
+    by_widths = texrs.inpaint(floor.image, hole, scale_map=wide)
     # Arrays that do not say what they hold.
     one, other = np.array(wide), np.array(areas)
-    said = texrs.complete(floor.image, hole, scale_map=one, scale_kind="width")
+    said = texrs.inpaint(floor.image, hole, scale_map=one, scale_kind="width")
     np.testing.assert_array_equal(said.image, by_widths.image)
-    by_areas = texrs.complete(floor.image, hole, scale_map=areas)
+    by_areas = texrs.inpaint(floor.image, hole, scale_map=areas)
     np.testing.assert_array_equal(
-        texrs.complete(floor.image, hole, scale_map=other, scale_kind="area").image, by_areas.image
+        texrs.inpaint(floor.image, hole, scale_map=other, scale_kind="area").image, by_areas.image
     )
-    assert (by_areas.image != texrs.complete(floor.image, hole, scale_map=other, scale_kind="width").image).any()
+    assert (by_areas.image != texrs.inpaint(floor.image, hole, scale_map=other, scale_kind="width").image).any()
     with pytest.raises(InvalidInput, match="kind: allowed are width and area"):
-        texrs.complete(floor.image, hole, scale_map=one, scale_kind="length")
+        texrs.inpaint(floor.image, hole, scale_map=one, scale_kind="length")
     with pytest.raises(InvalidInput, match="kind: says what a scale map holds"):
-        texrs.complete(floor.image, hole, scale_kind="width")
+        texrs.inpaint(floor.image, hole, scale_kind="width")
     for name, values in (("floor.png", floor.image), ("hole.png", hole), ("map.npy", other)):
         io.write(name, values)
-    command = ["complete", "floor.png", "hole.png", "-o", "out.png", "--scale-map", "map.npy", "--scale-kind"]
+    command = ["inpaint", "floor.png", "hole.png", "-o", "out.png", "--scale-map", "map.npy", "--scale-kind"]
     assert main([*command, "area", "-q"]) == 0
     np.testing.assert_array_equal(io.read("out.png"), by_areas.image)
     assert main([*command, "length"]) == 2

@@ -170,14 +170,14 @@ def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):
     hole = np.zeros(scale.shape, bool)
     hole[40:90, 40:90] = True
     bare = np.where(hole[..., np.newaxis], 0, image).astype(np.uint8)
-    result = texrs.complete(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
+    result = texrs.inpaint(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
     at = np.rint(result.source.coordinates[hole]).astype(int)
     assert not hole[at[:, 0], at[:, 1]].any()
     # Seen in depth, what is copied is turned and sized; copies of squares are neither.
     assert np.abs(result.source.frames()[hole] - np.eye(2)).max() > 0.05
     with texrs.threads(1):
-        alone = texrs.complete(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
+        alone = texrs.inpaint(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
     assert alone.image.tobytes() == result.image.tobytes()
 
 

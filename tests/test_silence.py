@@ -75,10 +75,10 @@ def make_words(command: str, name: str, text: str) -> list[str]:
 
 def test_many_inputs_are_tried() -> None:
     assert {command for command, _ in FOLDERS} >= {
-        *("analyse", "batch", "complete", "design", "extend", "info", "paint", "perspective", "rectify", "remove"),
+        *("analyse", "batch", "inpaint", "design", "extend", "info", "paint", "perspective", "rectify", "remove"),
         *("self-splice", "splice", "synthesize", "tile", "tiles"),
     }
-    assert ("complete", "exemplar") in FOLDERS
+    assert ("inpaint", "exemplar") in FOLDERS
     assert {command for command, _ in POINTS} == {"analyse", "database"}
 
 

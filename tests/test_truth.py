@@ -79,7 +79,7 @@ def test_a_simpler_processor_gives_the_same_bytes():
     wide = [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
     if not wide:
         pytest.skip("NumPy knows nothing here that this processor could do without")
-    names = ("complete_with_a_scale_map", "perspective", "removed", "scale_maps_edited", "self_splice_made_regular")
+    names = ("inpaint_with_a_scale_map", "perspective", "removed", "scale_maps_edited", "self_splice_made_regular")
     chosen = " or ".join(f"{name}-1" for name in names)
     plain = {
         **os.environ,

@@ -20,7 +20,7 @@ CALLS = {
     "remove": "texrs.remove(image, image",
     "Plane": "texrs.Plane((32, 32), 45",
     "View": "texrs.View(",
-    "complete": "texrs.complete(image, image",
+    "inpaint": "texrs.inpaint(image, image",
     "blend": "texrs.blend(source, image, wrap=True",
     "analyse": "texrs.elements.analyse(image",
     "segment": "texrs.exemplar.segment(image",

@@ -40,14 +40,14 @@ def fill_by_texrs(given: Arrays) -> Work:
     """All that the verb does."""
     import texrs
 
-    return lambda: [texrs.complete(image, given["hole"]).image for image in given["images"]]
+    return lambda: [texrs.inpaint(image, given["hole"]).image for image in given["images"]]
 
 
 def fill_by_one_size(given: Arrays) -> Work:
     """With the size of patches given, as the others have one: by default several are tried, and the best is kept."""
     import texrs
 
-    return lambda: [texrs.complete(image, given["hole"], patch_size=GIVEN).image for image in given["images"]]
+    return lambda: [texrs.inpaint(image, given["hole"], patch_size=GIVEN).image for image in given["images"]]
 
 
 def fill_by_opencv(given: Arrays) -> Work:

@@ -16,7 +16,7 @@ const FORMATS: [Format; 5] = [
 ];
 const SAMPLES: [Sample; 4] = [Sample::U8, Sample::U16, Sample::F16, Sample::F32];
 
-/// Reads a file, and checks that the result is complete and within the limits.
+/// Reads a file, and checks that the result is inpaint and within the limits.
 fn read(file: &[u8], limit: u64) -> Option<Decoded> {
     let found = decode("file", file, limit).inspect_err(speaks).ok()?;
     let [rows, columns, channels] = found.shape;

@@ -2,7 +2,7 @@
 
 The verbs: `design` (many natural textures from one example), `splice` (the elements of one texture in the arrangement of
 another) and `self_splice` (in an edited one), `perspective` (elements as large as a map says), `solid` and `synthesize`
-(volumes and pictures grown under a frame field), `tile` (any picture made cyclic), `complete` (holes filled by example),
+(volumes and pictures grown under a frame field), `tile` (any picture made cyclic), `inpaint` (holes filled by example),
 `rectify` (the flat texture of a plane that was photographed aslant), `extend` (more of such a photograph), `remove` (something
 taken out of one) and `blend` (colours corrected so that seams disappear). Each returns a `Synthesis`, whose `SourceMap` looks
 anything that is in register with the exemplar up in the same way.

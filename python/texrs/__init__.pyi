@@ -22,12 +22,12 @@ from ._masks import Mask
 from ._threads import threads
 from ._version import __version__
 from .blending import blend
-from .completion import complete
 from .database import TextureDatabase
 from .elements import Elements
 from .exemplar import ElementOptions, Exemplar
 from .extension import extend
 from .growth.constraints import Constraints, Guide
+from .inpainting import inpaint
 from .materials import Material, apply
 from .papers.design import DeformationOptions, design, design_variants
 from .papers.perspective import perspective
@@ -67,7 +67,6 @@ __all__ = [
     "apply",
     "blend",
     "check_tiling",
-    "complete",
     "design",
     "design_variants",
     "elements",
@@ -75,6 +74,7 @@ __all__ = [
     "exemplar",
     "extend",
     "fields",
+    "inpaint",
     "io",
     "judging",
     "kernels",

@@ -100,7 +100,7 @@ def _take_whole(value: Any, name: str) -> Array:
     count = int(np.ma.getmaskarray(value).sum())
     if count:
         raise InvalidInput(
-            f"{name}: {count} of {value.size} values are masked, which is a hole: texrs.complete fills it, "
+            f"{name}: {count} of {value.size} values are masked, which is a hole: texrs.inpaint fills it, "
             "or value.filled(...) says what stands there"
         )
     return np.asarray(value.data)
@@ -137,7 +137,7 @@ def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
     if count:
         name = os.path.basename(path)
         ignore(
-            f"{name}: its nodata value {value:g} is not used, so {count} pixels count as data; texrs complete fills them"
+            f"{name}: its nodata value {value:g} is not used, so {count} pixels count as data; texrs inpaint fills them"
         )
 
 

@@ -80,7 +80,7 @@ class Mask:
     >>> wall = texrs.samples.load("bricks", size=(64, 64)).image
     >>> drawn = np.zeros((64, 64), np.uint8)
     >>> drawn[20:30, 20:30] = 255
-    >>> round(texrs.complete(wall, texrs.Mask(drawn, grow=3)).report["filled"], 3)
+    >>> round(texrs.inpaint(wall, texrs.Mask(drawn, grow=3)).report["filled"], 3)
     0.058
 
     """

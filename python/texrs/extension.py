@@ -16,8 +16,8 @@ from texrs._progress import answering, listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
-from texrs.completion._planes import LEAST, Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
+from texrs.inpainting._planes import LEAST, Part, add_rest, fill_parts
 from texrs.materials import Material
 from texrs.planes import Plane, View
 from texrs.planes._choose import as_views, find_grounds, follow_plane
@@ -65,7 +65,7 @@ def extend(
     boundary_width : int
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
     screening : float, optional
-        Weight of the values when the colours of what is added are corrected, as in `texrs.complete`; None or 0: no correction.
+        Weight of the values when the colours of what is added are corrected, as in `texrs.inpaint`; None or 0: no correction.
     light : bool
         Whether slow changes of light, as towards a window, are followed; beyond the photograph it stays as it is at the border.
     seed : int

@@ -1,6 +1,6 @@
 """Something taken out of a photograph: what is behind it is filled in, in the perspective of the plane that is seen there.
 
-Completion with everything on (`texrs.complete`): the plane is found in what is known of the ground, patches are copied from
+Completion with everything on (`texrs.inpaint`): the plane is found in what is known of the ground, patches are copied from
 the ground alone, each as large as things are there, and colours follow the light. What lies beyond the ground, as the sky
 above a floor, is filled from what is not ground; so is each of several planes from its own.
 """
@@ -18,8 +18,8 @@ from texrs._progress import answering, listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
-from texrs.completion._planes import Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
+from texrs.inpainting._planes import Part, add_rest, fill_parts
 from texrs.materials import Material
 from texrs.planes import Plane, View
 from texrs.planes._choose import as_views, find_grounds, follow_plane
@@ -68,9 +68,9 @@ def remove(
         Pixels around that which may change too, 0 to 64, so that seams run where they show least, between things; by default
         1/40 of the shorter side, of planes whose things lie apart 1/12. Only what seams run around changes.
     patch_size : int, optional
-        Side of the patches in pixels, as in `texrs.complete`.
+        Side of the patches in pixels, as in `texrs.inpaint`.
     screening : float, optional
-        Weight of the values when the colours of what is filled in are corrected, as in `texrs.complete`; None or 0: no
+        Weight of the values when the colours of what is filled in are corrected, as in `texrs.inpaint`; None or 0: no
         correction.
     light : bool
         Whether slow changes of light, as towards a window, are followed: they are divided out of what is copied, and those of

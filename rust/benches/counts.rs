@@ -5,7 +5,7 @@
 
 use texrs::appearance::Appearance;
 use texrs::coherence::{self, FEW, Kinds};
-use texrs::complete::{self, Canvas};
+use texrs::inpaint::{self, Canvas};
 use texrs::fixed::{Frames, ONE, Place, identity};
 use texrs::gather::{self, Interpolation, gather};
 use texrs::grid::{Grid, Region};
@@ -83,7 +83,7 @@ fn completion() {
     let free = |x: usize| x + patch <= side * 3 / 8 || x >= side * 5 / 8;
     let allowed = (0..side * side).map(|i| free(i / side) || free(i % side));
     let (index, mut colours) = (index(side, patch, Some(allowed.collect())), image(side, 0));
-    let options = complete::Options {
+    let options = inpaint::Options {
         patch: [patch; 2],
         pick: Pick::default(),
         seed: 0,
@@ -97,7 +97,7 @@ fn completion() {
         keep: None,
         channels: 3,
     };
-    measured(|| complete::complete(&mut canvas, &index, &options, &Monitor::default()).unwrap());
+    measured(|| inpaint::inpaint(&mut canvas, &index, &options, &Monitor::default()).unwrap());
 }
 
 fn seam() {
@@ -254,7 +254,7 @@ fn correction() {
 fn main() {
     let all: [(&str, fn()); 9] = [
         ("coherence", correction),
-        ("complete", completion),
+        ("inpaint", completion),
         ("gather", gathering),
         ("mean_shift", mean_shifting),
         ("patch_search", patch_search),

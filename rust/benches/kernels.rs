@@ -1,7 +1,7 @@
 //! The root of the criterion benchmarks. Each kernel has a group, and sizes and pools are ids.
 
 mod coherence;
-mod complete;
+mod inpaint;
 mod mean_shift;
 mod ncc;
 mod patch_search;
@@ -63,7 +63,7 @@ criterion_group!(
     benches,
     bench_gather,
     coherence::bench,
-    complete::bench,
+    inpaint::bench,
     mean_shift::bench,
     ncc::bench,
     patch_search::bench,

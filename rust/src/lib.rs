@@ -21,7 +21,7 @@
 //! |---|---|
 //! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
 //! | [`patch_search`] | exact best matches of a masked patch |
-//! | [`complete`] | exemplar-based filling of holes -> `seam`, `patch_search` |
+//! | [`inpaint`] | exemplar-based filling of holes -> `seam`, `patch_search` |
 //! | [`poisson`] | images reconstructed from their differences, near given values |
 //! | [`distance`] | signed distances to the outlines of labelled pieces |
 //! | [`warp`] | source coordinates of the pixels of warped images and moved shapes -> `gather` |
@@ -58,6 +58,6 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, quilt,
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    complete, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson,
+    inpaint, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson,
     reconstruction, regions, seam, smooth, sparse, warp,
 };

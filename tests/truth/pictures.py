@@ -129,7 +129,7 @@ def scale_maps_edited() -> Parts:
     return maps | seen
 
 
-# --- tile and complete -----------------------------------------------------------------------------------------------
+# --- tile and inpaint -----------------------------------------------------------------------------------------------
 
 
 @case
@@ -172,46 +172,46 @@ COMPLETED = ("filled", "replaced_outside", "patch_size", "patches")
 
 
 @case
-def complete_with_patches() -> Parts:
+def inpaint_with_patches() -> Parts:
     hole = box((128, 144), (40, 90), (50, 100)) | box((128, 144), (0, 30), (120, 144))
-    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, boundary_width=5, screening=0.003, seed=3)
+    result = texrs.inpaint(colour("pebbles", 128, 144, seed=4), hole, boundary_width=5, screening=0.003, seed=3)
     return parts_of(result, report=COMPLETED, stages=("known", "patches", "composite"))
 
 
 @case
-def complete_what_is_transparent() -> Parts:
+def inpaint_what_is_transparent() -> Parts:
     image = clear("weave", 96, 96).copy()
     image[box(image.shape[:2], (70, 96), (20, 60)), 3] = 0
     return parts_of(
-        texrs.complete(image, texrs.Mask("alpha", threshold=1), wrap=True, allow_mirror=False, patch_size=12),
+        texrs.inpaint(image, texrs.Mask("alpha", threshold=1), wrap=True, allow_mirror=False, patch_size=12),
         report=COMPLETED,
     )
 
 
 @case
-def complete_by_optimising() -> Parts:
+def inpaint_by_optimising() -> Parts:
     hole = box((112, 112), (30, 80), (30, 80))
-    result = texrs.complete(deep("bark", 112, 112), hole, method="optimise", seed=5, wrap=(True, False))
+    result = texrs.inpaint(deep("bark", 112, 112), hole, method="optimise", seed=5, wrap=(True, False))
     return parts_of(result, report=("filled", "levels"))
 
 
 @case
-def complete_with_a_scale_map() -> Parts:
+def inpaint_with_a_scale_map() -> Parts:
     floor = sample("tilted_discs", 128, 128, seed=1)
     hole = box((128, 128), (50, 100), (40, 90))
     scale = np.where(hole, np.nan, floor.scale_map)
     parts: dict[str, object] = {}
     for method, given in (("patch", scale), ("optimise", "auto")):
-        found = parts_of(texrs.complete(floor.image, hole, scale_map=given, method=method), report=("filled",))
+        found = parts_of(texrs.inpaint(floor.image, hole, scale_map=given, method=method), report=("filled",))
         parts |= {f"{method} {name}": part for name, part in found.items()}
     return parts
 
 
 @case
-def complete_with_a_source() -> Parts:
+def inpaint_with_a_source() -> Parts:
     hole = box((96, 112), (20, 70), (30, 80))
     other = floats("pebbles", 80, 96, seed=5)
-    result = texrs.complete(floats("grit", 96, 112), hole, exemplar=other, screening=0.001, boundary_width=2, seed=1)
+    result = texrs.inpaint(floats("grit", 96, 112), hole, exemplar=other, screening=0.001, boundary_width=2, seed=1)
     return parts_of(result, report=COMPLETED, stages=("patches", "composite"))
 
 

@@ -33,7 +33,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "tiles": "Cut corner tiles from designs: an endless texture, of which any window is looked up.",
         "tile": "Make a picture tileable, so that copies side by side have no edge between them.",
         "check": "Test whether a picture tiles along each axis, and how bold its borders are.",
-        "complete": "Fill a hole in a picture with patches of what is known of it, or of another picture.",
+        "inpaint": "Fill a hole in a picture with patches of what is known of it, or of another picture.",
         "extend": "Make a photograph of a plane larger, on any side, in the same perspective.",
         "rectify": "Make the flat texture of a plane that was photographed aslant.",
         "remove": "Take something out of a photograph, and fill in the plane behind it in its perspective.",

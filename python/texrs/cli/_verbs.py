@@ -47,7 +47,7 @@ from texrs.synthesis import Synthesis
 # --- the verbs -------------------------------------------------------------------------------------------------------
 
 NAMES = (
-    "complete",
+    "inpaint",
     "design",
     "extend",
     "perspective",
@@ -67,15 +67,15 @@ GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemp
 def make_verb(name: str) -> Verb:
     """Return the verb of a name; its function is imported now."""
     match name:
-        case "complete":
-            from texrs.completion import complete
+        case "inpaint":
+            from texrs.inpainting import inpaint
 
             kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
             names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
             arguments, marked = {"image": UNKNOWN, "hole.marks": HOLE}, names | {"hole.marks": "hole"}
-            flat = Options(complete, arguments=arguments, kinds=kinds, names=marked, optional={"marks": ""})
+            flat = Options(inpaint, arguments=arguments, kinds=kinds, names=marked, optional={"marks": ""})
             deep = Options(
-                complete,
+                inpaint,
                 arguments={**arguments, "image": UNKNOWN_VOLUME},
                 kinds=kinds,
                 names=marked,

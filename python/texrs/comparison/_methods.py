@@ -22,8 +22,8 @@ import numpy as np
 from texrs import io
 from texrs._typing import Array
 from texrs.comparison._results import Request
-from texrs.completion import complete
 from texrs.errors import TexrsError
+from texrs.inpainting import inpaint
 from texrs.papers.design import design
 from texrs.papers.solid import synthesize
 from texrs.tiling import tile
@@ -136,7 +136,7 @@ def blend_borders(module: Any, asked: Request) -> Array:
     return np.asarray(module.image_to_seamless(Image.fromarray(asked.picture), overlap=0.2).convert("RGB"))
 
 
-def inpaint(flag: str, cv2: Any, asked: Request) -> Array:
+def continue_colours(flag: str, cv2: Any, asked: Request) -> Array:
     """Let OpenCV continue the colours at the border of the hole inwards."""
     assert asked.hole is not None
     made: Array = cv2.inpaint(asked.picture, asked.hole.astype(np.uint8), 5, getattr(cv2, flag))
@@ -190,17 +190,15 @@ METHODS = (
     Method("as it is", "tile", always(lambda a: a.picture)),
     Method("texrs tile", "tile", always(lambda a: tile(a.picture).image)),
     Method("img2texture", "tile", find_module("img2texture", blend_borders), "pip install img2texture"),
+    Method("texrs inpaint", "hole", always(lambda a: inpaint(a.picture, a.hole, boundary_width=4, seed=a.seed).image)),
     Method(
-        "texrs complete", "hole", always(lambda a: complete(a.picture, a.hole, boundary_width=4, seed=a.seed).image)
-    ),
-    Method(
-        "texrs complete, optimised",
+        "texrs inpaint, optimised",
         "hole",
-        always(lambda a: complete(a.picture, a.hole, method="optimise", seed=a.seed).image),
+        always(lambda a: inpaint(a.picture, a.hole, method="optimise", seed=a.seed).image),
     ),
     Method("scikit-image biharmonic", "hole", always(smooth)),
-    Method("OpenCV Telea", "hole", find_module("cv2", partial(inpaint, "INPAINT_TELEA")), OPENCV),
-    Method("OpenCV Navier-Stokes", "hole", find_module("cv2", partial(inpaint, "INPAINT_NS")), OPENCV),
+    Method("OpenCV Telea", "hole", find_module("cv2", partial(continue_colours, "INPAINT_TELEA")), OPENCV),
+    Method("OpenCV Navier-Stokes", "hole", find_module("cv2", partial(continue_colours, "INPAINT_NS")), OPENCV),
     Method("OpenCV shift maps", "hole", find_module("cv2.xphoto", shift_maps), XPHOTO),
     Method("PyPatchMatch", "hole", find_module("patch_match", match_patches), PATCH_MATCH),
     Method("Embark texture-synthesis", "hole", find_program("embark", partial(run_embark, False)), EMBARK),

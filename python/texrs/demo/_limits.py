@@ -7,8 +7,8 @@ from skimage import data
 
 from texrs import samples
 from texrs._html import card, cards, code, figure
-from texrs.completion import complete
 from texrs.demo._workshop import Section, Workshop
+from texrs.inpainting import inpaint
 from texrs.papers.design import design
 
 SIDE = 192
@@ -24,10 +24,10 @@ def _fail(workshop: Workshop) -> str:
     workshop.watch(1 / 3)
     scattered = design(scene, SIDE, seed=1).image
     workshop.watch(2 / 3)
-    filled = complete(floor.image, hole, scale_map=np.asarray(floor.scale_map, np.float32), seed=3).image
+    filled = inpaint(floor.image, hole, scale_map=np.asarray(floor.scale_map, np.float32), seed=3).image
     return code(
         "texrs design scene.png -o result.png --seed 1\n"
-        "texrs complete floor.png hole.png -o filled.png --scale-map scale.npy --seed 3"
+        "texrs inpaint floor.png hole.png -o filled.png --scale-map scale.npy --seed 3"
     ) + cards(
         [
             card(

@@ -6,8 +6,8 @@ import numpy as np
 
 from texrs._html import card, cards, code, figure, pair, row
 from texrs._typing import Bools
-from texrs.completion import complete
 from texrs.demo._workshop import Section, Workshop, load_sample
+from texrs.inpainting import inpaint
 from texrs.tiling import tile
 
 SIDE = 192
@@ -36,15 +36,15 @@ def _tile(workshop: Workshop) -> str:
     return code("texrs tile photograph.jpg -o tile.png") + "".join(rows)
 
 
-def _complete(workshop: Workshop) -> str:
+def _inpaint(workshop: Workshop) -> str:
     pictures = []
     for i, (name, caption) in enumerate(FILLED):
         workshop.watch(i / len(FILLED))
         picture = load_sample(name, SIDE).image
-        made = complete(picture, mark_scratches((SIDE, SIDE)))
+        made = inpaint(picture, mark_scratches((SIDE, SIDE)))
         filled = figure(made.image, "Filled", note=f"{made.report['patches']} patches")
         pictures.append(card([figure(made.stages["known"], f"{caption}, with holes")], filled))
-    return code("texrs complete picture.png holes.png -o whole.png") + cards(pictures)
+    return code("texrs inpaint picture.png holes.png -o whole.png") + cards(pictures)
 
 
 def mark_scratches(shape: tuple[int, int]) -> Bools:
@@ -63,8 +63,8 @@ TILE = Section(
     _tile,
 )
 COMPLETE = Section(
-    "complete",
+    "inpaint",
     "Holes filled by example",
     "Patches of what is around, each cut in where it shows least. Nothing outside the hole changes.",
-    _complete,
+    _inpaint,
 )

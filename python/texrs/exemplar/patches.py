@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
 from texrs.exemplar.symmetry import Flip, flip, flip_coordinates, flip_frame
-from texrs.kernels.complete import Completion
+from texrs.kernels.inpaint import Inpainting
 from texrs.kernels.patch_search import PatchIndex
 
 __all__ = ["choose_usual_side", "index_patches", "mark_corners", "place_patches"]
@@ -42,13 +42,13 @@ def index_patches(
 
 
 def place_patches(
-    found: Completion, mirrors: Sequence[Flip], shape: tuple[int, int]
+    found: Inpainting, mirrors: Sequence[Flip], shape: tuple[int, int]
 ) -> tuple[tuple[NDArray[np.intp], ...], Floats, list[Floats]]:
     """Return what patches fill, and where that comes from in an exemplar of which some lie in mirror images.
 
     Parameters
     ----------
-    found : Completion
+    found : Inpainting
         Made with an index of the mirror images.
     mirrors : sequence of (bool, bool)
         The mirror images, as in the index.

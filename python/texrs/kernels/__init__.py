@@ -4,8 +4,8 @@ Each is a noun of the literature and knows nothing of the papers that use it.
 """
 
 from texrs.kernels import (
-    complete,
     gather,
+    inpaint,
     mean_shift,
     ncc,
     patch_search,
@@ -18,8 +18,8 @@ from texrs.kernels import (
 )
 
 __all__ = [
-    "complete",
     "gather",
+    "inpaint",
     "mean_shift",
     "ncc",
     "patch_search",

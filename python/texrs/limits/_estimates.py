@@ -55,7 +55,7 @@ COSTS: dict[str, dict[str | None, Cost]] = {
     "solid": {None: Cost(0, 300, 59, field=40), "fast": Cost(0, 50, 56, field=40)},
     "synthesize": {None: Cost(0, 268, 52, field=22), "fast": Cost(0, 230, 62, field=22)},
     "tile": {None: Cost(0, 40, 80, fixed=6e6)},
-    "complete": {None: Cost(0, 0, 60, fixed=14e6)},
+    "inpaint": {None: Cost(0, 0, 60, fixed=14e6)},
     "extend": {None: Cost(0, 0, 384, fixed=20e6)},
     "rectify": {None: Cost(0, 0, 78, fixed=12e6)},
     "remove": {None: Cost(0, 0, 360, fixed=16e6)},
@@ -79,7 +79,7 @@ def memory(
     Parameters
     ----------
     verb : str
-        Its name: design, splice, self_splice, perspective, solid, synthesize, tile, complete, extend, rectify, remove,
+        Its name: design, splice, self_splice, perspective, solid, synthesize, tile, inpaint, extend, rectify, remove,
         analyse (`texrs.elements.analyse`), or TileSet (`texrs.TileSet`).
     exemplar : sequence of int, or a sequence of them
         Shape of the example, (H, W), (H, W, C), or for solid (D, H, W[, C]); of several their shapes.

@@ -48,7 +48,7 @@ SHOWN = 512
 class Material(Exports):
     """Maps in register, by name, such as the albedo, the normals and the heights of one surface.
 
-    A material goes wherever an example goes: `texrs.design`, `texrs.tile`, `texrs.complete` and all other verbs decide on what
+    A material goes wherever an example goes: `texrs.design`, `texrs.tile`, `texrs.inpaint` and all other verbs decide on what
     its maps tell together (`guide`), and look every map up through the one source map, so that all stay in register: colours
     and heights are blended, normals turned and brought back to unit length, labels and masks never mixed.
 

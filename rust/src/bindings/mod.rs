@@ -3,7 +3,7 @@
 
 mod appearance;
 mod coherence;
-mod complete;
+mod inpaint;
 mod distance;
 mod gather;
 mod hash;
@@ -127,7 +127,7 @@ mod _rust {
     #[pymodule_export]
     use super::coherence::{cohere, jitter, similar};
     #[pymodule_export]
-    use super::complete::complete;
+    use super::inpaint::inpaint;
     #[pymodule_export]
     use super::distance::outlines;
     #[pymodule_export]

@@ -1,7 +1,7 @@
 //! Algorithms of the literature. Each can be used on its own and does not depend on the methods
 //! that use it.
 
-pub mod complete;
+pub mod inpaint;
 pub mod distance;
 pub mod gather;
 pub mod image_io;

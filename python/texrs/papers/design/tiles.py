@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from texrs._typing import Bools
 from texrs.exemplar.patches import place_patches
 from texrs.exemplar.symmetry import flip, flip_coordinates, flip_frame
-from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
+from texrs.kernels.inpaint import inpaint
 from texrs.papers.design.canvas import Draft, Tile
 from texrs.papers.design.plan import Plan
 from texrs.source_map import SourceMap
@@ -50,7 +50,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
     label = draft.label
     frames: list[NDArray[np.floating]] = [flip_frame(draft.mirror) @ f for f in draft.frames]
     if holes.any():
-        filled = complete(
+        filled = inpaint(
             draft.colours,
             draft.covered,
             plan.index,

@@ -22,7 +22,7 @@ from texrs.exemplar.analysis import COARSEST
 from texrs.exemplar.patches import mark_corners
 from texrs.growth import from_draft, grow
 from texrs.growth.constraints import Asked
-from texrs.kernels.complete import complete
+from texrs.kernels.inpaint import inpaint
 from texrs.kernels.patch_search import PatchIndex
 
 __all__ = ["Draft", "Refinement", "correct_draft", "fill", "fill_with_patches", "refine_places"]
@@ -136,7 +136,7 @@ def fill_with_patches(
         known, colours[hidden] = known | hidden, guide[ground].mean(axis=0)
         if known.all():
             return replace(draft, known=known)
-    filled = complete(
+    filled = inpaint(
         colours,
         known,
         PatchIndex([guide], allowed=[allowed], max_patch=side),

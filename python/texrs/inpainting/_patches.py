@@ -13,11 +13,11 @@ import numpy as np
 
 from texrs._arrays import as_image, guidance, log_single
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.completion._judge import Filled, judge_seams
-from texrs.completion._scene import Scene
 from texrs.errors import InvalidInput
 from texrs.exemplar.patches import choose_usual_side, mark_corners
 from texrs.exemplar.symmetry import ALL, NONE, SUSPECT, Flip, find_mirrors
+from texrs.inpainting._judge import Filled, judge_seams
+from texrs.inpainting._scene import Scene
 from texrs.source_map import SourceMap
 
 SCALED = np.float32(2.0)
@@ -96,9 +96,9 @@ def fill_with_patches(
         # Where scales differ, those within a large patch do too.
         side = list_sides(scene, choose_usual_side(min(free.shape)), (1.0,))[0]
     else:
-        side, tried, made = try_sides(scene, mirrors, seed, lambda share: watch("complete", 0.5 * share))
+        side, tried, made = try_sides(scene, mirrors, seed, lambda share: watch("inpaint", 0.5 * share))
     if made is None:
-        made = scene.fill(side, mirrors, seed, lambda share: watch("complete", 0.5 + 0.5 * share))
+        made = scene.fill(side, mirrors, seed, lambda share: watch("inpaint", 0.5 + 0.5 * share))
     new = np.nonzero(made.label)
     corner = np.array([p.start for p in part], np.float32)
     source = map_untouched(shapes)

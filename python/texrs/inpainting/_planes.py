@@ -1,7 +1,7 @@
 """Holes in pictures of several planes: each is filled in by itself, from what is seen of it, and as it is seen.
 
 What is none of the planes, as the sky above a floor, goes on behind them as it lies. Where two meet in a hole neither sees the
-other: both are filled in a little further than they show, and cut where one ends (`texrs.completion._sides`).
+other: both are filled in a little further than they show, and cut where one ends (`texrs.inpainting._sides`).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from texrs._arrays import guidance
 from texrs._light import divide_out, measure_lights
 from texrs._masks import widen
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.completion._fill import fill
-from texrs.completion._holes import paint_over
-from texrs.completion._patches import choose_mirrors
-from texrs.completion._sides import share_out
 from texrs.exemplar.symmetry import NONE
+from texrs.inpainting._fill import fill
+from texrs.inpainting._holes import paint_over
+from texrs.inpainting._patches import choose_mirrors
+from texrs.inpainting._sides import share_out
 from texrs.planes import Plane
 from texrs.scale_maps._plane import LEVEL
 from texrs.scale_maps._plane import Plane as Slope

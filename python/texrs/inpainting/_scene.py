@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from texrs._typing import Bools, Floats
-from texrs.completion._judge import Filled
 from texrs.exemplar.patches import index_patches, place_patches
 from texrs.exemplar.symmetry import Flip
-from texrs.kernels.complete import complete as fill
+from texrs.inpainting._judge import Filled
+from texrs.kernels.inpaint import inpaint as fill
 from texrs.kernels.patch_search import PatchIndex
 
 

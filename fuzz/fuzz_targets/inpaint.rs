@@ -4,7 +4,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use texrs::complete::{Canvas, Options, complete};
+use texrs::inpaint::{Canvas, Options, inpaint};
 use texrs::grid::Grid;
 use texrs::patch_search::{Exemplar, Index, Pick};
 use texrs_fuzz::{Draw, agreed, speaks};
@@ -63,7 +63,7 @@ fuzz_target!(|bytes: &[u8]| {
             keep: keep.as_deref(),
             channels,
         };
-        let done = complete(&mut canvas, &index, &options, monitor)?;
+        let done = inpaint(&mut canvas, &index, &options, monitor)?;
         Ok((colours, known, done))
     });
     let Some((filled, all, done)) = found else {

@@ -14,7 +14,7 @@ from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.kernels.patch_search import PatchIndex
 
-__all__ = ["Completion", "complete"]
+__all__ = ["Inpainting", "inpaint"]
 
 
 def __dir__() -> list[str]:
@@ -22,7 +22,7 @@ def __dir__() -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Completion:
+class Inpainting:
     """A picture without holes, and where its new pixels come from.
 
     Attributes
@@ -39,12 +39,12 @@ class Completion:
     Examples
     --------
     >>> import numpy as np
-    >>> from texrs.kernels.complete import complete
+    >>> from texrs.kernels.inpaint import inpaint
     >>> from texrs.kernels.patch_search import PatchIndex
     >>> stripes = np.tile(np.float32([0, 0, 1, 1]), (24, 6))[..., np.newaxis]
     >>> known = np.ones((24, 24), bool)
     >>> known[8:14, 9:16] = False
-    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch_size=12)
+    >>> filled = inpaint(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch_size=12)
     >>> filled.label.shape, int(filled.label[0, 0]), bool((filled.label[~known] >= 0).all())
     ((24, 24), -1, True)
 
@@ -56,7 +56,7 @@ class Completion:
     coordinates: Floats
 
 
-def complete(
+def inpaint(
     colours: Array,
     known: Bools,
     index: PatchIndex,
@@ -71,7 +71,7 @@ def complete(
     paper: bool = False,
     shown: int | None = None,
     progress: Callable[[float], object] | None = None,
-) -> Completion:
+) -> Inpainting:
     """Return a picture whose unknown pixels are filled from the hole boundary inwards, patch by patch.
 
     At each step: good matches of the known pixels in a window on the boundary [1]_, less those that would repeat or
@@ -112,7 +112,7 @@ def complete(
 
     Returns
     -------
-    Completion
+    Inpainting
         The filled picture and its sources.
 
     Raises
@@ -135,7 +135,7 @@ def complete(
     >>> stripes = np.tile(np.float32([0, 0, 1, 1]), (24, 6))[..., np.newaxis]
     >>> known = np.ones((24, 24), bool)
     >>> known[8:14, 9:16] = False
-    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch_size=12)
+    >>> filled = inpaint(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch_size=12)
     >>> bool((filled.colours == stripes).all())
     True
 
@@ -175,4 +175,4 @@ def complete(
     of = patches[label[new]]
     for axis, (at, length) in enumerate(zip(new, mask.shape, strict=True)):
         coordinates[..., axis][new] = (at - of[:, 3 + axis]) % length + of[:, 1 + axis]
-    return Completion(filled, label, patches[:, 0], coordinates)
+    return Inpainting(filled, label, patches[:, 0], coordinates)

@@ -19,15 +19,15 @@ from texrs._engine.pyramid import ONE, Region
 from texrs._masks import as_marks, widen
 from texrs._progress import answering, stage
 from texrs._typing import Array, Bools, Progress
-from texrs.completion._holes import find_hole
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.growth.start import OVERLAP, weights_of
+from texrs.inpainting._holes import find_hole
 from texrs.io._grids import holds_volume
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
-__all__ = ["complete_volume", "is_volume"]
+__all__ = ["inpaint_volume", "is_volume"]
 
 LEAST = 16
 """Least side of a volume, in voxels."""
@@ -66,7 +66,7 @@ def is_volume(image: object, hole: object) -> bool:
     return len(shape) == 3 and shape[2] > MOST_CHANNELS and not flat
 
 
-def complete_volume(
+def inpaint_volume(
     image: Array | Exemplar,
     hole: object,
     *,
@@ -76,14 +76,14 @@ def complete_volume(
     seed: int,
     progress: Progress | None,
 ) -> Synthesis:
-    """Fill a hole in a volume; see `texrs.complete`."""
+    """Fill a hole in a volume; see `texrs.inpaint`."""
     volume, hole_ = check_volume(image.image if isinstance(image, Exemplar) else image, hole)
     shape, labels = hole_.shape, image._labels if isinstance(image, Exemplar) else None
     width, number = as_int(boundary_width, "boundary_width", 0, 1024), as_seed(seed)
     weight = None if screening is None else as_float(screening, "screening", 0, 1e6)
     side = None if patch_size is None else as_int(patch_size, "patch_size", 6, min(shape))
     watch = progress or (lambda stage, share: None)
-    watch("complete", 0.0)
+    watch("inpaint", 0.0)
     source, count, seams, side = SourceMap.identity(shape), 0, 0.0, side or 0
     labelled = False
     composite = result = volume.copy()

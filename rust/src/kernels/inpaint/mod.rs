@@ -77,7 +77,7 @@ pub struct Patch {
 
 /// The pasted patches and their pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Completion {
+pub struct Inpainting {
     /// Number of the patch that each pixel of the canvas comes from, or -1 if no patch was pasted
     /// there.
     pub label: Vec<i32>,
@@ -100,12 +100,12 @@ pub struct Canvas<'a> {
 }
 
 /// Fills every hole of the canvas with patches of the exemplars.
-pub fn complete(
+pub fn inpaint(
     canvas: &mut Canvas<'_>,
     index: &Index,
     options: &Options,
     monitor: &Monitor,
-) -> Result<Completion> {
+) -> Result<Inpainting> {
     let [rows, columns] = canvas.grid.shape();
     let Options { patch, paper, .. } = *options;
     // Check the arguments.
@@ -162,7 +162,7 @@ pub fn complete(
         return Err(Error::value("shown", message));
     }
     // Prepare the search, the stitchers and the order of holes.
-    let mut result = Completion {
+    let mut result = Inpainting {
         label: vec![-1; canvas.grid.len()],
         patches: Vec::new(),
     };

@@ -1,4 +1,4 @@
-"""texrs.complete with scale maps and by optimisation."""
+"""texrs.inpaint with scale maps and by optimisation."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def hole_in(shape, *boxes):
 
 def fill(image, hole, *, seed=1, **options):
     bare = np.where(hole[..., np.newaxis] if image.ndim == 3 else hole, 0, image).astype(image.dtype)
-    return texrs.complete(bare, hole, seed=seed, **options)
+    return texrs.inpaint(bare, hole, seed=seed, **options)
 
 
 @pytest.mark.parametrize("method", ["patch", "optimise"])
@@ -112,7 +112,7 @@ def test_all_of_a_picture_from_another():
     other, theirs = checks.floor((96, 96))
     image, everything = np.zeros((64, 80, 3), np.uint8), np.ones((64, 80), bool)
     ramp = np.linspace(0.7, 1.5, 64, dtype=np.float32)[:, np.newaxis].repeat(80, axis=1)
-    result = texrs.complete(
+    result = texrs.inpaint(
         image, everything, exemplar=other, scale_map=ramp, exemplar_scale_map=theirs, method="optimise", screening=1e-4
     )
     assert result.source.exemplar.all()
@@ -123,13 +123,13 @@ def test_transparency_is_the_hole(floor):
     image, _ = floor
     hole = hole_in(image.shape[:2], (50, 90, 50, 100))
     alpha = np.where(hole, 0, 255).astype(np.uint8)
-    result = texrs.complete(np.dstack([image, alpha]), "alpha", seed=1)
+    result = texrs.inpaint(np.dstack([image, alpha]), "alpha", seed=1)
     np.testing.assert_array_equal(result.image[..., :3], fill(image, hole).image)
     assert (result.image[..., 3] == 255).all()
     with pytest.raises(InvalidInput, match="hole: no pixel of the image is transparent"):
-        texrs.complete(result.image, "alpha")
+        texrs.inpaint(result.image, "alpha")
     with pytest.raises(FileError, match="hole: beta: there is no such file"):
-        texrs.complete(result.image, "beta")
+        texrs.inpaint(result.image, "beta")
 
 
 @pytest.mark.parametrize("method", ["patch", "optimise"])
@@ -218,12 +218,12 @@ def test_bad_input_is_named(options, sentence):
     hole = hole_in((64, 64), (20, 30, 20, 30))
     image = np.random.default_rng(0).integers(0, 255, (64, 64), np.uint8)
     with pytest.raises(InvalidInput, match=sentence):
-        texrs.complete(image, options.pop("hole", hole), **options)
+        texrs.inpaint(image, options.pop("hole", hole), **options)
 
 
 def test_pictures_without_an_axis_of_channels_are_filled_in_perspective():
     floor = texrs.samples.tilted_discs((96, 96)).image
     hole = np.zeros((96, 96), bool)
     hole[40:60, 40:60] = True
-    made = texrs.complete(floor[..., 0], hole, scale_map="auto")
-    assert np.array_equal(made.image, texrs.complete(floor[..., :1], hole, scale_map="auto").image[..., 0])
+    made = texrs.inpaint(floor[..., 0], hole, scale_map="auto")
+    assert np.array_equal(made.image, texrs.inpaint(floor[..., :1], hole, scale_map="auto").image[..., 0])

@@ -50,7 +50,7 @@ def test_a_hole_has_no_step_at_its_border(name: str) -> None:
     hole = make_ball(volume.shape[:3], 9)
     given = volume.copy()
     given[hole] = 7
-    result = texrs.complete(given, hole, seed=3)
+    result = texrs.inpaint(given, hole, seed=3)
     assert (result.image[~hole] == volume[~hole]).all()
     assert measure_step(result.image, hole) <= 1.2
     assert result.image.dtype == volume.dtype
@@ -59,26 +59,26 @@ def test_a_hole_has_no_step_at_its_border(name: str) -> None:
     places = np.rint(result.source.coordinates).astype(int)
     assert not hole[tuple(np.moveaxis(places, -1, 0))].any()
     # What was in the hole does not matter.
-    assert (texrs.complete(volume, hole, seed=3).image == result.image).all()
+    assert (texrs.inpaint(volume, hole, seed=3).image == result.image).all()
 
 
 def test_labels_are_not_mixed() -> None:
     labels = (make_noise() // 52).astype(np.uint8) * 50
     hole = make_ball(labels.shape, 8)
-    result = texrs.complete(labels, hole)
+    result = texrs.inpaint(labels, hole)
     assert result.report["labels"]
     assert result.report["screening"] == 0
     assert set(np.unique(result.image)) <= set(np.unique(labels[~hole]))
     with pytest.raises(InvalidInput, match="screening: labels cannot be mixed"):
-        texrs.complete(labels, hole, screening=0.1)
+        texrs.inpaint(labels, hole, screening=0.1)
 
 
 def test_the_correction_can_be_left_out() -> None:
     volume = make_noise()
     hole = make_ball(volume.shape, 8)
-    plain = texrs.complete(volume, hole, screening=0)
+    plain = texrs.inpaint(volume, hole, screening=0)
     assert (plain.image == plain.stages["composite"]).all()
-    assert (texrs.complete(volume, hole).stages["composite"] == plain.image).all()
+    assert (texrs.inpaint(volume, hole).stages["composite"] == plain.image).all()
 
 
 def test_known_voxels_change_within_the_boundary_alone() -> None:
@@ -86,7 +86,7 @@ def test_known_voxels_change_within_the_boundary_alone() -> None:
 
     volume = make_noise()
     hole = make_ball(volume.shape, 8)
-    result = texrs.complete(volume, hole, boundary_width=3)
+    result = texrs.inpaint(volume, hole, boundary_width=3)
     far = distance_transform_edt(~hole) > 3
     assert (result.image[far] == volume[far]).all()
     assert result.report["replaced_outside"] > 0
@@ -96,9 +96,9 @@ def test_threads_do_not_change_a_voxel() -> None:
     volume = make_noise()
     hole = make_ball(volume.shape, 7)
     with texrs.threads(1):
-        one = texrs.complete(volume, hole, seed=5).image
+        one = texrs.inpaint(volume, hole, seed=5).image
     with texrs.threads(3):
-        several = texrs.complete(volume, hole, seed=5).image
+        several = texrs.inpaint(volume, hole, seed=5).image
     np.testing.assert_array_equal(one, several)
 
 
@@ -108,7 +108,7 @@ def test_holes_of_any_shape() -> None:
     corner[:10, :12, 30:] = True
     specks = np.random.default_rng(2).random(volume.shape) < 0.002
     for hole in (corner, specks, corner | specks):
-        result = texrs.complete(volume, hole, screening=0)
+        result = texrs.inpaint(volume, hole, screening=0)
         assert (result.image[~hole] == volume[~hole]).all()
         assert ((result.source.label > 0) == hole).all()
 
@@ -133,7 +133,7 @@ def test_holes_of_any_shape() -> None:
 def test_refusals(options: dict[str, object], says: str) -> None:
     given = {"image": make_noise(), "hole": make_ball((40, 40, 40), 8)} | options
     with pytest.raises(InvalidInput, match=says):
-        texrs.complete(**given)
+        texrs.inpaint(**given)
 
 
 def test_the_command_fills_volumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -142,8 +142,8 @@ def test_the_command_fills_volumes(tmp_path: Path, capsys: pytest.CaptureFixture
     io.write_volume(tmp_path / "scan.nrrd", np.where(hole, 0, volume).astype(np.uint8), spacing=(3, 1, 0.5))
     io.write_volume(tmp_path / "hole.nrrd", hole.astype(np.uint8))
     names = [str(tmp_path / name) for name in ("scan.nrrd", "hole.nrrd", "filled.nrrd")]
-    assert main(["complete", names[0], names[1], "-o", names[2], "-q"]) == 0, capsys.readouterr().err
-    np.testing.assert_array_equal(io.read_volume(names[2]), texrs.complete(volume, hole).image)
+    assert main(["inpaint", names[0], names[1], "-o", names[2], "-q"]) == 0, capsys.readouterr().err
+    np.testing.assert_array_equal(io.read_volume(names[2]), texrs.inpaint(volume, hole).image)
     assert io.read_spacing(names[2]) == (3, 1, 0.5)
-    assert main(["complete", names[0], names[1], "-o", names[2], "--wrap", "x", "-q"]) == 2
+    assert main(["inpaint", names[0], names[1], "-o", names[2], "--wrap", "x", "-q"]) == 2
     assert "--wrap: is for pictures; leave it out for a volume" in capsys.readouterr().err

@@ -1,14 +1,14 @@
 //! Filling a hole of a quarter of the side, with pools of one and two threads.
 
 use criterion::{BenchmarkId, Criterion};
-use texrs::complete::{Canvas, Options, complete};
+use texrs::inpaint::{Canvas, Options, inpaint};
 use texrs::grid::Grid;
 use texrs::hash::Noise;
 use texrs::par::{self, Monitor};
 use texrs::patch_search::{Exemplar, Index, Pick};
 
 pub(crate) fn bench(c: &mut Criterion) {
-    let mut group = c.benchmark_group("complete");
+    let mut group = c.benchmark_group("inpaint");
     group.sample_size(10);
     for (side, patch) in [(128usize, 21usize), (256, 32), (512, 32)] {
         let noise = Noise::new(1);
@@ -64,7 +64,7 @@ pub(crate) fn bench(c: &mut Criterion) {
                         };
                         let monitor = Monitor::default();
                         par::install(threads, || {
-                            complete(&mut canvas, &index, &options, &monitor).unwrap()
+                            inpaint(&mut canvas, &index, &options, &monitor).unwrap()
                         })
                         .unwrap()
                     });

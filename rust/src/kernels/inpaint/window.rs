@@ -1,6 +1,6 @@
 //! The window of the canvas that is being filled: its known pixels, and the cut of a match into it.
 
-use super::{Canvas, Completion, FAR_WEIGHT, FLAT, KEPT_WEIGHT, Patch};
+use super::{Canvas, Inpainting, FAR_WEIGHT, FLAT, KEPT_WEIGHT, Patch};
 use crate::Result;
 use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
@@ -216,7 +216,7 @@ impl Window {
         found: &Match,
         taken: &[bool],
         to: [usize; 2],
-        result: &mut Completion,
+        result: &mut Inpainting,
     ) -> Vec<usize> {
         let n = self.channels;
         let new = copy(index, found, self.shape);

@@ -13,9 +13,9 @@ import numpy as np
 from texrs._arrays import as_image, guidance
 from texrs._progress import answering
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.completion._holes import look_around, paint_over
 from texrs.exemplar.sheet import Flattened, find_plane
 from texrs.growth import stitch_sheet
+from texrs.inpainting._holes import look_around, paint_over
 from texrs.scale_maps._kinds import find_kind
 from texrs.scale_maps._plane import Plane
 from texrs.source_map import SourceMap

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.completion._depth import fill_in_depth
-from texrs.completion._patches import fill_with_patches
 from texrs.exemplar.symmetry import Flip
+from texrs.inpainting._depth import fill_in_depth
+from texrs.inpainting._patches import fill_with_patches
 from texrs.scale_maps._plane import Plane
 from texrs.source_map import SourceMap
 

@@ -8,7 +8,7 @@ use super::patch_search::PatchIndex;
 use super::run;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
-use crate::kernels::complete::{Canvas, Options, complete as fill};
+use crate::kernels::inpaint::{Canvas, Options, inpaint as fill};
 use crate::kernels::patch_search::Pick;
 
 /// Filled colours, the patch number of each pixel, and five numbers for each patch: exemplar,
@@ -19,9 +19,9 @@ type Filled<'py> = (
     Bound<'py, PyArray2<i64>>,
 );
 
-#[pyfunction]
+#[pyfunction(name = "complete")]
 #[allow(clippy::too_many_arguments)] // the arguments of the Python wrapper
-pub(super) fn complete<'py>(
+pub(super) fn inpaint<'py>(
     py: Python<'py>,
     colours: PyReadonlyArray3<'py, f32>,
     known: PyReadonlyArray2<'py, bool>,

@@ -10,12 +10,12 @@ import pytest
 import texrs
 from reference.look_up import view
 from texrs import samples
-from texrs.completion._judge import Filled, judge_seams
-from texrs.completion._patches import MARGIN, PLACES, choose_mirrors, choose_part
-from texrs.completion._scene import Scene
 from texrs.errors import Cancelled, InvalidInput
 from texrs.exemplar.patches import mark_corners
 from texrs.exemplar.symmetry import NONE
+from texrs.inpainting._judge import Filled, judge_seams
+from texrs.inpainting._patches import MARGIN, PLACES, choose_mirrors, choose_part
+from texrs.inpainting._scene import Scene
 
 PEBBLES = samples.pebbles((96, 112)).image
 
@@ -45,7 +45,7 @@ def test_periodic_pattern_is_restored_exactly():
         for mirror in (True, False):
             image = whole.copy()
             image[hole] = 128
-            np.testing.assert_array_equal(texrs.complete(image, hole, allow_mirror=mirror).image, whole)
+            np.testing.assert_array_equal(texrs.inpaint(image, hole, allow_mirror=mirror).image, whole)
 
 
 def test_holes_at_the_border_are_filled_across_it():
@@ -53,7 +53,7 @@ def test_holes_at_the_border_are_filled_across_it():
     whole = np.tile(unit, (8, 6))
     hole = np.zeros(whole.shape, bool)
     hole[:3], hole[:, -4:] = True, True
-    result = texrs.complete(np.where(hole, 0, whole).astype(np.uint8), hole, wrap=True)
+    result = texrs.inpaint(np.where(hole, 0, whole).astype(np.uint8), hole, wrap=True)
     np.testing.assert_array_equal(result.image, whole)
 
 
@@ -62,12 +62,12 @@ def test_holes_at_the_border_are_filled_across_it():
     "hole", [HOLE, disc((96, 112), (0, 0), 0.5), np.random.default_rng(0).random((96, 112)) < 0.01]
 )
 def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, boundary):
-    result = texrs.complete(PEBBLES, hole, boundary_width=boundary, seed=3)
+    result = texrs.inpaint(PEBBLES, hole, boundary_width=boundary, seed=3)
     row, column = places(result)
     assert not hole[row, column].any()
     own = (row == np.indices(row.shape)[0]) & (column == np.indices(row.shape)[1])
     assert not own[hole].any()
-    far = texrs.complete(PEBBLES, hole, boundary_width=0).source.label == 0
+    far = texrs.inpaint(PEBBLES, hole, boundary_width=0).source.label == 0
     assert (far == ~hole).all()
     kept = result.source.label == 0
     assert own[kept].all()
@@ -78,7 +78,7 @@ def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, boundary):
 def test_the_boundary_is_not_exceeded():
     from scipy.ndimage import binary_dilation
 
-    result = texrs.complete(PEBBLES, HOLE, boundary_width=4)
+    result = texrs.inpaint(PEBBLES, HOLE, boundary_width=4)
     assert (result.source.label[~binary_dilation(HOLE, np.ones((3, 3)), 4)] == 0).all()
 
 
@@ -88,14 +88,14 @@ def test_what_is_in_the_hole_does_not_matter():
     for content in (0.0, 1e6, -7.0, np.nan, np.inf):
         image = base.copy()
         image[HOLE] = content
-        made.append(texrs.complete(image, HOLE).image)
+        made.append(texrs.inpaint(image, HOLE).image)
     assert np.isfinite(made[0]).all()
     for other in made[1:]:
         np.testing.assert_array_equal(other, made[0])
 
 
 def test_filling_continues_the_texture():
-    result = texrs.complete(PEBBLES, HOLE)
+    result = texrs.inpaint(PEBBLES, HOLE)
     grey = result.image.astype(float).mean(axis=-1)
     for axis in (0, 1):
         step = np.abs(np.diff(grey, axis=axis))
@@ -110,14 +110,14 @@ def test_large_elements_are_not_torn_at_the_far_border():
     image = np.where((columns + rows // 3) % 56 < 28, 200, 40).astype(np.uint8)
     hole = np.zeros(image.shape, bool)
     hole[50:110, 50:110] = True
-    result = texrs.complete(np.where(hole, 128, image).astype(np.uint8), hole, allow_mirror=False)
+    result = texrs.inpaint(np.where(hole, 128, image).astype(np.uint8), hole, allow_mirror=False)
     assert (result.image != image)[hole].mean() < 0.01
 
 
 def test_patches_do_not_mirror_or_repeat_what_is_beside_them():
     image = samples.pebbles((160, 160), seed=2).image
     hole = disc((160, 160), radius=0.22)
-    result = texrs.complete(image, hole)
+    result = texrs.inpaint(image, hole)
     row, column = places(result)
     turned = (result.source.frames() != np.eye(2)).any(axis=(2, 3))
     r, c = np.indices(row.shape)
@@ -132,7 +132,7 @@ def test_empty_hole_is_refused():
     none = np.zeros((96, 112), bool)
     for more in ({}, {"exemplar": PEBBLES[:20]}, {"method": "optimise"}):
         with pytest.raises(InvalidInput, match="hole: marks nothing, so there is nothing to fill"):
-            texrs.complete(PEBBLES, none, **more)
+            texrs.inpaint(PEBBLES, none, **more)
 
 
 # --- another picture -------------------------------------------------------------------------------------------------
@@ -142,7 +142,7 @@ def test_empty_hole_is_refused():
 def test_source_is_the_second_exemplar(dtype):
     other = np.ascontiguousarray(samples.beans((64, 80)).image.astype(dtype))
     image = PEBBLES.astype(dtype)
-    result = texrs.complete(image, HOLE, exemplar=other)
+    result = texrs.inpaint(image, HOLE, exemplar=other)
     assert result.source.shapes == ((96, 112), (64, 80))
     np.testing.assert_array_equal(result.source.exemplar, HOLE.astype(np.uint16))
     row, column = places(result)
@@ -152,10 +152,10 @@ def test_source_is_the_second_exemplar(dtype):
 
 def test_whole_image_from_a_source():
     everywhere = np.ones((40, 50), bool)
-    result = texrs.complete(np.full((40, 50, 3), np.nan, np.float32), everywhere, exemplar=PEBBLES.astype(np.float32))
+    result = texrs.inpaint(np.full((40, 50, 3), np.nan, np.float32), everywhere, exemplar=PEBBLES.astype(np.float32))
     assert (result.source.exemplar == 1).all()
     assert result.image.shape == (40, 50, 3)
-    seeds = [texrs.complete(PEBBLES, np.ones((96, 112)) > 0, exemplar=PEBBLES, seed=s).image for s in (1, 1, 2)]
+    seeds = [texrs.inpaint(PEBBLES, np.ones((96, 112)) > 0, exemplar=PEBBLES, seed=s).image for s in (1, 1, 2)]
     assert (seeds[0] == seeds[1]).all()
     assert (seeds[0] != seeds[2]).any()
 
@@ -163,7 +163,7 @@ def test_whole_image_from_a_source():
 def test_sources_of_floats_are_compared_in_one_range():
     ramp = np.tile(np.linspace(0, 10, 48, dtype=np.float32), (48, 1))
     hole = disc((48, 48))
-    result = texrs.complete(ramp, hole, exemplar=ramp * 2)
+    result = texrs.inpaint(ramp, hole, exemplar=ramp * 2)
     # In a range of its own the doubled ramp would look like the ramp itself.
     assert np.abs(result.image - ramp)[hole].mean() < 1
 
@@ -173,7 +173,7 @@ def test_sources_of_floats_are_compared_in_one_range():
 
 def test_every_map_in_register():
     stack = [PEBBLES, PEBBLES.astype(np.uint16) * 257, PEBBLES.astype(np.float32) * (4 / 255), PEBBLES[..., 0] > 90]
-    made = [texrs.complete(each, HOLE) for each in stack]
+    made = [texrs.inpaint(each, HOLE) for each in stack]
     for each, result in zip(stack, made, strict=True):
         assert result.image.dtype == each.dtype
         np.testing.assert_array_equal(view(result.source, each), result.image)
@@ -182,10 +182,10 @@ def test_every_map_in_register():
 
 
 def test_mirrored_patches_turn_normals():
-    result = texrs.complete(PEBBLES, HOLE)
+    result = texrs.inpaint(PEBBLES, HOLE)
     turned = (result.source.frames() != np.eye(2)).any(axis=(2, 3))
     assert turned.any()
-    plain = texrs.complete(PEBBLES, HOLE, allow_mirror=False).source
+    plain = texrs.inpaint(PEBBLES, HOLE, allow_mirror=False).source
     assert (plain.frames() == np.eye(2)).all()
     # Along a patch coordinates run as its frame says.
     joined = result.source.continues(1)[:, :-1]
@@ -197,7 +197,7 @@ def test_mirrored_patches_turn_normals():
 def test_any_number_of_channels(channels):
     grey = PEBBLES[..., 0]
     image = grey if channels is None else np.stack([np.roll(grey, c, axis=0) for c in range(channels)], axis=-1)
-    result = texrs.complete(image, HOLE.astype(np.uint8) * 255)
+    result = texrs.inpaint(image, HOLE.astype(np.uint8) * 255)
     assert result.image.shape == image.shape
     row, column = places(result)
     np.testing.assert_array_equal(result.image, image[row, column])
@@ -207,13 +207,13 @@ def test_any_number_of_channels(channels):
 
 
 def test_the_patches_are_kept_whose_seams_show_least():
-    report = texrs.complete(PEBBLES, HOLE).report
+    report = texrs.inpaint(PEBBLES, HOLE).report
     tried = dict(report["tried"])
     assert len(tried) >= 3
     assert list(tried) == sorted(tried, reverse=True)
     assert 0.97 * tried[report["patch_size"]] <= min(tried.values())
-    again = texrs.complete(PEBBLES, HOLE, patch_size=report["patch_size"])
-    np.testing.assert_array_equal(texrs.complete(PEBBLES, HOLE).image, again.image)
+    again = texrs.inpaint(PEBBLES, HOLE, patch_size=report["patch_size"])
+    np.testing.assert_array_equal(texrs.inpaint(PEBBLES, HOLE).image, again.image)
     assert again.report["tried"] == []
 
 
@@ -223,7 +223,7 @@ def test_large_things_are_made_whole(side):
     row, column = np.mgrid[:320, :320]
     wall = ((row // side + column // side) % 2 * 150 + (row % side < 3) * 60).astype(np.uint8)
     hole = np.hypot(row - 170, column - 150) < 48
-    made = texrs.complete(np.where(hole, 0, wall).astype(np.uint8), hole)
+    made = texrs.inpaint(np.where(hole, 0, wall).astype(np.uint8), hole)
     assert (made.image == wall).mean() > 0.995
 
 
@@ -236,7 +236,7 @@ def test_sizes_for_large_holes_are_tried_in_a_small_copy(monkeypatch):
     picture = texrs.samples.pebbles((640, 640)).image
     hole = np.zeros((640, 640), bool)
     hole[200:430, 210:440] = True
-    report = texrs.complete(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole).report
+    report = texrs.inpaint(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole).report
     assert [shape for shape, _ in seen] == [(320, 320)] * (len(seen) - 1) + [(640, 640)]
     assert seen[-1][1] == report["patch_size"]
     assert sorted((2 * side for _, side in seen[:-1]), reverse=True) == [side for side, _ in report["tried"]]
@@ -282,7 +282,7 @@ def test_holes_far_from_the_corner_are_filled_from_what_is_around_them():
     picture = np.tile(PEBBLES, (8, 8, 1))
     hole = np.zeros(picture.shape[:2], bool)
     hole[500:540, 700:760] = True
-    result = texrs.complete(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole)
+    result = texrs.inpaint(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole)
     np.testing.assert_array_equal(result.image, picture)  # it repeats
     row, column = places(result)
     np.testing.assert_array_equal(result.image, picture[row, column])
@@ -294,7 +294,7 @@ def test_flat_ground_is_filled_at_once():
     white = np.full((256, 256, 3), 255, np.uint8)
     hole = np.zeros((256, 256), bool)
     hole[80:160, 90:170] = True
-    result = texrs.complete(white, hole)
+    result = texrs.inpaint(white, hole)
     np.testing.assert_array_equal(result.image, white)
     assert len(result.report["tried"]) == 1
 
@@ -302,13 +302,13 @@ def test_flat_ground_is_filled_at_once():
 def test_smaller_patches_where_few_places_are_free():
     grid = np.zeros((96, 112), bool)
     grid[::9], grid[:, ::9] = True, True
-    result = texrs.complete(PEBBLES, grid)
+    result = texrs.inpaint(PEBBLES, grid)
     assert result.report["patch_size"] == 8
     assert mark_corners(~grid, 8).sum() >= PLACES > mark_corners(~grid, 9).sum()
     dense = np.zeros((96, 112), bool)
     dense[::5], dense[:, ::5] = True, True
-    assert texrs.complete(PEBBLES, dense).report["patch_size"] == 4
-    assert 12 <= texrs.complete(PEBBLES, HOLE).report["patch_size"] <= 64
+    assert texrs.inpaint(PEBBLES, dense).report["patch_size"] == 4
+    assert 12 <= texrs.inpaint(PEBBLES, HOLE).report["patch_size"] <= 64
 
 
 def test_corners():
@@ -378,45 +378,45 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
 )
 def test_arguments_are_checked(image, hole, options, words):
     with pytest.raises(InvalidInput, match=re.escape(words)):
-        texrs.complete(image, hole, **options)
+        texrs.inpaint(image, hole, **options)
 
 
 def test_the_image_is_not_changed():
     image, hole = PEBBLES.copy(), HOLE.copy()
-    texrs.complete(image, hole)
+    texrs.inpaint(image, hole)
     np.testing.assert_array_equal(image, PEBBLES)
     np.testing.assert_array_equal(hole, HOLE)
     everywhere, before = np.ones((96, 112), bool), image.copy()
-    texrs.complete(image, everywhere, exemplar=PEBBLES)
+    texrs.inpaint(image, everywhere, exemplar=PEBBLES)
     np.testing.assert_array_equal(image, before)
 
 
 def test_exemplars_stand_for_their_arrays():
     other = samples.pebbles((64, 80), seed=5).image
-    made = texrs.complete(texrs.Exemplar(PEBBLES), HOLE, exemplar=texrs.Exemplar(other))
-    np.testing.assert_array_equal(made.image, texrs.complete(PEBBLES, HOLE, exemplar=other).image)
+    made = texrs.inpaint(texrs.Exemplar(PEBBLES), HOLE, exemplar=texrs.Exemplar(other))
+    np.testing.assert_array_equal(made.image, texrs.inpaint(PEBBLES, HOLE, exemplar=other).image)
     with pytest.raises(InvalidInput, match="^exemplar: needs an Exemplar with axes=2"):
-        texrs.complete(PEBBLES, HOLE, exemplar=texrs.Exemplar(np.zeros((8, 8, 8), np.uint8), axes=3))
+        texrs.inpaint(PEBBLES, HOLE, exemplar=texrs.Exemplar(np.zeros((8, 8, 8), np.uint8), axes=3))
 
 
 def test_progress_and_cancel():
     seen = []
-    texrs.complete(PEBBLES, HOLE, progress=lambda stage, share: seen.append((stage, share)))
-    assert seen[0] == ("complete", 0.0)
+    texrs.inpaint(PEBBLES, HOLE, progress=lambda stage, share: seen.append((stage, share)))
+    assert seen[0] == ("inpaint", 0.0)
     assert seen[-1] == ("done", 1.0)
 
     def stop(stage: str, share: float) -> None:
         raise Cancelled("enough")
 
     with pytest.raises(Cancelled):
-        texrs.complete(PEBBLES, HOLE, progress=stop)
+        texrs.inpaint(PEBBLES, HOLE, progress=stop)
 
 
 def test_same_bytes_for_any_number_of_threads():
     made = []
     for count in (1, 2, 7):
         with texrs.threads(count):
-            made.append(texrs.complete(PEBBLES, HOLE, boundary_width=2, seed=9))
+            made.append(texrs.inpaint(PEBBLES, HOLE, boundary_width=2, seed=9))
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
         assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()
@@ -433,7 +433,7 @@ def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
     assert choose_mirrors([noise, lit], hole, None) == (NONE,)
     assert [len(choose_mirrors([lit], hole, said)) for said in (True, False)] == [4, 1]
     for picture, mirrored in ((noise, True), (lit, False)):
-        result = texrs.complete(picture, hole)
+        result = texrs.inpaint(picture, hole)
         assert result.report["allow_mirror"] is mirrored
         frames = result.source.frames()
         assert mirrored or (np.diagonal(frames, axis1=-2, axis2=-1) == 1).all()
@@ -443,6 +443,6 @@ def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
 def test_patches_that_cover_the_hole_are_tried():
     hole = np.zeros((128, 128), bool)
     hole[40:70, 50:80] = True
-    sides = [side for side, _ in texrs.complete(samples.scales((128, 128)).image, hole).report["tried"]]
+    sides = [side for side, _ in texrs.inpaint(samples.scales((128, 128)).image, hole).report["tried"]]
     assert max(sides) > 30
     assert max(sides) <= 1.3 * 30

@@ -15,7 +15,7 @@ import texrs
 wall = data.brick()[:256, :384]
 rows, columns = np.mgrid[:256, :384]
 hole = np.hypot(rows - 128, columns - 190) < 55
-mended = texrs.complete(wall, hole, boundary_width=4, seed=1).image
+mended = texrs.inpaint(wall, hole, boundary_width=4, seed=1).image
 
 figure, row = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 for axes, title, picture in zip(

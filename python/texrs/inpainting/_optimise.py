@@ -13,11 +13,11 @@ import numpy as np
 from texrs import scale_maps
 from texrs._arrays import as_image, guidance, try_array
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.completion._holes import look_around, paint_over
 from texrs.errors import InvalidInput
 from texrs.exemplar.analysis import count_levels
 from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
 from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
+from texrs.inpainting._holes import look_around, paint_over
 from texrs.planes import Sizes
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps._kinds import Kind, find_kind, keep_kind

@@ -30,25 +30,25 @@ from texrs._progress import listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
-from texrs.completion._depth import see_plane
-from texrs.completion._fill import Filling, fill
-from texrs.completion._holes import check_material, find_hole
-from texrs.completion._optimise import optimise, recover_scale
-from texrs.completion._patches import LEAST, choose_mirrors
-from texrs.completion._volumes import complete_volume, is_volume
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.symmetry import NONE
+from texrs.inpainting._depth import see_plane
+from texrs.inpainting._fill import Filling, fill
+from texrs.inpainting._holes import check_material, find_hole
+from texrs.inpainting._optimise import optimise, recover_scale
+from texrs.inpainting._patches import LEAST, choose_mirrors
+from texrs.inpainting._volumes import inpaint_volume, is_volume
 from texrs.materials import Material
 from texrs.planes import Sizes
 from texrs.scale_maps._kinds import Kind, as_kind
 from texrs.synthesis import Synthesis
 
-__all__ = ["complete"]
+__all__ = ["inpaint"]
 
 
 @takes_materials("image", "exemplar", check=check_material)
-def complete(
+def inpaint(
     image: Array | Exemplar | Material,
     hole: Array | Mask | str | float | None = None,
     *,
@@ -159,7 +159,7 @@ def complete(
     >>> wall = np.tile(np.uint8([[0, 0, 9, 9], [9, 9, 0, 0]]), (24, 12))
     >>> hole = np.zeros(wall.shape, bool)
     >>> hole[10:25, 12:30] = True
-    >>> result = texrs.complete(np.where(hole, 5, wall).astype(np.uint8), hole)
+    >>> result = texrs.inpaint(np.where(hole, 5, wall).astype(np.uint8), hole)
     >>> bool((result.image == wall).all())
     True
 
@@ -180,7 +180,7 @@ def complete(
         for name in (name for name, given in flat.items() if given):
             raise InvalidInput(f"{name}: is for pictures; leave it out for a volume")
         volume: Any = image
-        return complete_volume(
+        return inpaint_volume(
             volume,
             hole,
             patch_size=patch_size,
@@ -213,8 +213,8 @@ def complete(
     )
     watch = progress or (lambda stage, share: None)
 
-    check_work("complete", pictures, shapes[0], "image", method=method)
-    watch("complete", 0.0)
+    check_work("inpaint", pictures, shapes[0], "image", method=method)
+    watch("inpaint", 0.0)
     scales, measured = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)
