@@ -5,11 +5,11 @@
 
 use texrs::appearance::Appearance;
 use texrs::coherence::{self, FEW, Kinds};
-use texrs::inpaint::{self, Canvas};
 use texrs::fixed::{Frames, ONE, Place, identity};
 use texrs::gather::{self, Interpolation, gather};
 use texrs::grid::{Grid, Region};
 use texrs::hash::Noise;
+use texrs::inpaint::{self, Canvas};
 use texrs::mean_shift;
 use texrs::par::{self, Monitor};
 use texrs::patch_search::{Exemplar, Index, Pick, Query};

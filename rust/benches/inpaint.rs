@@ -1,9 +1,9 @@
 //! Filling a hole of a quarter of the side, with pools of one and two threads.
 
 use criterion::{BenchmarkId, Criterion};
-use texrs::inpaint::{Canvas, Options, inpaint};
 use texrs::grid::Grid;
 use texrs::hash::Noise;
+use texrs::inpaint::{Canvas, Options, inpaint};
 use texrs::par::{self, Monitor};
 use texrs::patch_search::{Exemplar, Index, Pick};
 

@@ -58,6 +58,6 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, quilt,
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    inpaint, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson,
+    distance, gather, image_io, inpaint, mean_shift, ncc, nearby, patch_search, poisson,
     reconstruction, regions, seam, smooth, sparse, warp,
 };

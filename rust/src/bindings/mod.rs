@@ -3,11 +3,11 @@
 
 mod appearance;
 mod coherence;
-mod inpaint;
 mod distance;
 mod gather;
 mod hash;
 mod image_io;
+mod inpaint;
 mod mean_shift;
 mod ncc;
 mod nearby;
@@ -127,8 +127,6 @@ mod _rust {
     #[pymodule_export]
     use super::coherence::{cohere, jitter, similar};
     #[pymodule_export]
-    use super::inpaint::inpaint;
-    #[pymodule_export]
     use super::distance::outlines;
     #[pymodule_export]
     use super::gather::gather;
@@ -136,6 +134,8 @@ mod _rust {
     use super::hash::{philox, uniform};
     #[pymodule_export]
     use super::image_io::{decode_image, encode_image, exif_orientation};
+    #[pymodule_export]
+    use super::inpaint::inpaint;
     #[pymodule_export]
     use super::mean_shift::mean_shift;
     #[pymodule_export]

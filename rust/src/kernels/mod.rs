@@ -1,10 +1,10 @@
 //! Algorithms of the literature. Each can be used on its own and does not depend on the methods
 //! that use it.
 
-pub mod inpaint;
 pub mod distance;
 pub mod gather;
 pub mod image_io;
+pub mod inpaint;
 pub mod mean_shift;
 pub mod ncc;
 pub mod nearby;

@@ -1,6 +1,6 @@
 //! The window of the canvas that is being filled: its known pixels, and the cut of a match into it.
 
-use super::{Canvas, Inpainting, FAR_WEIGHT, FLAT, KEPT_WEIGHT, Patch};
+use super::{Canvas, FAR_WEIGHT, FLAT, Inpainting, KEPT_WEIGHT, Patch};
 use crate::Result;
 use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
