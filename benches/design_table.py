@@ -87,7 +87,7 @@ def measure(
         seconds.append(time.perf_counter() - start)
     found: dict[str, list[Any]] = {name: [] for name in HEAD if name != "D5"}
     for r in results:
-        before = r.stages["composite"]
+        before = r.stages["before_blending"]
         found["D1"].append(checks.d1(image, r, size))
         found["D2"].append(checks.d2(image, r.image, r.source))
         found["D2b"].append(checks.d2b(image, before, r.image, r.source))

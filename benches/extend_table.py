@@ -2,7 +2,7 @@
 
     python benches/extend_table.py OUT PICTURE ... [--seed 1]
 
-Writes `OUT/NAME.png` for each picture: it and what `texrs.extend(to=)` adds to it, nothing else said. The plane of what was
+Writes `OUT/NAME.png` for each picture: it and what `texrs.extend(size=)` adds to it, nothing else said. The plane of what was
 added alone is found anew, with the known part left out: by how many degrees it is off, and how sure that is (a plane that was
 not followed has none). Sharpness: the mean gradient of what was added over that of the photograph, 1 where both are as sharp.
 Border: the mean difference across the photograph's border over that of the lines beside it; 1 where it does not show. To be
@@ -86,7 +86,7 @@ def main() -> None:
         start = time.process_time()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            made = texrs.extend(image, to=(2 * rows, 2 * columns), seed=options.seed)
+            made = texrs.extend(image, size=(2 * rows, 2 * columns), seed=options.seed)
         spent = time.process_time() - start
         io.write(options.out / f"{path.stem}.png", made.image)
         top, left = made.report["added"]["top"], made.report["added"]["left"]

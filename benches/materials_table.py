@@ -42,7 +42,7 @@ def list_commands(stack: Path, designed: Path, hole: Path, size: int) -> Iterato
     """Return each verb, its words, and the material that it looks into."""
     wanted = ["--size", str(size)]
     yield "design", [str(stack), *wanted], stack
-    yield "tile", [str(stack), *wanted, "--flatten"], stack
+    yield "tile", [str(stack), *wanted, "--flatten-lighting"], stack
     yield "synthesize", [str(stack), *wanted, "--wrap", "xy"], stack
     yield "perspective", [str(stack), *wanted, "--target", "plane:slant=45,tilt=90", "--scale-map", "front"], stack
     yield "splice", [str(stack), "sample:pebbles", *wanted], stack

@@ -142,7 +142,9 @@ def main() -> None:
                 sharp = measure_sharpness(result.image) / measure_sharpness(a.image)
                 broken = judging.judge(a.image, result.source, result.image).broken
                 ground = measure_ground(a, result)
-                numbers.append((measure_present(result), result.report["realised"], sharp, ground, broken, spent))
+                numbers.append(
+                    (measure_present(result), result.report["displacement_reached"], sharp, ground, broken, spent)
+                )
         present, realised, sharp, ground, broken, spent = np.mean(numbers, axis=0)
         how, alike = " ".join(sorted(methods)), measure_likeness(made)
         print(

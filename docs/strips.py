@@ -245,8 +245,8 @@ def augment() -> Iterator[Strip]:
         ]
     )
 
-    def draw(seed: int, visible: float = 0.5) -> Picture:
-        made = texrs.transforms.TextureAugment(visible)(buttons.image, boxes=boxes, seed=seed)
+    def draw(seed: int, min_visible: float = 0.5) -> Picture:
+        made = texrs.transforms.TextureAugment(min_visible)(buttons.image, boxes=boxes, seed=seed)
         image = np.kron(made.image, np.ones((2, 2, 1), np.uint8))
         for left, top, right, bottom in np.rint(2 * made.boxes).astype(int):
             for rows, columns in (
@@ -262,7 +262,7 @@ def augment() -> Iterator[Strip]:
     yield ("seed", "Another picture each, and its boxes.", several([0, 1, 2, 3, 4], draw))
     yield ("seed, with labels", "The labels of the same pictures.", several([0, 1, 2, 3, 4], label))
     yield (
-        "visible",
+        "min_visible",
         "How much of a box a piece must show for it to have one.",
         several([0.1, 0.3, 0.5, 0.7, 0.95], lambda share: draw(3, share)),
     )

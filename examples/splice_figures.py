@@ -27,7 +27,7 @@ def draw_overview() -> np.ndarray:
     rows = []
     for method in (None, "paper"):
         result = texrs.splice(entry("dots"), entry("bricks"), seed=1, method=method)
-        names = ("points of a", "points of b", "matching", "warped mesh", "before refinement", "composite")
+        names = ("source points", "target points", "matching", "warped mesh", "before refinement", "before_blending")
         rows.append(beside([result.stages[name] for name in names if name in result.stages], SIDE))
     return below(rows)
 

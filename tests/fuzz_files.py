@@ -107,7 +107,7 @@ def make_folders(folder: Path) -> Iterator[tuple[Path, Path, list[Reader]]]:
         yield (
             database,
             database / file,
-            [lambda path: texrs.TextureDatabase(path, say=lambda text: None).analyse("dots")],
+            [lambda path: texrs.TextureDatabase(path, log=lambda text: None).analyse("dots")],
         )
     material = folder / "material"
     texrs.Material({"albedo": sample.image, "height": sample.image[..., 0]}).save(material)

@@ -34,7 +34,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "design": ("design in.png -o out.png --size 96 --motion keep --map map.npz", "out.png map.npz"),
     "synthesize": ("synthesize in.png -o out.zarr --size 128 --chunks 64", ""),
     "synthesize, to a file": ("synthesize in.png -o out.tif --size 128 --chunks 64", "out.tif"),
-    "tiles": ("tiles in.png -o tiles --side 32 --pictures 1 --motion keep", ""),
+    "tiles": ("tiles in.png -o tiles --tile-size 32 --pictures 1 --motion keep", ""),
     "database": ("database base add in.png --box 78,41,23,21 --layout disjoint", ""),
     "batch": ("batch recipe.toml", ""),
 }

@@ -393,7 +393,7 @@ def test_away_from_seams_differences_stay(designed):
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     _, result = designed
-    before, after = (i.astype(float) for i in (result.stages["composite"], result.image))
+    before, after = (i.astype(float) for i in (result.stages["before_blending"], result.image))
     near = np.zeros(result.source.shape, bool)
     for axis in range(2):
         at, beyond = _seams.list_seams(result.source, axis, True)
@@ -414,8 +414,8 @@ def test_away_from_seams_differences_stay(designed):
 def test_blending_can_be_left_out(designed):
     sample, result = designed
     plain = texrs.design(sample, 256, seed=5, copies=2, screening=None)
-    np.testing.assert_array_equal(plain.image, plain.stages["composite"])
-    np.testing.assert_array_equal(plain.stages["composite"], result.stages["composite"])
+    np.testing.assert_array_equal(plain.image, plain.stages["before_blending"])
+    np.testing.assert_array_equal(plain.stages["before_blending"], result.stages["before_blending"])
     assert plain.report["screening"] == 0
     assert plain.report["seams"]["before"] == plain.report["seams"]["after"]
 

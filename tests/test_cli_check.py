@@ -62,7 +62,7 @@ def test_uneven_light_is_printed_and_may_be_kept(folder, capsys):
     io.write("lit.png", np.clip(np.rint(grit * ramp), 0, 255).astype(np.uint8))
     assert main(["tile", "lit.png", "-o", "even.png"]) == 0
     assert "is lit unevenly" in capsys.readouterr().err
-    assert main(["tile", "lit.png", "-o", "kept.png", "--no-flatten"]) == 0
+    assert main(["tile", "lit.png", "-o", "kept.png", "--no-flatten-lighting"]) == 0
     assert "unevenly" not in capsys.readouterr().err
 
 

@@ -56,13 +56,13 @@ def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixtur
 def test_colours_are_brought_into_even_light_and_heights_are_not(here: Path) -> None:
     lit = (io.read("rock/rock_albedo.png") * np.linspace(0.4, 1, 64)[:, np.newaxis]).astype(np.uint8)
     io.write("rock/rock_albedo.png", lit)
-    assert main(["tile", "rock", "-o", "new", "--flatten", "--map", "map.npz", "-q"]) == 0
+    assert main(["tile", "rock", "-o", "new", "--flatten-lighting", "--map", "map.npz", "-q"]) == 0
     source = texrs.SourceMap.load("map.npz")
     for name in ("albedo", "height"):
         assert main(["apply", "map.npz", f"rock/rock_{name}.png", "-o", f"{name}.png", "-q"]) == 0
         assert (io.read(f"{name}.png") == io.read(f"new/rock_{name}.png")).all()
     assert (io.read("new/rock_height.png") == source.render(io.read("rock/rock_height.png"))).all()
-    assert main(["apply", "map.npz", "rock/rock_albedo.png", "-o", "lit.png", "--no-flatten", "-q"]) == 0
+    assert main(["apply", "map.npz", "rock/rock_albedo.png", "-o", "lit.png", "--no-flatten-lighting", "-q"]) == 0
     assert (io.read("lit.png") == source.render(lit)).all()
     assert (io.read("albedo.png") != io.read("lit.png")).any()
 

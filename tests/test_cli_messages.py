@@ -45,7 +45,7 @@ CALLS = {
     "splice": "in.png sample:dots -o out.tif",
     "synthesize": "in.png -o out.tif",
     "tile": "in.png -o out.tif",
-    "tiles": "in.png --side 48 --pictures 1 --size 40 -o out.tif",
+    "tiles": "in.png --tile-size 48 --pictures 1 --size 40 -o out.tif",
 }
 BAD = ("bogus", "-5", "missing.png", "1,2")
 COMMON = {*LIMITS, "count", "strict", "force", "quiet"}

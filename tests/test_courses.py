@@ -165,4 +165,4 @@ def test_walls_are_mixed_with_other_textures() -> None:
     made = texrs.design([lay_wall(seed=1), pebbles], 256, seed=1)
     assert made.report["courses"][0] is not None
     assert made.report["courses"][1] is None
-    assert abs(made.report["shares"][0] / 256**2 - 0.5) < 0.03
+    assert abs(made.report["pixel_counts"][0] / 256**2 - 0.5) < 0.03

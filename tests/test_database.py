@@ -30,13 +30,13 @@ def said() -> list[str]:
 
 @pytest.fixture
 def textures(tmp_path: Path, said: list[str]) -> TextureDatabase:
-    made = TextureDatabase(tmp_path / "db", say=said.append)
+    made = TextureDatabase(tmp_path / "db", log=said.append)
     made.add(DOTS.image, "dots", similarity=True, **GIVEN)
     return made
 
 
 def test_what_is_added_is_kept(textures: TextureDatabase, said: list[str]) -> None:
-    again = TextureDatabase(textures.path, say=said.append)
+    again = TextureDatabase(textures.path, log=said.append)
     assert list(again) == ["dots"]
     assert "dots" in again
     assert len(again) == 1
@@ -197,7 +197,7 @@ def test_one_name_given_by_several_processes_at_once(tmp_path: Path, said: list[
     context, count = get_context("spawn"), 3
     with ProcessPoolExecutor(count, context, meet, (context.Barrier(count),)) as pool:
         answers = list(pool.map(add_one, [str(tmp_path / "db")] * count, range(count), [replace] * count))
-    textures = TextureDatabase(tmp_path / "db", say=said.append)
+    textures = TextureDatabase(tmp_path / "db", log=said.append)
     if replace:
         assert answers == ["ok"] * count
     else:

@@ -43,12 +43,12 @@ def test_size_dtype_and_content(pebbles, result):
     # Every colour comes from the exemplar: where coordinates are whole, exactly that sample.
     whole = (result.source.coordinates == np.rint(result.source.coordinates)).all(axis=-1)
     at = result.source.coordinates[whole].astype(int)
-    np.testing.assert_array_equal(result.stages["composite"][whole], pebbles[at[:, 0], at[:, 1]])
+    np.testing.assert_array_equal(result.stages["before_blending"][whole], pebbles[at[:, 0], at[:, 1]])
     assert whole.mean() > 0.3
 
 
 def test_stages_are_pictures_in_order(result):
-    assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "composite"]
+    assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "before_blending"]
     assert result.stages["holes"].dtype == bool
     # What lies apart leaves a hole where it was.
     apart = texrs.design(samples.dots((96, 96)).image, 96, copies=1).stages
@@ -65,7 +65,7 @@ def test_the_composite_is_what_the_source_map_shows_in_every_dtype(pebbles):
         made = texrs.design(exemplar, 96, seed=2, copies=2)
         assert made.image.dtype == np.dtype(name)
         expected = view(made.source, exemplar)
-        np.testing.assert_allclose(made.stages["composite"], expected, rtol=1e-6 * (name == "float32"))
+        np.testing.assert_allclose(made.stages["before_blending"], expected, rtol=1e-6 * (name == "float32"))
 
 
 def test_depth_does_not_change_the_decisions(pebbles):

@@ -53,7 +53,7 @@ def made(name, seed):
 
 def measure(check, name, seed):
     example, result = exemplar(name), made(name, seed)
-    composite = result.stages["composite"]
+    composite = result.stages["before_blending"]
     match check:
         case "d1":
             return checks.d1(example, result, SIZE)
@@ -139,7 +139,7 @@ def test_d10_several_exemplars():
     result = texrs.design(several, (320, 320), seed=0, copies=2)
     found = checks.d10(several, result.image, result.source)
     assert found.passed, found
-    composite = result.stages["composite"]
+    composite = result.stages["before_blending"]
     assert checks.d6(several[0], composite, result.image, result.source, several=True).passed
 
 
@@ -370,7 +370,7 @@ def test_d5_knows_how_much_textures_on_one_lattice_differ_at_most():
 
 def test_d6_fails_for_a_blur_and_for_a_drift_of_colour(pebbles, blur):
     result = made("pebbles", 0)
-    composite = result.stages["composite"]
+    composite = result.stages["before_blending"]
     assert not checks.d6(pebbles, composite, composite, result.source).passed
     found = checks.d6(pebbles, composite, blur, result.source)
     assert found.p99 > 2

@@ -151,7 +151,7 @@ def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
     lattice = texrs.exemplar.segment(wall).lattice
     assert lattice is not None
     made = texrs.design(wall, (200, 232), seed=1, copies=2, motion="keep")
-    [closing] = made.report["stretched"]
+    [closing] = made.report["lattice_stretch"]
     size = np.diag([200.0, 232.0])
     times = np.linalg.solve(np.array(closing) @ lattice.vectors, size)
     assert np.abs(times - np.rint(times)).max() < 0.02
@@ -169,7 +169,7 @@ def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
 def test_a_lattice_is_not_stretched_where_nothing_goes_around():
     wall = samples.bricks((160, 160)).image
     made = texrs.design(wall, (200, 232), seed=1, copies=2, motion="keep", wrap=False)
-    assert made.report["stretched"] == [None]
+    assert made.report["lattice_stretch"] == [None]
     assert (np.abs(made.source.frames()) == np.eye(2)).all()
 
 

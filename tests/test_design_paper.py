@@ -196,14 +196,14 @@ def test_completion_takes_the_best_match_of_a_centred_window():
 
 def test_the_composite_is_what_the_source_map_shows(pebbles, result):
     assert result.image.shape == (160, 192, 3)
-    np.testing.assert_array_equal(view(result.source, pebbles), result.stages["composite"])
+    np.testing.assert_array_equal(view(result.source, pebbles), result.stages["before_blending"])
 
 
 def test_unscreened_poisson_acts_and_keeps_the_border(result):
     before, after = result.report["seams"]["before"], result.report["seams"]["after"]
     assert after["outliers"] < before["outliers"]
     assert after["mean"] < before["mean"]
-    composite = result.stages["composite"]
+    composite = result.stages["before_blending"]
     for axis in range(2):
         for line in (0, -1):
             np.testing.assert_array_equal(np.take(result.image, line, axis), np.take(composite, line, axis))
@@ -217,7 +217,7 @@ def test_screening_keeps_the_colours(result, pebbles):
     from scipy.ndimage import gaussian_filter
 
     def drift(image):
-        shift = image.astype(float) - result.stages["composite"]
+        shift = image.astype(float) - result.stages["before_blending"]
         return np.abs(gaussian_filter(shift, (12, 12, 0))).max()
 
     screened = texrs.blend(result.source, pebbles, wrap=False)
@@ -235,7 +235,7 @@ def test_layers_by_hand_and_several_exemplars(pebbles):
     made = texrs.design(pebbles, 96, elements=ElementOptions(labels=labels), copies=1, method="paper")
     assert len(made.report["operations"][0]) == 2
     two = texrs.design([pebbles, 255 - pebbles], 96, copies=1, method="paper")
-    assert min(two.report["shares"]) > 0
+    assert min(two.report["pixel_counts"]) > 0
 
 
 @pytest.mark.parametrize("method", ["literal", "default", "Paper"])

@@ -21,13 +21,13 @@ def chosen(gravel):
 
 
 def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
-    [tried] = chosen["auto"].report["tried"]
+    [tried] = chosen["auto"].report["candidates"]
     assert sorted(tried) == ["move", "keep"]
     clearly = tried["keep"]["score"] < CLEARLY * tried["move"]["score"]
     assert chosen["auto"].report["motion"] == ["keep" if clearly else "move"]
     for plan in ("move", "keep"):
         assert chosen[plan].report["motion"] == [plan]
-        assert chosen[plan].report["tried"] == [None]
+        assert chosen[plan].report["candidates"] == [None]
     np.testing.assert_array_equal(chosen["auto"].image, chosen[chosen["auto"].report["motion"][0]].image)
     assert (chosen["move"].image != chosen["keep"].image).any()
 
@@ -66,9 +66,9 @@ def test_still_elements_are_copied_as_they_are(chosen):
 def test_who_says_how_to_deform_is_obeyed(gravel):
     asked = texrs.DeformationOptions(translate=0.1)
     found = texrs.design(gravel, 64, deformation=asked, copies=1)
-    assert (found.report["motion"], found.report["tried"]) == (["move"], [None])
+    assert (found.report["motion"], found.report["candidates"]) == (["move"], [None])
     paper = texrs.design(gravel, 64, method="paper", motion="keep", copies=1)
-    assert (paper.report["motion"], paper.report["tried"]) == (["move"], [None])
+    assert (paper.report["motion"], paper.report["candidates"]) == (["move"], [None])
 
 
 def test_plans_are_tried_once_an_exemplar():
@@ -82,14 +82,14 @@ def test_plans_are_tried_once_an_exemplar():
     assert tried == sorted(tried)
     assert {0.0, 0.5} <= set(tried)
     assert not any(stage == "try" for seed, stage, _ in steps if seed == 1)
-    assert made[0].report["tried"] == made[1].report["tried"]
+    assert made[0].report["candidates"] == made[1].report["candidates"]
 
 
 def test_each_exemplar_of_several_has_a_plan(gravel):
     dots = samples.dots((128, 128)).image
     grey = np.repeat(gravel[..., np.newaxis], 3, axis=-1) if gravel.ndim == 2 else gravel
     found = texrs.design([dots, grey], 128, seed=1)
-    assert len(found.report["motion"]) == len(found.report["tried"]) == 2
+    assert len(found.report["motion"]) == len(found.report["candidates"]) == 2
     assert found.report["motion"][0] == texrs.design(dots, 128).report["motion"][0]
 
 

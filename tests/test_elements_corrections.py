@@ -57,7 +57,7 @@ def test_the_rest_is_moved_named_and_painted(found: Elements) -> None:
     assert made.mask[0, 0]
     assert not made.mask[95, 95]
     # What a net is not is said.
-    assert "connected means" in made.report["doubts"][0]
+    assert "connected means" in made.report["warnings"][0]
 
 
 def test_corrections_are_made_again_with_the_analysis(found: Elements, tmp_path: Path) -> None:
@@ -100,11 +100,11 @@ def test_the_command_writes_the_page_and_reads_the_list(
 def test_what_is_doubtful_is_said_and_what_to_give() -> None:
     plain = elements.analyse(samples.load("bark", size=(96, 96)).image)
     low = {name for name, sure in plain.report["confidence"].items() if sure < 0.65}
-    said = plain.report["doubts"]
+    said = plain.report["warnings"]
     assert "layout is proposed, 49% sure: say how the elements hang together" in said
     assert {name for name in ("box", "layout", "background") if any(d.startswith(f"{name} is") for d in said)} == low
     given = elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint")
-    assert not [d for d in given.report["doubts"] if "proposed" in d]
+    assert not [d for d in given.report["warnings"] if "proposed" in d]
 
 
 def test_names_do_not_leave_their_place(found: Elements) -> None:

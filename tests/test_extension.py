@@ -20,7 +20,7 @@ LARGER = texrs.extend(FLOOR, left=64, right=80, bottom=24, view=PLANE, seed=2)
 def test_nothing_known_changes() -> None:
     assert LARGER.image.shape == (184, 320, 3)
     np.testing.assert_array_equal(LARGER.image[:160, 64:240], FLOOR)
-    np.testing.assert_array_equal(LARGER.source.render(FLOOR, antialias=True), LARGER.stages["composite"])
+    np.testing.assert_array_equal(LARGER.source.render(FLOOR, antialias=True), LARGER.stages["before_blending"])
     np.testing.assert_array_equal(texrs.apply(LARGER.source, FLOOR), LARGER.image)
     inside = np.moveaxis(np.indices((160, 176)), 0, -1)
     np.testing.assert_array_equal(LARGER.source.coordinates[:160, 64:240], inside)
@@ -95,7 +95,7 @@ def test_again_and_otherwise() -> None:
     )
     assert grey.image.shape == (176, 176)
     assert grey.image.dtype == np.uint16
-    assert grey.stages["composite"].shape == (176, 176)
+    assert grey.stages["before_blending"].shape == (176, 176)
 
 
 @pytest.mark.parametrize(

@@ -208,13 +208,13 @@ def test_any_number_of_channels(channels):
 
 def test_the_patches_are_kept_whose_seams_show_least():
     report = texrs.inpaint(PEBBLES, HOLE).report
-    tried = dict(report["tried"])
+    tried = dict(report["candidates"])
     assert len(tried) >= 3
     assert list(tried) == sorted(tried, reverse=True)
     assert 0.97 * tried[report["patch_size"]] <= min(tried.values())
     again = texrs.inpaint(PEBBLES, HOLE, patch_size=report["patch_size"])
     np.testing.assert_array_equal(texrs.inpaint(PEBBLES, HOLE).image, again.image)
-    assert again.report["tried"] == []
+    assert again.report["candidates"] == []
 
 
 @pytest.mark.parametrize("side", [64, 40])
@@ -239,7 +239,7 @@ def test_sizes_for_large_holes_are_tried_in_a_small_copy(monkeypatch):
     report = texrs.inpaint(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole).report
     assert [shape for shape, _ in seen] == [(320, 320)] * (len(seen) - 1) + [(640, 640)]
     assert seen[-1][1] == report["patch_size"]
-    assert sorted((2 * side for _, side in seen[:-1]), reverse=True) == [side for side, _ in report["tried"]]
+    assert sorted((2 * side for _, side in seen[:-1]), reverse=True) == [side for side, _ in report["candidates"]]
 
 
 def test_seams_are_judged_by_what_patches_show_beyond_them():
@@ -296,7 +296,7 @@ def test_flat_ground_is_filled_at_once():
     hole[80:160, 90:170] = True
     result = texrs.inpaint(white, hole)
     np.testing.assert_array_equal(result.image, white)
-    assert len(result.report["tried"]) == 1
+    assert len(result.report["candidates"]) == 1
 
 
 def test_smaller_patches_where_few_places_are_free():
@@ -443,6 +443,6 @@ def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
 def test_patches_that_cover_the_hole_are_tried():
     hole = np.zeros((128, 128), bool)
     hole[40:70, 50:80] = True
-    sides = [side for side, _ in texrs.inpaint(samples.scales((128, 128)).image, hole).report["tried"]]
+    sides = [side for side, _ in texrs.inpaint(samples.scales((128, 128)).image, hole).report["candidates"]]
     assert max(sides) > 30
     assert max(sides) <= 1.3 * 30

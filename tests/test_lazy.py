@@ -114,7 +114,7 @@ def test_source_maps_are_looked_up_lazily() -> None:
     turned = made.source.to_dask(normals, (32, 64), map_type="normal", interpolation="nearest")
     assert np.array_equal(turned.compute(), made.source.render(normals, map_type="normal", interpolation="nearest"))
     plain = texrs.design(WEAVE, 96, seed=2)
-    assert np.array_equal(plain.source.to_dask(WEAVE, 50).compute(), plain.stages["composite"])
+    assert np.array_equal(plain.source.to_dask(WEAVE, 50).compute(), plain.stages["before_blending"])
     with pytest.raises(InvalidInput, match="exemplars: number 0 needs size"):
         made.source.to_dask(WEAVE[:-1])
 

@@ -235,7 +235,7 @@ def test_a_feathered_filling_fades_into_the_image() -> None:
     wide = widen(DISC, 5)
     assert made.report["filled"] == wide.mean()
     # The marked area is replaced, what lies beyond the band stays, and the band is between the two.
-    composite = made.stages["composite"]
+    composite = made.stages["before_blending"]
     np.testing.assert_array_equal(made.image[DISC], composite[DISC])
     np.testing.assert_array_equal(made.image[~wide], base[~wide])
     weight = np.rint(255 * fade(DISC, 5)) / 255

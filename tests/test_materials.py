@@ -72,7 +72,7 @@ def test_every_verb_gives_every_map_back(verb: str) -> None:
         assert (each.role, each.space) == (material[name].role, material[name].space), name
     assert result.image is made["albedo"].pixels
     assert result.report["maps"]["albedo"] == "colour"
-    assert {"guide", "composite"} <= result.stages.keys()
+    assert {"guide", "before_blending"} <= result.stages.keys()
 
 
 def test_maps_stay_in_register_exactly() -> None:

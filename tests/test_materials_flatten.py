@@ -73,16 +73,17 @@ def test_what_differs_by_chance_alone_stays(seed: int) -> None:
 def test_a_tile_is_in_even_light() -> None:
     """Copies of what is lighter at one end show bands; those of a tile in even light do not."""
     lit = (GRAIN * RAMP).astype(np.uint8)
-    as_it_is, even = texrs.tile(lit, size=(ROWS, COLUMNS)), texrs.tile(lit, size=(ROWS, COLUMNS), flatten=True)
+    as_it_is, even = texrs.tile(lit, size=(ROWS, COLUMNS)), texrs.tile(lit, size=(ROWS, COLUMNS), flatten_lighting=True)
     assert vary(as_it_is.image) > 4 * vary(even.image)
-    assert even.report["flatten"] is True
+    assert even.report["flatten_lighting"] is True
     source = even.source
     assert source.finish is not None
     assert (texrs.apply(source, lit) == even.image).all()
     assert (
-        texrs.apply(source, lit, finish=dataclasses.replace(source.finish, flatten=False)) == source.render(lit)
+        texrs.apply(source, lit, finish=dataclasses.replace(source.finish, flatten_lighting=False))
+        == source.render(lit)
     ).all()
-    stones = texrs.tile(Material({"albedo": lit, "height": lit[..., 0]}), flatten=True)
+    stones = texrs.tile(Material({"albedo": lit, "height": lit[..., 0]}), flatten_lighting=True)
     assert stones.material is not None
     assert (stones.material["albedo"].pixels == texrs.apply(stones.source, lit)).all()
     assert (stones.material["height"].pixels == stones.source.render(lit[..., 0])).all()

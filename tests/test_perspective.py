@@ -106,11 +106,11 @@ def test_a_target_of_another_size_is_stretched(floor):
 
 def test_scales_are_measured_in_a_mask_where_that_is_asked():
     image = samples.tilted_discs((128, 128)).image
-    how = texrs.scale_maps.Measuring(detail=2, foreshortened=True)
-    made = texrs.perspective(image, size=64, measuring=how, seed=1)
+    how = texrs.scale_maps.Measuring(min_feature_size=2, foreshortened=True)
+    made = texrs.perspective(image, size=64, scale_measurement=how, seed=1)
     given = texrs.perspective(image, how.measure(image), 64, seed=1)
     np.testing.assert_array_equal(made.image, given.image)
-    mask = texrs.scale_maps.auto_mask(image, detail=2)
+    mask = texrs.scale_maps.auto_mask(image, min_feature_size=2)
     wide = texrs.scale_maps.from_mask(mask, trend="plane", foreshortened=True)
     np.testing.assert_array_equal(made.stages["target"], texrs.scale_maps.resample(wide, (64, 64)))
 
@@ -166,9 +166,15 @@ BAD = [
     ({"scale_map": np.full((32, 32), np.nan)}, "scale_map: .* NaN"),
     ({"scale_map": np.ones((32, 32), np.uint8)}, "scale_map: needs float scales"),
     ({"target": np.ones((5, 5, 7), np.float32)}, "target: needs shape"),
-    ({"measuring": {"detail": 3}}, "measuring: a scale map is given"),
-    ({"scale_map": "auto", "measuring": {"detail": 3}}, "measuring: needs a texrs.scale_maps.Measuring"),
-    ({"scale_map": "auto", "measuring": texrs.scale_maps.Measuring(detail=9)}, "detail: needs a number from 0.5 to 8"),
+    ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: a scale map is given"),
+    (
+        {"scale_map": "auto", "scale_measurement": {"min_feature_size": 3}},
+        "scale_measurement: needs a texrs.scale_maps.Measuring",
+    ),
+    (
+        {"scale_map": "auto", "scale_measurement": texrs.scale_maps.Measuring(min_feature_size=9)},
+        "min_feature_size: needs a number from 0.5 to 8",
+    ),
     ({"size": 0}, "size: "),
     ({"size": "large"}, "size: "),
     ({"seed": -1}, "seed: "),

@@ -58,7 +58,7 @@ def test_the_papers_method_follows_the_scale_too():
     known = np.unique(small.reshape(-1, 3), axis=0)
     made = np.unique(result.image.reshape(-1, 3), axis=0)
     assert len(np.unique(np.concatenate([known, made]), axis=0)) > len(known)
-    copied = np.unique(result.stages["composite"].reshape(-1, 3), axis=0)
+    copied = np.unique(result.stages["before_blending"].reshape(-1, 3), axis=0)
     assert len(np.unique(np.concatenate([known, copied]), axis=0)) == len(known)
     for energies in result.report["energies"]:
         assert energies[-1] <= energies[0]

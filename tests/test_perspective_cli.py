@@ -43,10 +43,10 @@ def test_targets_and_sizes(files):
 
 def test_a_mask_is_measured_as_is_said(files):
     io.write(files / "discs.png", samples.tilted_discs((128, 128)).image)
-    line = "perspective @discs.png -o @out.png --detail 2 --trend linear --foreshortened --size 48 -q"
+    line = "perspective @discs.png -o @out.png --min-feature-size 2 --trend linear --foreshortened --size 48 -q"
     assert run(files, line) == 0
-    how = texrs.scale_maps.Measuring(detail=2, trend="linear", foreshortened=True)
-    made = texrs.perspective(io.read(files / "discs.png"), size=48, measuring=how)
+    how = texrs.scale_maps.Measuring(min_feature_size=2, trend="linear", foreshortened=True)
+    made = texrs.perspective(io.read(files / "discs.png"), size=48, scale_measurement=how)
     np.testing.assert_array_equal(io.read(files / "out.png"), made.image)
 
 
@@ -92,11 +92,11 @@ def test_holes_are_filled_by_scale(files):
             "perspective @floor.png --scale-map @scale.npy -o @out.png --scale-weight 99",
             "--scale-weight: needs a number",
         ),
-        ("perspective @floor.png --detail 0 -o @out.png", "--detail: needs a number from 0.5"),
+        ("perspective @floor.png --min-feature-size 0 -o @out.png", "--min-feature-size: needs a number from 0.5"),
         ("perspective @floor.png --trend steep -o @out.png", "--trend: allowed are none, plane, linear and quadratic"),
         (
-            "perspective @floor.png --scale-map @scale.npy --detail 3 --foreshortened -o @out.png",
-            "--detail and --foreshortened: a scale map is given",
+            "perspective @floor.png --scale-map @scale.npy --min-feature-size 3 --foreshortened -o @out.png",
+            "--min-feature-size and --foreshortened: a scale map is given",
         ),
         ("inpaint @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
         ("inpaint @floor.png @hole.png -o @out.png --method heal", "--method: allowed are"),

@@ -141,7 +141,7 @@ def test_blending_takes_the_light_of_the_picture(method, box):
     plain = fill(image, hole, method=method, exemplar=dark)
     light = fill(image, hole, method=method, exemplar=dark, screening=1e-4)
     np.testing.assert_array_equal(light.image[~hole], image[~hole])
-    np.testing.assert_array_equal(light.stages["composite"], plain.image)
+    np.testing.assert_array_equal(light.stages["before_blending"], plain.image)
     np.testing.assert_array_equal(light.source.coordinates, plain.source.coordinates)
 
     def off(picture):

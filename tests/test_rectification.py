@@ -46,7 +46,7 @@ def test_scales_are_even() -> None:
 def test_pixels_are_the_photograph_s() -> None:
     result = texrs.rectify(FLOOR, view=PLANE)
     np.testing.assert_array_equal(result.source.render(FLOOR, antialias=True), result.image)
-    np.testing.assert_array_equal(result.stages["composite"], result.image)
+    np.testing.assert_array_equal(result.stages["before_blending"], result.image)
     # A map that is in register with the photograph follows: here where its pixels are.
     places = np.moveaxis(np.indices(PLANE.shape), 0, -1).astype(np.float32)
     np.testing.assert_allclose(
@@ -93,7 +93,7 @@ def test_dtypes_and_channels_stay(dtype: type) -> None:
     result = texrs.rectify(grey, view=PLANE)
     assert result.image.dtype == dtype
     assert result.image.ndim == 2
-    assert result.stages["composite"].shape == result.image.shape
+    assert result.stages["before_blending"].shape == result.image.shape
 
 
 def test_any_size_and_cyclic() -> None:

@@ -85,7 +85,7 @@ def test_light_is_followed() -> None:
     seen = np.where(marked[..., np.newaxis], np.uint8(90), lit)
     off = {}
     for light in (False, True):
-        made = texrs.remove(seen, marked, view=View(plane=PLANE, ground=~marked), light=light, seed=1)
+        made = texrs.remove(seen, marked, view=View(plane=PLANE, ground=~marked), match_lighting=light, seed=1)
         sides = [
             np.log(picture[60:125, 150:225].reshape(65, 3, 25, 3).mean(axis=(0, 2, 3))) for picture in (made.image, lit)
         ]
@@ -95,7 +95,7 @@ def test_light_is_followed() -> None:
         np.testing.assert_array_equal(made.image[kept], seen[kept])
     assert off[True] < 0.6 * off[False]
     # In even light there is nothing to follow.
-    even = [texrs.remove(FLOOR, MARKED, view=PLANE, light=light, seed=1).image for light in (False, True)]
+    even = [texrs.remove(FLOOR, MARKED, view=PLANE, match_lighting=light, seed=1).image for light in (False, True)]
     np.testing.assert_array_equal(*even)
 
 
@@ -235,7 +235,7 @@ def test_grey_pictures_of_16_bit_and_again() -> None:
     one, two = (texrs.remove(floor, marked, view=PLANE, seed=4, screening=None) for _ in range(2))
     assert one.image.dtype == np.uint16
     assert one.image.shape == SIZE
-    assert one.stages["composite"].shape == SIZE
+    assert one.stages["before_blending"].shape == SIZE
     np.testing.assert_array_equal(one.image, two.image)
     np.testing.assert_array_equal(one.source.render(floor), one.image)
 
@@ -313,14 +313,14 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_photograph_is_extended_to_a_size() -> None:
-    made = texrs.extend(FLOOR, to=(196, 260), view=PLANE, seed=1)
+    made = texrs.extend(FLOOR, size=(196, 260), view=PLANE, seed=1)
     assert made.image.shape == (196, 260, 3)
     assert made.report["added"] == {"top": 8, "bottom": 8, "left": 10, "right": 10}
     steep = Plane(SIZE, 62, 90, fov=55)
     up = texrs.extend(
-        look("pebbles", Plane(SIZE, 60, 90, fov=55)), to=(260, 240), view=steep, bottom=10, seed=1
+        look("pebbles", Plane(SIZE, 60, 90, fov=55)), size=(260, 240), view=steep, bottom=10, seed=1
     ).report["added"]
     assert up["top"] < 35 < up["bottom"]
     assert up["top"] + up["bottom"] == 80
     with pytest.raises(InvalidInput, match=r"to: needs \(180, 240\)"):
-        texrs.extend(FLOOR, to=(100, 300), view=PLANE)
+        texrs.extend(FLOOR, size=(100, 300), view=PLANE)

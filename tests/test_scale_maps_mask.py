@@ -237,9 +237,9 @@ def test_large_pictures_are_looked_at_in_cells() -> None:
     larger = np.repeat(np.repeat(TILES.image, 4, axis=0), 4, axis=1)[:-2, :-1]
     known = np.ones(larger.shape[:2], bool)
     known[400:600, 300:700] = False
-    mask = scale_maps.auto_mask(larger, detail=4)
+    mask = scale_maps.auto_mask(larger, min_feature_size=4)
     assert (mask[1::4, 1::4] == scale_maps.auto_mask(TILES.image)).mean() > 0.97
-    assert (scale_maps.auto_mask(larger, detail=4, known=known)[known] == mask[known]).mean() > 0.97
+    assert (scale_maps.auto_mask(larger, min_feature_size=4, known=known)[known] == mask[known]).mean() > 0.97
 
 
 def test_every_dtype_gives_the_same_mask() -> None:
@@ -291,7 +291,7 @@ def test_masks_without_features_are_refused(mask: np.ndarray, options: dict, mes
         (np.full((64, 64), np.nan), {}, r"^image: 4096 of 4096 values are NaN"),
         (TILES.image, {"known": BLANK}, r"^known: needs shape \(256, 256\), got \(64, 64\)$"),
         (TILES.image, {"known": np.zeros((256, 256), bool)}, r"^known: no pixel of the picture is known"),
-        (TILES.image, {"detail": 0}, r"^detail: needs a number from 0.5 to 64.0, got 0$"),
+        (TILES.image, {"min_feature_size": 0}, r"^min_feature_size: needs a number from 0.5 to 64.0, got 0$"),
         (TILES.image, {"trend": "flat"}, r"^trend: allowed are"),
     ],
 )

@@ -35,7 +35,7 @@ def seen(made, exemplar):
 
 def check_seen(made, exemplar):
     """Check that the composite is what its map shows: integers exactly, floats but for the order of sums."""
-    composite, expected = made.stages["composite"], seen(made, exemplar)
+    composite, expected = made.stages["before_blending"], seen(made, exemplar)
     assert composite.dtype == expected.dtype
     if composite.dtype.kind == "f":
         np.testing.assert_allclose(composite, expected, rtol=1e-3 if composite.dtype == np.float16 else 1e-6, atol=1e-5)
@@ -68,7 +68,7 @@ def test_what_comes_in_is_what_comes_out(name):
     assert made.image.dtype == exemplar.dtype
     assert made.image.shape == (24, 24, 24, *exemplar.shape[3:])
     check_seen(made, exemplar)
-    np.testing.assert_array_equal(made.image, made.stages["composite"])
+    np.testing.assert_array_equal(made.image, made.stages["before_blending"])
     assert made.image.min() >= exemplar.min() - 1e-3  # the look-up stays within
     assert made.image.max() <= exemplar.max() + 1e-3
 
@@ -215,9 +215,9 @@ def test_exemplars_that_repeat_are_found_by_measurement():
     assert measure_repeat(np.roll(whole, 9, 1), axes=3) == (True, True, True)
     assert measure_repeat(STRIPES, axes=3) != (True, True, True)
     around = texrs.solid(whole, 40, seed=4)
-    assert around.report["repeats"] == [True, True, True]
+    assert around.report["periodic_axes"] == [True, True, True]
     bounded = texrs.solid(texrs.Exemplar(whole, axes=3, repeat=False), 40, seed=4)
-    assert bounded.report["repeats"] == [False, False, False]
+    assert bounded.report["periodic_axes"] == [False, False, False]
     # Where it repeats, patches go on across its end: all of it can be used.
     across = [
         sum(
@@ -319,14 +319,14 @@ def test_reports_and_stages_are_saved(result, tmp_path):
     import imageio.v3 as iio
 
     assert [level["shape"] for level in result.report["levels"]] == [[33, 40, 21]]
-    assert list(result.stages) == ["patches", "composite"]
+    assert list(result.stages) == ["patches", "before_blending"]
     names = [p.name for p in result.save_stages(tmp_path / "stages")]
     assert names == ["01-patches.png", "02-composite.png", "report.json"]
     shown = iio.imread(tmp_path / "stages" / "02-composite.png")
     np.testing.assert_array_equal(shown, volume.slices(result.image))
     corrected = texrs.solid(STRIPES, (33, 40, 21), quality="fast")
     assert [level["shape"] for level in corrected.report["levels"]] == [[17, 20, 11], [33, 40, 21]]
-    assert list(corrected.stages) == ["blocks", "level 1", "level 2", "composite"]
+    assert list(corrected.stages) == ["blocks", "level 1", "level 2", "before_blending"]
     assert result._repr_png_().startswith(b"\x89PNG")
     flat = texrs.synthesize(WEAVE, 40)
     paths = flat.save_stages(tmp_path / "flat")

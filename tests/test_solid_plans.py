@@ -19,7 +19,7 @@ def beans():
 def test_the_usual_plan_is_what_is_made_where_nothing_is_said(beans):
     default, usual = (texrs.synthesize(beans, 128, seed=2, **said) for said in ({}, {"patches": "default"}))
     np.testing.assert_array_equal(default.image, usual.image)
-    assert (default.report["patches"], default.report["tried"]) == ("default", None)
+    assert (default.report["patches"], default.report["candidates"]) == ("default", None)
 
 
 def test_large_patches_are_fewer(beans):
@@ -51,7 +51,7 @@ def test_what_is_judged_clearly_best_is_taken(monkeypatch):
         monkeypatch.setattr("texrs.papers.solid.try_plan", lambda asked, progress, plan, seed, names=names: names[plan])
         found = texrs.synthesize(exemplar, 64, patches="auto").report
         assert found["patches"] == best
-        assert {name: figures["score"] for name, figures in found["tried"].items()} == given
+        assert {name: figures["score"] for name, figures in found["candidates"].items()} == given
 
 
 def test_plans_are_tried_once_an_exemplar():
@@ -65,20 +65,20 @@ def test_plans_are_tried_once_an_exemplar():
     ]
     assert tried.count((0, "try")) == 2 * len(plans.PLANS)
     assert tried.count((1, "try")) == 0
-    assert made[0].report["tried"] == made[1].report["tried"]
-    assert set(made[0].report["tried"]) == set(plans.PLANS)
-    assert set(made[0].report["tried"]["default"]) == {"score", "torn", "broken", "fog", "repetition", "share"}
+    assert made[0].report["candidates"] == made[1].report["candidates"]
+    assert set(made[0].report["candidates"]) == set(plans.PLANS)
+    assert set(made[0].report["candidates"]["default"]) == {"score", "torn", "broken", "fog", "repetition", "share"}
 
 
 def test_without_elements_there_is_nothing_to_be_plain_about():
     noise = np.random.default_rng(3).random((64, 64, 3)).astype(np.float32)
-    assert set(texrs.synthesize(noise, 64, patches="auto").report["tried"]) == {"default", "large"}
+    assert set(texrs.synthesize(noise, 64, patches="auto").report["candidates"]) == {"default", "large"}
 
 
 def test_labels_are_not_tried():
     labels = texrs.Exemplar(samples.beans((64, 64)).labels.astype(np.uint8), labels=True)
     found = texrs.synthesize(labels, 64, patches="auto").report
-    assert (found["patches"], found["tried"]) == ("default", None)
+    assert (found["patches"], found["candidates"]) == ("default", None)
 
 
 def test_the_command_takes_a_plan(tmp_path, monkeypatch):

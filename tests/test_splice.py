@@ -300,9 +300,15 @@ def test_progress_and_stopping() -> None:
 
 def test_stages_are_pictures(tmp_path: Any) -> None:
     result = texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96)
-    assert {"points of a", "points of b", "mask", "matching", "warped mesh", "before refinement", "composite"} <= set(
-        result.stages
-    )
+    assert {
+        "source points",
+        "target points",
+        "mask",
+        "matching",
+        "warped mesh",
+        "before refinement",
+        "before_blending",
+    } <= set(result.stages)
     assert len(result.save_stages(tmp_path)) == len(result.stages) + 1
 
 
@@ -388,8 +394,8 @@ def test_no_strength_leaves_the_layout_as_it_is(name: str) -> None:
     mine = ENTRIES[name]
     result = texrs.splice(mine, ENTRIES["pebbles"], use_cells=False, strength=0.0, seed=1)
     matches = result.report["matches"]
-    assert {m["realised"] for m in matches} == {None}
-    assert result.report["realised"] == 1
+    assert {m["displacement_reached"] for m in matches} == {None}
+    assert result.report["displacement_reached"] == 1
     inside = tuple(slice(2 * n // 5, 3 * n // 5) for n in mine.mask.shape)
     assert (result.image[inside] == mine.image[inside]).mean() > 0.98
 

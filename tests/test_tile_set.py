@@ -59,7 +59,7 @@ def _measure_steps(image: np.ndarray, axis: int, side: int) -> np.ndarray:
 
 def test_tiles_agree_along_their_edges(tiles: texrs.TileSet) -> None:
     """A strip lies on both sides of an edge, so that nothing is seen there."""
-    side = tiles.side
+    side = tiles.tile_size
     image = tiles[0 : 12 * side, 0 : 12 * side].astype(float)
     cells = image.reshape(12, side, 12, side, 3)
     mixed = np.random.default_rng(0).permutation(cells.transpose(0, 2, 1, 3, 4).reshape(144, side, side, 3))
@@ -137,7 +137,7 @@ def test_engines_read_what_is_saved(stones: texrs.TileSet, tmp_path: Path) -> No
         "tiles.gdshader",
     ]
     atlas, index = io.read(tmp_path / "albedo.png"), io.read(tmp_path / "index.png")
-    side = stones.side
+    side = stones.tile_size
     shown = np.concatenate(
         [
             np.concatenate(
@@ -158,7 +158,7 @@ def test_wrong_arguments(tiles: texrs.TileSet) -> None:
         (lambda: texrs.TileSet(DOTS, 30), "side: needs an integer from 32"),
         (lambda: texrs.TileSet(DOTS, 50), "side: needs a multiple of 4"),
         (lambda: texrs.TileSet(DOTS, 48, variants=0), "variants"),
-        (lambda: texrs.TileSet(DOTS, 48, wrap=True), "wrap: is said by side"),
+        (lambda: texrs.TileSet(DOTS, 48, wrap=True), "wrap: is given by tile_size"),
         (lambda: tiles.window((0, 10**16), 5), "origin"),
         (lambda: tiles.window(0, (5, 0)), "size"),
         (lambda: tiles[0:5], "index: needs ranges"),
@@ -172,9 +172,9 @@ def test_wrong_arguments(tiles: texrs.TileSet) -> None:
 def test_what_repeats_does_so_in_whole_periods() -> None:
     """Each tile lies as those beside it do, though no two show the same."""
     tiles = texrs.TileSet(samples.weave((96, 96)).image, seed=1, variants=2)
-    light = tiles[0 : 4 * tiles.side, 0 : 4 * tiles.side].mean(axis=-1)
+    light = tiles[0 : 4 * tiles.tile_size, 0 : 4 * tiles.tile_size].mean(axis=-1)
     for axis in (0, 1):
-        after, before = np.split(light, [tiles.side], axis)[1], np.split(light, [-tiles.side], axis)[0]
+        after, before = np.split(light, [tiles.tile_size], axis)[1], np.split(light, [-tiles.tile_size], axis)[0]
         assert np.corrcoef(after.ravel(), before.ravel())[0, 1] > 0.6
         assert not np.array_equal(after, before)
 

@@ -277,7 +277,7 @@ def test_axes_that_do_not_wrap_keep_their_size(wrap):
 
 def test_every_pixel_of_the_result_keeps_its_neighbours_but_at_the_cut():
     made = texrs.tile(picture("pebbles", 128), overlap=(30, 24))
-    pieces = made.stages["pieces"]
+    pieces = made.stages["source_regions"]
     for axis in (0, 1):
         torn = ~made.source.continues(axis)
         change = pieces != np.roll(pieces, -1, axis)
@@ -409,7 +409,7 @@ def test_an_exemplar_is_tiled_as_its_array():
 def test_seams_can_be_blended():
     pebbles = samples.pebbles((96, 96)).image
     plain, blended = texrs.tile(pebbles, overlap=12), texrs.tile(pebbles, overlap=12, screening=0.05)
-    assert (blended.stages["composite"] == plain.image).all()
+    assert (blended.stages["before_blending"] == plain.image).all()
     assert (blended.image != plain.image).any()
     assert blended.report["screening"] == 0.05
     with pytest.raises(InvalidInput, match="screening"):

@@ -185,9 +185,9 @@ def test_pixels_far_from_the_border_stay_where_they_are(name):
 def test_uneven_light_is_evened_and_reported():
     gravel = samples.load("gravel").image[:256, :256]
     lit = multiply(gravel[..., np.newaxis], 0.55, 1.45)
-    made, kept = texrs.tile(lit), texrs.tile(lit, flatten=False)
-    assert made.report["flatten"] is True
-    assert kept.report["flatten"] is False
+    made, kept = texrs.tile(lit), texrs.tile(lit, flatten_lighting=False)
+    assert made.report["flatten_lighting"] is True
+    assert kept.report["flatten_lighting"] is False
     [said] = [each for each in made.report["assumed"] if "unevenly" in each]
     assert said.startswith("image: is lit unevenly, one part 2.")
     ends = [np.ptp([part.mean() for part in np.array_split(each.image, 8, axis=1)]) for each in (made, kept)]
@@ -198,7 +198,7 @@ def test_uneven_light_is_evened_and_reported():
 @pytest.mark.parametrize("side", [128, 192])
 def test_even_light_stays(name, side):
     made = texrs.tile(picture(name, side))
-    assert made.report["flatten"] is False
+    assert made.report["flatten_lighting"] is False
     assert not any("lit" in each for each in made.report.get("assumed", []))
 
 
@@ -206,17 +206,17 @@ def test_heights_normals_and_what_tiles_are_not_lit():
     ramp = np.tile(np.linspace(10000, 40000, 160), (160, 1))
     noise = np.random.default_rng(1).normal(0, 900, ramp.shape)
     for heights in ((ramp + noise).astype(np.uint16), (ramp + noise).astype(np.float32) / 65535):
-        assert texrs.tile(heights).report["flatten"] is False
+        assert texrs.tile(heights).report["flatten_lighting"] is False
     slope = np.stack([0.7 * np.linspace(-1, 1, 160) * np.ones((160, 1)), 0 * ramp, 0 * ramp], axis=-1)
     slope[..., 2] = np.sqrt(1 - slope[..., 0] ** 2)
-    assert texrs.tile(np.rint((slope / 2 + 0.5) * 255).astype(np.uint8)).report["flatten"] is False
+    assert texrs.tile(np.rint((slope / 2 + 0.5) * 255).astype(np.uint8)).report["flatten_lighting"] is False
 
 
 def test_pictures_of_few_colours_keep_them():
     image = np.kron(np.tile(pixel_art(), (3, 3, 1))[:40, :44], np.ones((4, 4, 1), np.uint8))
     image[:, 88:] //= 4
     made = texrs.tile(image)
-    assert made.report["flatten"] is False
+    assert made.report["flatten_lighting"] is False
     assert {*map(tuple, made.image.reshape(-1, 3))} <= {*map(tuple, image.reshape(-1, 3))}
 
 
@@ -224,7 +224,7 @@ def test_only_colours_of_a_material_are_evened():
     image = multiply(picture("grit"), 0.55, 1.45)
     material = texrs.Material({"albedo": image, "height": image[..., 0].astype(np.uint16) * 257})
     made = texrs.tile(material)
-    assert made.report["flatten"] is True
+    assert made.report["flatten_lighting"] is True
     at = made.source.coordinates.astype(int)
     np.testing.assert_array_equal(made.material["height"].pixels, material["height"].pixels[at[..., 0], at[..., 1]])
     even = material.flatten()["albedo"].pixels

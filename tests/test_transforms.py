@@ -171,8 +171,8 @@ def test_threads_make_the_same_and_others_go_on_meanwhile():
 
 def test_it_can_be_sent_to_a_worker():
     sent = pickle.loads(pickle.dumps(TextureAugment(0.25)))
-    assert sent.visible == 0.25
-    assert repr(sent) == "TextureAugment(visible=0.25)"
+    assert sent.min_visible == 0.25
+    assert repr(sent) == "TextureAugment(min_visible=0.25)"
 
 
 def test_what_cannot_be_taken_is_said():
@@ -182,7 +182,7 @@ def test_what_cannot_be_taken_is_said():
         AUGMENT(IMAGE, boxes=[[1, 2, 3]])
     with pytest.raises(InvalidInput, match="image: each side must be at least 16"):
         AUGMENT(IMAGE[:12])
-    with pytest.raises(InvalidInput, match="visible: needs a number from 0 to 1"):
+    with pytest.raises(InvalidInput, match="min_visible: needs a number from 0 to 1"):
         TextureAugment(1.5)
 
 
@@ -208,7 +208,7 @@ def test_in_a_pipeline_of_albumentations():
         assert (made["mask"][round(top) : round(bottom), round(left) : round(right)] == label).any()
     both = alb.Compose([Transform(p=1)], seed=1)(image=IMAGE, mask=np.dstack([ROWS, COLUMNS]).astype(np.int32))
     assert np.array_equal(both["image"], IMAGE[both["mask"][..., 0], both["mask"][..., 1]])
-    assert Transform(p=1).to_dict()["transform"]["visible"] == 0.5
+    assert Transform(p=1).to_dict()["transform"]["min_visible"] == 0.5
 
 
 def ask_albumentations(pipe: object, results: object) -> None:

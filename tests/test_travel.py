@@ -143,7 +143,7 @@ def test_results_travel(tmp_path: Path) -> None:
     dots = samples.dots((96, 96)).image
     made = texrs.synthesize(WEAVE, 48, field=TURNED)
     back = pickle.loads(pickle.dumps(made))
-    assert np.array_equal(back.source.render(WEAVE), made.stages["composite"])
+    assert np.array_equal(back.source.render(WEAVE), made.stages["before_blending"])
     assert np.array_equal(back.source.frames(), made.source.frames())
     assert repr(back.source.finish) == repr(made.source.finish)
     elements = texrs.elements.analyse(dots)

@@ -55,7 +55,7 @@ def test_a_hole_has_no_step_at_its_border(name: str) -> None:
     assert measure_step(result.image, hole) <= 1.2
     assert result.image.dtype == volume.dtype
     # The map alone is exact, and looks nowhere into the hole.
-    np.testing.assert_array_equal(result.source.render([given]), result.stages["composite"])
+    np.testing.assert_array_equal(result.source.render([given]), result.stages["before_blending"])
     places = np.rint(result.source.coordinates).astype(int)
     assert not hole[tuple(np.moveaxis(places, -1, 0))].any()
     # What was in the hole does not matter.
@@ -77,8 +77,8 @@ def test_the_correction_can_be_left_out() -> None:
     volume = make_noise()
     hole = make_ball(volume.shape, 8)
     plain = texrs.inpaint(volume, hole, screening=0)
-    assert (plain.image == plain.stages["composite"]).all()
-    assert (texrs.inpaint(volume, hole).stages["composite"] == plain.image).all()
+    assert (plain.image == plain.stages["before_blending"]).all()
+    assert (texrs.inpaint(volume, hole).stages["before_blending"] == plain.image).all()
 
 
 def test_known_voxels_change_within_the_boundary_alone() -> None:

@@ -57,7 +57,7 @@ class Palette:
         image = source.render(self.images if len(self.images) > 1 else self.images[0], interpolation="nearest")
         known = {"screening": 0.0, "interpolation": "nearest"}
         report = {**made.report, **{key: value for key, value in known.items() if key in made.report}}
-        stages = {name: image if name == "composite" else stage for name, stage in made.stages.items()}
+        stages = {name: image if name == "before_blending" else stage for name, stage in made.stages.items()}
         return replace(made, image=image, source=source, stages=stages, report={**report, "palette": self.count})
 
 
@@ -81,7 +81,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
     wanted = isinstance(weight, int | float) and weight not in (0, usual.get("screening"))
     smooth = isinstance(how, str) and how not in ("nearest", usual.get("interpolation"))
     fading = any(isinstance(value, Mask) and value.feather for value in given.values())
-    if asked is False or wanted or smooth or fading or given.get("flatten") is True:
+    if asked is False or wanted or smooth or fading or given.get("flatten_lighting") is True:
         return None
     images: list[tuple[str, Array]] = []
     for name in names:

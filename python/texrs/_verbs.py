@@ -93,7 +93,7 @@ def takes_materials(
                 return verb(*given.args, **given.kwargs)
             materials = _check(several, used)
             check(given.arguments)
-            lit = given.arguments.get("flatten")
+            lit = given.arguments.get("flatten_lighting")
             guides = iter(guide_materials([m.flatten() for m in materials] if lit is True else materials))
             for name in used:
                 value = given.arguments[name]
@@ -105,10 +105,10 @@ def takes_materials(
                     )
             if lit is True:
                 # What is decided on is in even light already.
-                given.arguments["flatten"] = False
+                given.arguments["flatten_lighting"] = False
             made: Any = verb(*given.args, **given.kwargs)
             if lit is True:
-                made = replace(made, source=_flattened(made.source), report={**made.report, "flatten": True})
+                made = replace(made, source=_flattened(made.source), report={**made.report, "flatten_lighting": True})
             if isinstance(made, Synthesis):
                 return cast(T, finish(made, materials, watch))
             return cast(T, (finish(one, materials, watch) for one in made))
@@ -123,12 +123,12 @@ def finish(made: Synthesis, materials: list[Material], progress: Progress | None
     """Return what a verb made of guides as what it makes of their materials."""
     made = _palettes.keep_material(made, materials)
     material = apply_materials(materials, made.source, progress)
-    stages = {"guide" if name == "composite" else name: stage for name, stage in made.stages.items()}
+    stages = {"guide" if name == "before_blending" else name: stage for name, stage in made.stages.items()}
     maps = {name: each.role.value for name, each in material.items()}
     return replace(
         made,
         image=material.base,
-        stages={**stages, "composite": material.base},
+        stages={**stages, "before_blending": material.base},
         report={**made.report, "maps": maps},
         material=material,
     )
@@ -157,7 +157,7 @@ def _analyse(material: object, guide: Array, name: str, progress: Progress | Non
 def _flattened(source: SourceMap) -> SourceMap:
     """Return the source map of something whose light is to be evened."""
     assert source.finish is not None
-    return replace(source, finish=replace(source.finish, flatten=True))
+    return replace(source, finish=replace(source.finish, flatten_lighting=True))
 
 
 def _as_list(value: object) -> list[object]:

@@ -38,11 +38,11 @@ def extend(
     bottom: int = 0,
     left: int = 0,
     right: int = 0,
-    to: int | Sequence[int] | None = None,
+    size: int | Sequence[int] | None = None,
     view: View | Plane | Sequence[View | Plane] | None = None,
     boundary_width: int = 0,
     screening: float | None = 0.1,
-    light: bool = True,
+    match_lighting: bool = True,
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -54,7 +54,7 @@ def extend(
         The photograph, any real dtype, each side at least 64.
     top, bottom, left, right : int
         Pixels that are added there, 0 to 8192; some somewhere. Towards the horizon only as far as it.
-    to : int or (rows, columns), optional
+    size : int or (rows, columns), optional
         Size of the larger picture, in pixels: what the sides above do not add to it is added evenly, but towards the horizon
         only as far as the plane goes, and on the other side then.
     view : View or Plane, or a sequence of them, optional
@@ -66,7 +66,7 @@ def extend(
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
     screening : float, optional
         Weight of the values when the colours of what is added are corrected, as in `texrs.inpaint`; None or 0: no correction.
-    light : bool
+    match_lighting : bool
         Whether slow changes of light, as towards a window, are followed; beyond the photograph it stays as it is at the border.
     seed : int
         Chooses among what fits.
@@ -108,17 +108,21 @@ def extend(
         name: as_int(value, name, 0, MOST)
         for name, value in (("top", top), ("bottom", bottom), ("left", left), ("right", right))
     }
-    size = add_sizes((rows, columns), added) if to is None else as_size(to, "to")
-    missing = [n - m for n, m in zip(size, add_sizes((rows, columns), added), strict=True)]
+    sides = add_sizes((rows, columns), added) if size is None else as_size(size, "size")
+    missing = [n - m for n, m in zip(sides, add_sizes((rows, columns), added), strict=True)]
     if min(missing) < 0 or max(missing) > 2 * MOST:
         raise InvalidInput(
-            f"to: needs {rows, columns} pixels, and what the sides add, at least, and at most {2 * MOST} more; got {size}"
+            f"size: needs {rows, columns} pixels, and what the sides add, at least, and at most {2 * MOST} more; got {sides}"
         )
-    if size == (rows, columns):
+    if sides == (rows, columns):
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
-    check_work("extend", [pixels], size, "top, bottom, left, right" if to is None else "to")
+    check_work("extend", [pixels], sides, "top, bottom, left, right" if size is None else "size")
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
-    rim, number, follow = as_int(boundary_width, "boundary_width", 0, 64), as_seed(seed), as_bool(light, "light")
+    rim, number, follow = (
+        as_int(boundary_width, "boundary_width", 0, 64),
+        as_seed(seed),
+        as_bool(match_lighting, "match_lighting"),
+    )
     watch = progress or (lambda stage, share: None)
     views = as_views(view)
     settled = [v.settle((rows, columns)) for v in views]
@@ -141,11 +145,11 @@ def extend(
             added[before], added[after] = added[before] - over, added[after] + over
     first = np.array([added["top"], added["left"]])
     inner = (slice(first[0], first[0] + rows), slice(first[1], first[1] + columns))
-    canvas, hole = np.zeros((*size, pixels.shape[2]), pixels.dtype), np.ones(size, np.bool_)
+    canvas, hole = np.zeros((*sides, pixels.shape[2]), pixels.dtype), np.ones(sides, np.bool_)
     canvas[inner], hole[inner] = pixels, False
     parts = []
     for shown, (plane, _) in zip(grounds, planes, strict=True):
-        ground = np.zeros(size, np.bool_)
+        ground = np.zeros(sides, np.bool_)
         ground[inner] = shown
         parts.append(Part.of(ground, plane, (-added["top"], -added["left"])))
     parts = add_rest(parts, hole, canvas)
@@ -157,23 +161,23 @@ def extend(
     made = fill_parts(canvas, hole, parts, boundary=rim, light=follow, seed=number, progress=progress)
     lit = (-added["top"], -added["left"]) if follow else None
     # It copies nothing from beyond the photograph's borders.
-    places = np.moveaxis(np.indices(size), 0, -1) - first
+    places = np.moveaxis(np.indices(sides), 0, -1) - first
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
     source = source.finished((False, False), antialias=True, **made.finish(screening, lit))
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
-    stages = made.show(canvas, hole) | {"composite": source.render(pixels, antialias=True)}
+    stages = made.show(canvas, hole) | {"before_blending": source.render(pixels, antialias=True)}
     if image.ndim == 2:
-        result = result.reshape(size)
-        stages |= {name: stages[name].reshape(size) for name in ("known", "composite")}
+        result = result.reshape(sides)
+        stages |= {name: stages[name].reshape(sides) for name in ("known", "before_blending")}
     report: dict[str, Any] = {
         "added": added,
         "patches": list(made.counts),
         "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
         "boundary_width": rim,
         "screening": screening,
-        "light": follow,
+        "match_lighting": follow,
         "seed": number,
         "planes": [{"plane": None if plane is None else plane.as_dict(), "found": found} for plane, found in planes],
         "ground": [round(float(ground.mean()), 4) for ground in grounds],
@@ -182,7 +186,7 @@ def extend(
 
 
 def add_sizes(shape: tuple[int, int], added: Mapping[str, int]) -> tuple[int, int]:
-    """Return the size of a picture with what is added on its sides."""
+    """Return the sides of a picture with what is added on its sides."""
     return shape[0] + added["top"] + added["bottom"], shape[1] + added["left"] + added["right"]
 
 

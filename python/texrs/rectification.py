@@ -87,7 +87,7 @@ def rectify(
     Synthesis
         The texture, in the dtype and with the channels of the photograph; its source map leads to the photograph, with the
         frames of the plane, by which normals turn. The stages are ``"flat"``, all of the plane that is seen,
-        ``"sharp"``, what of that is used, and ``"composite"``. The report has the plane.
+        ``"sharp"``, what of that is used, and ``"before_blending"``. The report has the plane.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def rectify(
     stages = {
         "flat": sheet.source.render(pixels, interpolation="linear"),
         "sharp": sheet.sharp,
-        "composite": composite[..., 0] if squeeze else composite,
+        "before_blending": composite[..., 0] if squeeze else composite,
     }
     report: dict[str, Any] = {
         "plane": plane.as_dict(),

@@ -45,7 +45,7 @@ def remove(
     boundary_width: int | None = None,
     patch_size: int | None = None,
     screening: float | None = 0.1,
-    light: bool = True,
+    match_lighting: bool = True,
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -72,7 +72,7 @@ def remove(
     screening : float, optional
         Weight of the values when the colours of what is filled in are corrected, as in `texrs.inpaint`; None or 0: no
         correction.
-    light : bool
+    match_lighting : bool
         Whether slow changes of light, as towards a window, are followed: they are divided out of what is copied, and those of
         where it goes multiplied on.
     seed : int
@@ -86,8 +86,8 @@ def remove(
     Synthesis
         The photograph without it, in its dtype and with its channels; nothing changes but what is marked, its margin and
         boundary. Its source map leads to the photograph. The stages are ``"known"``, ``"ground"``, each plane in a shade of
-        its own, ``"patches"`` and ``"composite"``. The report contains the planes that were followed, and ``"filled"``, the
-        share of the image that is filled, 0 to 1, margin included.
+        its own, ``"patches"`` and ``"before_blending"``. The report contains the planes that were followed, and ``"filled"``,
+        the share of the image that is filled, 0 to 1, margin included.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def remove(
     if boundary_width is not None:
         rim = things = as_int(boundary_width, "boundary_width", 0, 64)
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
-    number, follow = as_seed(seed), as_bool(light, "light")
+    number, follow = as_seed(seed), as_bool(match_lighting, "match_lighting")
     watch = progress or (lambda stage, share: None)
     side = None if patch_size is None else as_int(patch_size, "patch_size", 4, min(shape))
     views = as_views(view)
@@ -152,7 +152,7 @@ def remove(
     source = made.source.finished((False, False), **how)
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
-    stages = made.show(pixels, hole) | {"composite": source.render(pixels)}
+    stages = made.show(pixels, hole) | {"before_blending": source.render(pixels)}
     report: dict[str, Any] = {
         "filled": float(hole.mean()),
         "patches": list(made.counts),
@@ -160,7 +160,7 @@ def remove(
         "margin": wide,
         "boundary_width": rim,
         "screening": screening,
-        "light": follow,
+        "match_lighting": follow,
         "seed": number,
         "planes": [{"plane": None if plane is None else plane.as_dict(), "found": found} for plane, found in planes],
         "ground": [round(float(ground.mean()), 4) for ground in grounds],
@@ -168,5 +168,5 @@ def remove(
     }
     if image.ndim == 2:
         result = result.reshape(shape)
-        stages |= {name: stages[name].reshape(shape) for name in ("known", "composite")}
+        stages |= {name: stages[name].reshape(shape) for name in ("known", "before_blending")}
     return Synthesis(result, source, stages, report)

@@ -29,9 +29,9 @@ class Synthesis:
     image : (rows, columns[, C]) or (planes, rows, columns[, C]) array
         The result, in the dtype and with the channels of the exemplar.
     source : SourceMap
-        Where each pixel comes from; ``source.render(exemplar)`` is ``stages["composite"]``, exactly.
+        Where each pixel comes from; ``source.render(exemplar)`` is ``stages["before_blending"]``, exactly.
     stages : mapping of str to array
-        Pictures of the stages, in the order in which they were made. ``"composite"`` is the result before any colour
+        Pictures of the stages, in the order in which they were made. ``"before_blending"`` is the result before any colour
         correction.
     report : mapping of str to object
         What was decided and measured: JSON types only.
@@ -83,7 +83,7 @@ class Synthesis:
         >>> import numpy as np
         >>> from texrs import SourceMap, Synthesis
         >>> picture = np.zeros((4, 4), np.uint8)
-        >>> result = Synthesis(picture, SourceMap.identity((4, 4)), {"composite": picture})
+        >>> result = Synthesis(picture, SourceMap.identity((4, 4)), {"before_blending": picture})
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in result.save_stages(folder)]
         ['01-composite.png', 'report.json']

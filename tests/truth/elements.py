@@ -15,13 +15,13 @@ from texrs.exemplar import segment
 from truth.exemplars import clear, colour, deep, floats, sample
 from truth.table import Parts, case, parts_of
 
-DESIGNED = ("elements", "segmentation", "rotate", "shares", "holes", "operations")
+DESIGNED = ("elements", "segmentation", "rotate", "pixel_counts", "holes", "operations")
 
 
 @case
 def design() -> Parts:
     result = texrs.design(colour("pebbles", 96, 104), (144, 160), seed=3)
-    return parts_of(result, report=DESIGNED, stages=("segmentation", "composite"))
+    return parts_of(result, report=DESIGNED, stages=("segmentation", "before_blending"))
 
 
 @case
@@ -67,7 +67,7 @@ def design_mixed_by_a_map_of_weights() -> Parts:
     ramp = np.linspace(0, 1, size[1]) * np.ones((size[0], 1))
     weights = np.stack([1 - ramp, ramp], axis=-1)
     result = texrs.design(several, size, weights=weights, wrap=(False, True), copies=2, seed=5)
-    return parts_of(result, report=DESIGNED, stages=("composite",))
+    return parts_of(result, report=DESIGNED, stages=("before_blending",))
 
 
 @case
@@ -79,7 +79,7 @@ def design_with_things_scattered() -> Parts:
 @case
 def design_as_printed() -> Parts:
     result = texrs.design(colour("pebbles", 96, 96, seed=1), (128, 144), method="paper", seed=2)
-    return parts_of(result, report=DESIGNED, stages=("composite",))
+    return parts_of(result, report=DESIGNED, stages=("before_blending",))
 
 
 # --- SPLICE ----------------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from truth.exemplars import box, channels, classes, clear, colour, deep, floats
 from truth.table import Parts, case, parts_of
 
 CUBE = (32, 32, 32)
-GROWN = ("repeats", "interpolation", "held", "levels")
+GROWN = ("periodic_axes", "interpolation", "constrained_points", "levels")
 
 # --- pictures --------------------------------------------------------------------------------------------------------
 
@@ -152,14 +152,14 @@ def frames_of_all_fields() -> Parts:
 def windows_of_a_plane() -> Parts:
     field = fields.spiral(angle=30, centre=(0, 0), axes=2)
     plane = PlaneTexture(colour("weave", 64, 64, seed=3), field=field, seed=2, quality="fast")
-    parts = parts_of(plane.window((-40, 100), (64, 80)), report=("origin", "repeats"))
+    parts = parts_of(plane.window((-40, 100), (64, 80)), report=("origin", "periodic_axes"))
     return parts | {"row": plane[-30, 90:140], "part": plane[10:20, 100:120]}
 
 
 @case
 def windows_of_a_solid() -> Parts:
     texture = SolidTexture(Exemplar(deep("stripes", *CUBE, seed=2), axes=3, repeat=False), seed=1, quality="fast")
-    parts = parts_of(texture.window((-4, 98, 2), (4, 8, 8)), report=("origin", "repeats"))
+    parts = parts_of(texture.window((-4, 98, 2), (4, 8, 8)), report=("origin", "periodic_axes"))
     return parts | {"slice": texture.slice((-2, 102, 6), normal=(1, 1, 0), size=4)}
 
 
@@ -167,14 +167,14 @@ def windows_of_a_solid() -> Parts:
 def patches_of_a_plane() -> Parts:
     field = fields.spiral(angle=30, centre=(0, 0), axes=2)
     plane = PlaneTexture(colour("weave", 48, 48, seed=3), field=field, seed=2)
-    parts = parts_of(plane.window((-40, 100), (40, 50)), report=("origin", "repeats", "quality"))
+    parts = parts_of(plane.window((-40, 100), (40, 50)), report=("origin", "periodic_axes", "quality"))
     return parts | {"row": plane[-30, 90:140]}
 
 
 @case
 def patches_of_a_solid() -> Parts:
     texture = SolidTexture(Exemplar(deep("stripes", *CUBE, seed=2), axes=3, repeat=False), seed=1)
-    parts = parts_of(texture.window((-4, 98, 2), (4, 8, 8)), report=("origin", "repeats", "quality"))
+    parts = parts_of(texture.window((-4, 98, 2), (4, 8, 8)), report=("origin", "periodic_axes", "quality"))
     return parts | {"slice": texture.slice((-2, 102, 6), normal=(1, 1, 0), size=4)}
 
 

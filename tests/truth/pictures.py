@@ -83,7 +83,7 @@ def perspective_on_another_plane() -> Parts:
 def perspective_as_printed() -> Parts:
     floor = sample("tilted_discs", 56, 56)
     result = texrs.perspective(floor.image, floor.scale_map, (48, 48), method="paper", seed=2)
-    return parts_of(result, report=("energies",), stages=("composite",))
+    return parts_of(result, report=("energies",), stages=("before_blending",))
 
 
 @case
@@ -160,7 +160,7 @@ def removed() -> Parts:
 @case
 def tile() -> Parts:
     result = texrs.tile(colour("pebbles", 144, 160))
-    return parts_of(result, report=("overlap", "joints"), stages=("swapped", "pieces"))
+    return parts_of(result, report=("overlap", "joints"), stages=("shifted", "source_regions"))
 
 
 @case
@@ -175,7 +175,7 @@ COMPLETED = ("filled", "replaced_outside", "patch_size", "patches")
 def inpaint_with_patches() -> Parts:
     hole = box((128, 144), (40, 90), (50, 100)) | box((128, 144), (0, 30), (120, 144))
     result = texrs.inpaint(colour("pebbles", 128, 144, seed=4), hole, boundary_width=5, screening=0.003, seed=3)
-    return parts_of(result, report=COMPLETED, stages=("known", "patches", "composite"))
+    return parts_of(result, report=COMPLETED, stages=("known", "patches", "before_blending"))
 
 
 @case
@@ -212,7 +212,7 @@ def inpaint_with_a_source() -> Parts:
     hole = box((96, 112), (20, 70), (30, 80))
     other = floats("pebbles", 80, 96, seed=5)
     result = texrs.inpaint(floats("grit", 96, 112), hole, exemplar=other, screening=0.001, boundary_width=2, seed=1)
-    return parts_of(result, report=COMPLETED, stages=("patches", "composite"))
+    return parts_of(result, report=COMPLETED, stages=("patches", "before_blending"))
 
 
 # --- colours and source maps -----------------------------------------------------------------------------------------

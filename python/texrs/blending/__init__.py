@@ -263,7 +263,7 @@ def _look_up(
     """Look maps up and correct their seams, in even light or with light that is followed if the finish says so."""
     if map_type == "label":
         return source.render(several, interpolation="nearest")
-    if how is not None and how.flatten and map_type == "colour":
+    if how is not None and how.flatten_lighting and map_type == "colour":
         several = [flatten(as_ndarray(each, "exemplars")) for each in several]
     if (
         how is not None

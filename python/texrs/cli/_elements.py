@@ -129,7 +129,7 @@ def database_command(
         return
     if not os.path.isdir(folder):
         raise FileError(f"{folder}: there is no such folder")
-    textures = TextureDatabase(folder, say=complain)
+    textures = TextureDatabase(folder, log=complain)
     match action:
         case "list":
             for record in textures.list():
@@ -221,7 +221,7 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
         )
     for image in images:
         _outputs.check_apart([image], {"name": os.path.join(folder, f"{given['name'] or Path(image).stem}.npz")})
-    textures = TextureDatabase(folder, say=complain)
+    textures = TextureDatabase(folder, log=complain)
     options = ANALYSED.call(values) | KEPT.call(KEPT.read(given, which=lambda o: o.name != "name"))
     for image in images:
         sample = image.startswith(SAMPLE)
@@ -252,7 +252,7 @@ def explain(entry: Any, *, quiet: bool) -> None:
         value = {"box": show_box(entry.report["box"]), "layout": entry.layout}.get(name, "as drawn")
         note(f"proposed {name}: {value} ({sure.get(name, 0):.0%} sure)", quiet=quiet)
     note(f"elements: {entry.arrangement.describe(entry.layout)}", quiet=quiet)
-    for doubt in entry.report["doubts"]:
+    for doubt in entry.report.get("warnings", ()):
         note(f"doubtful: {doubt}", quiet=quiet)
 
 

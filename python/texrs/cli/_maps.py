@@ -36,7 +36,7 @@ APPLIED = Options(
         "finish.fade": "the verb knows where its filling fades",
     },
     optional=dict.fromkeys(
-        ("wrap", "interpolation", "antialias", "screening", "across", "outlines", "flatten"), "as the map says"
+        ("wrap", "interpolation", "antialias", "screening", "across", "outlines", "flatten_lighting"), "as the map says"
     )
     | dict.fromkeys(("map_type", "green"), "as the name says"),
 )
@@ -106,7 +106,7 @@ def store_map(
     read = io.read if places.axes == 2 else io.read_volume
     images = [read(path) for path in paths]
     kind, green = read_kind(paths[0], images, places, values)
-    if finish.flatten and kind == "colour":
+    if finish.flatten_lighting and kind == "colour":
         images = [flatten(image) for image in images]
     how: dict[str, Any] = {"interpolation": finish.interpolation, "antialias": finish.antialias}
     how |= {"interpolation": "nearest"} if kind == "label" else {"map_type": kind, "green": green}
@@ -159,7 +159,7 @@ def read_kind(
 
 def fit(finish: Finish, paths: Sequence[str], given: Mapping[str, Any]) -> Finish:
     """Return how maps are finished whose names may say that they are no colours, which alone are lit."""
-    return finish if given["finish_flatten"] is not None else choose_finish(finish, paths[0])
+    return finish if given["finish_flatten_lighting"] is not None else choose_finish(finish, paths[0])
 
 
 def group(maps: Sequence[str], count: int) -> list[list[str]]:

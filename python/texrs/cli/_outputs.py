@@ -45,7 +45,7 @@ MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "Ho
 """Groups of options in the help."""
 NO_MATERIALS = ("batch", "samples")
 """Commands that read no folder of maps: a folder that is called as what they are given is none."""
-MATTER = ("out", "folder", "size", "to", "seed", "seeds", "options", "field", "wrap", "slant", "at")
+MATTER = ("out", "folder", "size", "seed", "seeds", "options", "field", "wrap", "slant", "at")
 """Options that matter most, the first three of which come first in the help of a command."""
 
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {

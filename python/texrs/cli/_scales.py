@@ -27,7 +27,7 @@ FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
 """Formats that keep the scales themselves; pictures of 8 bits keep them encoded."""
 ANGLES = Options(scale_maps.from_angles, only=("slant", "tilt", "fov"), optional={"slant": "", "tilt": "90"})
 MASKS = Options(scale_maps.from_mask, only=("measure", "window", "trend", "foreshortened"))
-FOUND = Options(scale_maps.auto_mask, only=("detail",))
+FOUND = Options(scale_maps.auto_mask, only=("min_feature_size",))
 EDITED = Options(scale_maps.edit, only=("steps",), names={"steps": "edit"}, optional={"steps": ""})
 RESIZED = Options(
     scale_maps.resample,

@@ -49,8 +49,8 @@ class Record:
 class Folder:
     """The manifest of a folder, and how entries get into it."""
 
-    def __init__(self, path: FilePath, say: Callable[[str], object] | None) -> None:
-        self.path, self._say, self._made = path, say, False
+    def __init__(self, path: FilePath, log: Callable[[str], object] | None) -> None:
+        self.path, self._say, self._made = path, log, False
         if not path.is_dir() and (path.exists() or not path.parent.is_dir()):
             raise FileError(f"{path}: no folder can be made there")
 

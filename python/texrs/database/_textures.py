@@ -108,9 +108,9 @@ class TextureDatabase:
 
     """
 
-    def __init__(self, path: Path, *, say: Callable[[str], object] | None = None) -> None:
+    def __init__(self, path: Path, *, log: Callable[[str], object] | None = None) -> None:
         self.path = as_path(path)
-        self._folder = Folder(self.path, say)
+        self._folder = Folder(self.path, log)
         self._folder.read()
 
     def __repr__(self) -> str:

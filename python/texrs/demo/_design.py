@@ -28,7 +28,7 @@ CAPTIONS = {
     "deformed": ("Deformed", "moved as a logistic map says, stitched by graph cuts"),
     "holes": ("Holes", "what no element covers"),
     "completed": ("Completed", "holes filled by example"),
-    "composite": ("Composite", "variants stitched on the torus"),
+    "before_blending": ("Composite", "variants stitched on the torus"),
 }
 
 

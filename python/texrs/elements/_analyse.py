@@ -158,7 +158,7 @@ def analyse(
         for name, sure in start.confidence.items()
         if sure < DOUBTFUL
     ]
-    entry = replace(entry, report={**entry.report, "doubts": [*entry.report["doubts"], *unsure]})
+    entry = replace(entry, report={**entry.report, "warnings": [*entry.report["warnings"], *unsure]})
     return correct(entry, steps)
 
 
@@ -307,7 +307,7 @@ def _make_entry(
     """Return the entry of a texture, with a report of what was found and decided."""
     report: dict[str, Any] = {
         "proposed": start.proposed,
-        "doubts": _list_doubts(given, start, parted, how),
+        "warnings": _list_doubts(given, start, parted, how),
         "confidence": start.confidence,
         "box": [*start.box.centre, *start.box.size],
         "background": [] if start.background is None else _sample_places(start.background),

@@ -90,7 +90,7 @@ def correct(entry: Elements, steps: object) -> Elements:
         "corrections": [*entry.report.get("corrections", []), *known],
         "foreground": float(entry.mask.mean()),
         "spacing": spacing(entry.points),
-        "doubts": [trouble] if trouble else [],
+        "warnings": [trouble] if trouble else [],
     }
     return replace(entry, report=report, directions=directions(entry.points), known=None) if known else entry
 

@@ -53,7 +53,7 @@ def page(entry: Elements, title: str = "elements") -> str:
         advice = f"; {escape(ADVICE[name])}" if sure is not None and sure < DOUBTFUL else ""
         value = {"layout": str(entry.layout), "box": f"{entry.box[0]} x {entry.box[1]}"}.get(name, "")
         rows.append(f"<tr{' class=doubt' if advice else ''}><th>{name}<td>{escape(value)}<td>{said}{advice}")
-    doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("doubts", []))
+    doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("warnings", []))
     known = {
         "points": entry.points.round(2).tolist(),
         "box": list(entry.box),

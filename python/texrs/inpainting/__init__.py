@@ -131,9 +131,9 @@ def inpaint(
         The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
         into ``[image, exemplar]``; pixels that are kept map to themselves, and none maps into the hole. To render a
         picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
-        (each in a shade of its own) and ``"composite"``, the result before ``screening``. In the report ``"measured"`` tells of
-        a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is; ``"exemplar_measured"``
-        the same of the exemplar's. ``"filled"`` is the share of the image that is filled, 0 to 1.
+        (each in a shade of its own) and ``"before_blending"``, the result before ``screening``. In the report ``"measured"``
+        tells of a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is;
+        ``"exemplar_measured"`` the same of the exemplar's. ``"filled"`` is the share of the image that is filled, 0 to 1.
 
     Raises
     ------
@@ -263,7 +263,7 @@ def inpaint(
     bare[open_] = 0 if open_.all() else bare.min()
     shades = np.zeros(open_.shape, np.uint8)
     shades[new] = 55 + places.label[new] * 67 % 200
-    stages = {"known": bare, "patches": shades, "composite": composite}
+    stages = {"known": bare, "patches": shades, "before_blending": composite}
     report: dict[str, object] = {
         "method": method,
         "seed": seed,
@@ -273,7 +273,7 @@ def inpaint(
         "exemplar_measured": None if measured[1] is None else measured[1].as_dict(),
         "replaced_outside": int(np.count_nonzero(~open_[new])),
         "patch_size": round(made.side, 3),
-        "tried": [[s, round(shown, 3)] for s, shown in made.tried],
+        "candidates": [[s, round(shown, 3)] for s, shown in made.tried],
         "patches": count,
         "allow_mirror": len(mirrors) > 1,
         "screening": screening,

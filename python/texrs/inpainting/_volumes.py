@@ -127,7 +127,7 @@ def inpaint_volume(
         "labels": labelled,
         "screening": weight or 0.0,
     }
-    stages = {"known": bare, "patches": shades, "composite": composite}
+    stages = {"known": bare, "patches": shades, "before_blending": composite}
     finished = source.finished((False,) * 3, interpolation="nearest")
     return Synthesis(result, finished, stages, report)
 

@@ -190,4 +190,8 @@ def find_kind(role: Role | None) -> Kind:
 def choose_finish(finish: Finish, name: str | None) -> Finish:
     """Return a finish that removes uneven light from colours alone."""
     role = find_named(name)
-    return replace(finish, flatten=False) if finish.flatten and role not in (None, Role.COLOUR) else finish
+    return (
+        replace(finish, flatten_lighting=False)
+        if finish.flatten_lighting and role not in (None, Role.COLOUR)
+        else finish
+    )

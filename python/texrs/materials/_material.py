@@ -481,9 +481,9 @@ def apply_materials(materials: Sequence[Material], source: SourceMap, progress: 
     check_alike(materials)
     first, made = materials[0], dict[str, Map]()
     finish = source.finish
-    if finish is not None and finish.flatten:
+    if finish is not None and finish.flatten_lighting:
         # Colours alone are lit, and each map says how it encodes light.
-        materials, finish = [m.flatten() for m in materials], replace(finish, flatten=False)
+        materials, finish = [m.flatten() for m in materials], replace(finish, flatten_lighting=False)
     names = list(first)
 
     def make(name: str, watch: Callable[[float], object]) -> Array:

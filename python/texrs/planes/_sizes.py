@@ -204,7 +204,7 @@ def list_masks(pixels: Array, known: Bools) -> list[Floats]:
     finest = max(1.0, FINEST * min(pixels.shape[:2]))
     for times in DETAILS:
         try:
-            mask = scale_maps.auto_mask(pixels, detail=times * finest, trend="quadratic", known=known)
+            mask = scale_maps.auto_mask(pixels, min_feature_size=times * finest, trend="quadratic", known=known)
             found.append(log_single(scale_maps.from_mask(mask, known=known)))
         except InvalidInput:
             # Nothing is so coarse; others may say something.

@@ -26,7 +26,9 @@ _FLAT = 1e-4
 """Standard deviation of colours, of 1, below which a picture shows nothing."""
 
 
-def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "plane", known: object = None) -> Bools:
+def auto_mask(
+    image: object, *, min_feature_size: float | None = None, trend: Trend = "plane", known: object = None
+) -> Bools:
     """Return a mask of the features of a picture: what is lighter than its surroundings.
 
     How far the surroundings reach, and what is too fine to be seen, must grow with the elements, or else the mask has
@@ -37,7 +39,7 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     ----------
     image : array_like
         Shape (H, W) or (H, W, C).
-    detail : float, optional
+    min_feature_size : float, optional
         What is finer than so many pixels, where elements have their normal size, is no feature. By default 1/400 of the
         shorter side, at least 1.
     trend : {"plane", "linear", "quadratic", "none"}
@@ -71,7 +73,11 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
     if not there.any():
         raise InvalidInput("known: no pixel of the picture is known; there must be some to look at")
-    fine = max(1.0, _DETAIL * min(size)) if detail is None else as_float(detail, "detail", 0.5, min(size) / 4)
+    fine = (
+        max(1.0, _DETAIL * min(size))
+        if min_feature_size is None
+        else as_float(min_feature_size, "min_feature_size", 0.5, min(size) / 4)
+    )
     as_trend(trend)
     colours = guidance(pixels)
     if float(colours[there].std(axis=0).max()) < _FLAT:

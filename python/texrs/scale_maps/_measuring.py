@@ -20,7 +20,7 @@ class Measuring:
 
     Parameters
     ----------
-    detail : float, optional
+    min_feature_size : float, optional
         Measured in a mask of features, of which what is finer than so many pixels, where elements have their normal size, is
         none (`auto_mask`). By default 1/400 of the picture's shorter side, at least 1.
     trend : {"plane", "linear", "quadratic", "none"}
@@ -37,19 +37,21 @@ class Measuring:
     Examples
     --------
     >>> from texrs import samples, scale_maps
-    >>> measured = scale_maps.Measuring(detail=3, foreshortened=True).measure(samples.tilted_discs((128, 128)).image)
+    >>> measured = scale_maps.Measuring(min_feature_size=3, foreshortened=True).measure(samples.tilted_discs((128, 128)).image)
     >>> bool(measured[-1, 64] > measured[0, 64])
     True
 
     """
 
-    detail: float | None = None
+    min_feature_size: float | None = None
     trend: Trend = "plane"
     foreshortened: bool = False
 
     def __post_init__(self) -> None:
-        if self.detail is not None:
-            object.__setattr__(self, "detail", as_float(self.detail, "detail", 0.5, LARGEST_DETAIL))
+        if self.min_feature_size is not None:
+            object.__setattr__(
+                self, "min_feature_size", as_float(self.min_feature_size, "min_feature_size", 0.5, LARGEST_DETAIL)
+            )
         as_trend(self.trend)
         as_bool(self.foreshortened, "foreshortened")
 
@@ -80,5 +82,5 @@ class Measuring:
         (96, 96)
 
         """
-        mask = auto_mask(image, detail=self.detail, trend=self.trend, known=known)
+        mask = auto_mask(image, min_feature_size=self.min_feature_size, trend=self.trend, known=known)
         return from_mask(mask, trend=self.trend, foreshortened=self.foreshortened, known=known)

@@ -17,7 +17,7 @@ from texrs.errors import InvalidInput
 
 __all__ = ["Finish"]
 
-PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines", "flatten", "light")
+PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines", "flatten_lighting", "light")
 """What is said in words; the rest are masks."""
 
 
@@ -43,7 +43,7 @@ class Finish:
         Whether values are corrected also where two exemplars meet.
     outlines : bool
         Whether the step across a seam stays where it is the outline of a thing.
-    flatten : bool
+    flatten_lighting : bool
         Whether uneven light is taken out of colours before they are looked up, see `texrs.materials.flatten`.
     within : (rows, columns) bool, optional
         Correct only marked pixels; all others keep their values. None: correct all.
@@ -74,7 +74,7 @@ class Finish:
     band: int | None = None
     across: bool = True
     outlines: bool = True
-    flatten: bool = False
+    flatten_lighting: bool = False
     within: Bools | None = None
     known: tuple[Bools, ...] | None = None
     parts: NDArray[np.uint16] | None = None
@@ -148,7 +148,7 @@ class Finish:
         shape, shapes = as_instance(shape, "shape", tuple), as_instance(shapes, "shapes", tuple)
         words: dict[str, Any] = json.loads(parts["finish"].tobytes())
         # Files of before there was flattening say nothing of it.
-        if not isinstance(words, dict) or {"flatten", *words} != set(PLAIN):
+        if not isinstance(words, dict) or {"flatten_lighting", *words} != set(PLAIN):
             raise InvalidInput(f"finish: needs {', '.join(PLAIN)}")
         if not isinstance(words["wrap"], list) or len(words["wrap"]) != len(shape):
             raise InvalidInput(f"finish: wrap needs {len(shape)} values")
@@ -176,7 +176,7 @@ class Finish:
             None if band is None else as_int(band, "band", 1, 2**31),
             as_bool(words["across"], "across"),
             as_bool(words["outlines"], "outlines"),
-            as_bool(words.get("flatten", False), "flatten"),
+            as_bool(words.get("flatten_lighting", False), "flatten_lighting"),
             None if within is None else within.astype(np.bool_),
             tuple(m.astype(np.bool_) for m in masks) if masks else None,
             apart,

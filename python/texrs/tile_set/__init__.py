@@ -67,7 +67,7 @@ class TileSet(InParts):
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar or Material
         The example, as `texrs.design` takes it.
-    side : int, optional
+    tile_size : int, optional
         Of a tile, 32 to 1024 and a multiple of 4; that of the exemplar's shorter side, 64 to 256, by default, or less so that
         what repeats does so in whole periods.
     seed : int
@@ -101,7 +101,7 @@ class TileSet(InParts):
     def __init__(
         self,
         exemplar: Array | Exemplar | Material,
-        side: int | None = None,
+        tile_size: int | None = None,
         *,
         seed: int = 0,
         variants: int = 4,
@@ -111,29 +111,31 @@ class TileSet(InParts):
         watch = listen(progress)
         shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
         known = as_exemplar(shown)
-        if side is None:
-            side = choose_side(known.segment().lattice, int(np.clip(min(known.shape), 64, 256)) // 4 * 4)
-        if as_int(side, "side", 32, 1024) % 4:
-            raise InvalidInput(f"side: needs a multiple of 4, got {side}")
-        self._side, self._seed = side, as_seed(seed)
+        if tile_size is None:
+            tile_size = choose_side(known.segment().lattice, int(np.clip(min(known.shape), 64, 256)) // 4 * 4)
+        if as_int(tile_size, "tile_size", 32, 1024) % 4:
+            raise InvalidInput(f"tile_size: needs a multiple of 4, got {tile_size}")
+        self._side, self._seed = tile_size, as_seed(seed)
         if {"size", "wrap", "count"} & options.keys():
-            raise InvalidInput(f"{min({'size', 'wrap', 'count'} & options.keys())}: is said by side and variants")
-        check_work("TileSet", [known.pixels], (9 * side, 9 * side), "side")
+            raise InvalidInput(f"{min({'size', 'wrap', 'count'} & options.keys())}: is given by tile_size and variants")
+        check_work("TileSet", [known.pixels], (9 * tile_size, 9 * tile_size), "tile_size")
         given = exemplar if isinstance(exemplar, Material) else known
         made = list(
-            design_variants(given, as_int(variants, "variants", 1, 64), 2 * side, seed=seed, progress=watch, **options)
+            design_variants(
+                given, as_int(variants, "variants", 1, 64), 2 * tile_size, seed=seed, progress=watch, **options
+            )
         )
         depth = _measure_depth(known)
         costs = [np.asarray(KEEP * each.source.render(depth, interpolation="linear"), np.float32) for each in made]
         pictures = Pictures(np.stack([each.image for each in made]), np.stack(costs))
         advance = stage(watch, "tiles")
-        step = find_step(list(pictures.images), known.segment().lattice, side)
-        tiles = cut_tiles(pictures, side, step, self._seed, advance or (lambda share: None))
+        step = find_step(list(pictures.images), known.segment().lattice, tile_size)
+        tiles = cut_tiles(pictures, tile_size, step, self._seed, advance or (lambda share: None))
         around = np.pad(TORUS, (0, 1), mode="wrap")
         order = number_tiles(around)
         self._place: NDArray[np.intp] = np.empty(TILES, np.intp)
         self._place[order.reshape(-1)] = np.arange(TILES)
-        laid = tiles[order].transpose(0, 2, 1, 3, 4).reshape(9 * side, 9 * side, 3)
+        laid = tiles[order].transpose(0, 2, 1, 3, 4).reshape(9 * tile_size, 9 * tile_size, 3)
         materials = [each.material for each in made if each.material is not None]
         self._maps: dict[str, Array] = {}
         if materials:
@@ -156,13 +158,13 @@ class TileSet(InParts):
         return f"<{TILES} corner tiles of {self._side} x {self._side}, seed {self._seed}>"
 
     @property
-    def side(self) -> int:
+    def tile_size(self) -> int:
         """Pixels of a tile's side."""
         return self._side
 
     @property
     def atlas(self) -> Array:
-        """All tiles on a torus, (9 side, 9 side[, C]): each fits those beside it."""
+        """All tiles on a torus, (9 tile_size, 9 tile_size[, C]): each fits those beside it."""
         return self._maps[self._base]
 
     @property
@@ -190,7 +192,7 @@ class TileSet(InParts):
         Parameters
         ----------
         origin : int or (int, int)
-            First cell: cell (i, j) begins at pixel (i side, j side).
+            First cell: cell (i, j) begins at pixel (i tile_size, j tile_size).
         size : int or (rows, columns)
             How many cells, down and across.
 
@@ -269,11 +271,11 @@ class TileSet(InParts):
         coordinates, exemplar, label, *found = self._read(start, sides, arrays)
         here = SourceMap(coordinates, exemplar, label, found[-1] if dense else frame, source.shapes)
         maps = dict(zip(names, found[: len(names)], strict=True))
-        report = {"side": self._side, "seed": self._seed, "origin": list(start)}
+        report = {"tile_size": self._side, "seed": self._seed, "origin": list(start)}
         if watch is not None:
             watch(1.0)
         material = None if self._like is None else self._like.replace(**maps)
-        return Synthesis(maps[self._base], here, {"composite": maps[self._base]}, report, material)
+        return Synthesis(maps[self._base], here, {"before_blending": maps[self._base]}, report, material)
 
     def _read(self, origin: Sequence[int], size: Sequence[int], arrays: Sequence[Array]) -> list[Array]:
         """Return windows of arrays of the atlas."""

@@ -73,7 +73,7 @@ def tile(
     size: int | Sequence[int] | None = None,
     overlap: int | Sequence[int] | None = None,
     screening: float | None = None,
-    flatten: bool | None = None,
+    flatten_lighting: bool | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Make a picture tileable: copies of the result side by side have no edge between them.
@@ -96,7 +96,7 @@ def tile(
     screening : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear: the smaller, the wider the
         correction. None or 0: no correction, so that each pixel is one of the picture. See `texrs.blend`.
-    flatten : bool, optional
+    flatten_lighting : bool, optional
         If True, uneven light is evened out first, as far as there is evidence of it. By default only if one part is lit at
         least 1.6 times brighter than another part, and no side is shorter than 128 pixels. Of a material only colours
         are flattened. See `texrs.materials.flatten`.
@@ -108,12 +108,12 @@ def tile(
     -------
     Synthesis
         The image, in the dtype and with the channels of the picture; an axis that does not wrap keeps its length, or that
-        much of its middle that was asked for. The stages are ``"swapped"`` (the halves
-        exchanged, nothing cut yet), ``"pieces"`` (which part of the picture each pixel is from) and ``"composite"``, the
-        result before colours are corrected. The report contains for each axis the overlap, 0 if the ends are covered, the
-        number of joints that were tried, and the cost of the cuts. ``already`` lists the axes along which the picture tiles.
-        ``in_place`` is the share of the pixels that are those of the picture at the same place. ``resized`` is the reason for
-        another size, and ``tiling`` is what `texrs.check_tiling` finds in the result.
+        much of its middle that was asked for. The stages are ``"shifted"`` (the halves
+        exchanged, nothing cut yet), ``"source_regions"`` (which part of the picture each pixel is from) and
+        ``"before_blending"``, the result before colours are corrected. The report contains for each axis the overlap, 0 if the
+        ends are covered, the number of joints that were tried, and the cost of the cuts. ``already`` lists the axes along which
+        the picture tiles. ``in_place`` is the share of the pixels that are those of the picture at the same place. ``resized``
+        is the reason for another size, and ``tiling`` is what `texrs.check_tiling` finds in the result.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def tile(
     )
     choices = as_choices(overlap, size is None, (rows, columns), wanted, cyclic)
     check_work("tile", [pixels], wanted, "image" if size is None else "size", way=LARGER)
-    evened = None if flatten is None else as_bool(flatten, "flatten")
+    evened = None if flatten_lighting is None else as_bool(flatten_lighting, "flatten_lighting")
     with collect() as notices:
         free = [cyclic[a] and overlap is None and wanted == (rows, columns) for a in range(2)]
         already = [] if evened else find_tiled(given, free)
@@ -167,7 +167,7 @@ def tile(
             choices=choices,
             already=already,
             screening=weight,
-            flatten=evened,
+            flatten_lighting=evened,
             progress=listen(progress),
         )
     return replace(made, report=notices.add_to(made.report)) if notices else made
@@ -185,12 +185,12 @@ def join_edges(
     choices: Sequence[Choice],
     already: Sequence[int],
     screening: float,
-    flatten: bool,
+    flatten_lighting: bool,
     progress: Progress | None,
 ) -> Synthesis:
     """Return a picture whose edges are joined along the axes that wrap, and do not tile ``already``.
 
-    ``flatten``: whether the picture is in even light, which it was not.
+    ``flatten_lighting``: whether the picture is in even light, which it was not.
     """
     exemplar, watch = as_exemplar(image, "image"), progress or (lambda stage, share: None)
     shape = (exemplar.shape[0], exemplar.shape[1])
@@ -204,23 +204,23 @@ def join_edges(
     else:
         source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, watch)
     weight = screening if found or larger else 0.0
-    source = source.finished(wrap, screening=weight or None, flatten=flatten)
+    source = source.finished(wrap, screening=weight or None, flatten_lighting=flatten_lighting)
     composite = source.render(exemplar.image)
     # The picture is in even light already.
-    finish = None if source.finish is None else replace(source.finish, flatten=False)
+    finish = None if source.finish is None else replace(source.finish, flatten_lighting=False)
     result = apply(source, exemplar.image, finish=finish, progress=progress) if weight else composite
     watch("done", 1.0)
     stages = {
-        "swapped": np.roll(exemplar.image, [n // 2 if c else 0 for n, c in zip(shape, wrap, strict=True)], (0, 1)),
-        "pieces": (source.label * 85 % 256).astype(np.uint8),
-        "composite": composite,
+        "shifted": np.roll(exemplar.image, [n // 2 if c else 0 for n, c in zip(shape, wrap, strict=True)], (0, 1)),
+        "source_regions": (source.label * 85 % 256).astype(np.uint8),
+        "before_blending": composite,
     }
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
         "size": list(source.shape),
         "wrap": list(wrap),
         "screening": weight,
-        "flatten": flatten,
+        "flatten_lighting": flatten_lighting,
         "already": [AXES[a] for a in already],
         "resized": reasons,
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
@@ -368,5 +368,5 @@ def describe(joined: Joined) -> dict[str, object]:
         "cover": joint.cover,
         "joints_tried": joined.tried,
         "cost": round(cost, 4),
-        "cost_of_a_pair": round(cost / max(edges, 1), 4),
+        "mean_seam_cost": round(cost / max(edges, 1), 4),
     }

@@ -99,7 +99,7 @@ class TextureAugment:
 
     Parameters
     ----------
-    visible : float
+    min_visible : float
         Share of a box's area that must be seen in one piece for a box to survive, 0 to 1; see `follow_boxes`.
 
     Raises
@@ -122,12 +122,12 @@ class TextureAugment:
 
     """
 
-    def __init__(self, visible: float = 0.5) -> None:
-        self.visible = as_float(visible, "visible", 0, 1)
+    def __init__(self, min_visible: float = 0.5) -> None:
+        self.min_visible = as_float(min_visible, "min_visible", 0, 1)
 
     def __repr__(self) -> str:
         """Return the options."""
-        return f"TextureAugment(visible={self.visible})"
+        return f"TextureAugment(min_visible={self.min_visible})"
 
     def __call__(
         self,
@@ -171,5 +171,5 @@ class TextureAugment:
         source = design(known, known.shape, seed=number, wrap=False, motion="keep", elements=things).source
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")
-        kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.visible)
+        kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.min_visible)
         return Augmented(shown, followed, kept, index, source, number)

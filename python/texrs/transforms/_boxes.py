@@ -15,13 +15,15 @@ LOOSE = 0.5
 """Pixels by which neighbours may miss the step that their frame says, and still show one piece."""
 
 
-def follow_boxes(source: SourceMap, boxes: Array, visible: float = 0.5) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def follow_boxes(
+    source: SourceMap, boxes: Array, min_visible: float = 0.5
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the boxes around what is seen of boxes through a source map.
 
     Neighbouring pixels that are neighbours in the exemplar too are one piece of it. Wherever a piece shows at least the share
-    ``visible`` of a box's area, it gets a box: the smallest around the pixels of the piece that come from inside the box. So a
-    thing that is copied twice has two boxes, one that is cut off a smaller one, and one of which too little is left none. A box
-    is as tight as it was: where it was loose, so is what follows from it.
+    ``min_visible`` of a box's area, it gets a box: the smallest around the pixels of the piece that come from inside the box.
+    So a thing that is copied twice has two boxes, one that is cut off a smaller one, and one of which too little is left none.
+    A box is as tight as it was: where it was loose, so is what follows from it.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ def follow_boxes(source: SourceMap, boxes: Array, visible: float = 0.5) -> tuple
     boxes : (n, 4 or more) array_like
         left, top, right, bottom in pixels of the exemplar, from the outer edges: the whole picture is 0, 0, columns, rows.
         What stands behind stays with the box, as a class.
-    visible : float
+    min_visible : float
         Share of a box's area, as far as it lies in the picture, that must be seen in one piece; 0 to 1.
 
     Returns
@@ -65,7 +67,7 @@ def follow_boxes(source: SourceMap, boxes: Array, visible: float = 0.5) -> tuple
     if given.ndim != 2 or given.shape[1] < 4:
         raise InvalidInput(f"boxes: needs shape (n, 4) or (n, 4 and more), got {given.shape}")
     check_finite(given, "boxes")
-    share = as_float(visible, "visible", 0, 1)
+    share = as_float(min_visible, "min_visible", 0, 1)
     count, piece = _find_pieces(source)
     # A pixel covers half of one to each side of its middle, and boxes count from the edge.
     row, column = (source.coordinates[..., axis].ravel() + 0.5 for axis in range(2))

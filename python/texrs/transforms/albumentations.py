@@ -31,7 +31,7 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
 
     Parameters
     ----------
-    visible : float
+    min_visible : float
         See `texrs.transforms.follow_boxes`.
     p : float
         How often it is done.
@@ -43,12 +43,12 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
     class InitSchema(DualTransform.InitSchema):  # type: ignore[misc]
         """What the options may be."""
 
-        visible: float
+        min_visible: float
 
-    def __init__(self, visible: float = 0.5, p: float = 0.5) -> None:
+    def __init__(self, min_visible: float = 0.5, p: float = 0.5) -> None:
         super().__init__(p=p)
-        self.visible = visible
-        self._augment = Augment(visible)
+        self.min_visible = min_visible
+        self._augment = Augment(min_visible)
 
     def get_params_dependent_on_data(self, params: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
         """Return the source map of this sample."""
@@ -70,5 +70,5 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
         """Return the boxes that survive, in shares of the picture's sides as they came."""
         rows, columns = source.shape
         scale = np.concatenate([[columns, rows, columns, rows], np.ones(bboxes.shape[1] - 4)])
-        boxes, _ = follow_boxes(source, bboxes * scale, self.visible)
+        boxes, _ = follow_boxes(source, bboxes * scale, self.min_visible)
         return np.asarray(boxes / scale, bboxes.dtype)

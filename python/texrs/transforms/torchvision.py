@@ -30,15 +30,15 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
 
     Parameters
     ----------
-    visible : float
+    min_visible : float
         See `texrs.transforms.follow_boxes`.
 
     """
 
-    def __init__(self, visible: float = 0.5) -> None:
+    def __init__(self, min_visible: float = 0.5) -> None:
         super().__init__()
-        self.visible = visible
-        self._augment = Augment(visible)
+        self.min_visible = min_visible
+        self._augment = Augment(min_visible)
 
     def make_params(self, flat_inputs: list[Any]) -> dict[str, Any]:
         """Return the source map of this sample, and which boxes survive."""
@@ -51,7 +51,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         for each in flat_inputs:
             if isinstance(each, tv_tensors.BoundingBoxes):
                 corners = functional.convert_bounding_box_format(each, new_format=tv_tensors.BoundingBoxFormat.XYXY)
-                params["boxes"], params["index"] = follow_boxes(source, corners.numpy(), self.visible)
+                params["boxes"], params["index"] = follow_boxes(source, corners.numpy(), self.min_visible)
         return params
 
     def transform(self, inpt: Any, params: dict[str, Any]) -> Any:

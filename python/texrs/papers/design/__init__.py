@@ -34,7 +34,7 @@ Departures, with their reasons:
   and nowhere else.
 - What repeats on a lattice is stretched and sheared a little, by 15 % at most, so that a whole number of periods goes around
   a cyclic texture, and patches are taken in step with each other: else bricks run together where the courses close. The
-  report's "stretched" says by how much.
+  report's "lattice_stretch" says by how much.
 - What lies in courses without repeating along them, as a wall of stones of all lengths, is made level and laid course by
   course, as tall as the texture, a few times, those as tall exchanged for each other; patches are free along the courses and
   keep their places across, so all joints go through (`texrs.papers.design.sheets`). The report's "courses" says what was found.

@@ -23,7 +23,7 @@ __all__ = ["describe", "draw_stages"]
 
 def draw_stages(plan: Plan, tile: Tile, picture: Array) -> dict[str, Array]:
     """Return pictures of the stages, in their order."""
-    return {"segmentation": draw_elements(plan), **tile.stages, "composite": picture}
+    return {"segmentation": draw_elements(plan), **tile.stages, "before_blending": picture}
 
 
 TINT = 0.55
@@ -61,11 +61,11 @@ def describe(
         "reason": first.parts.reason,
         "arrangement": ["courses" if p.still and p.parts.courses else classify(p.parts) for p in plans],
         "motion": ["keep" if p.still else "move" for p in plans],
-        "tried": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
+        "candidates": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "courses": [describe_courses(p) for p in plans],
-        "stretched": [describe_closing(p, arguments) for p in plans],
+        "lattice_stretch": [describe_closing(p, arguments) for p in plans],
         "rotate": first.moves.rotate,
-        "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
+        "pixel_counts": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
         "density": None if arguments.density is None else describe_density(plans, composite, arguments.density),
         "holes": [t.holes for t in tiles],
         "screening": arguments.screening,

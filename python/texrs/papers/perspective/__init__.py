@@ -73,7 +73,7 @@ def perspective(
     scale_kind: Kind | None = None,
     fov: float | None = None,
     direction: float | Array | Field | str | None = None,
-    measuring: Measuring | None = None,
+    scale_measurement: Measuring | None = None,
     method: Method = None,
     scale_weight: float = 1.0,
     augment_scales: Sizes = "auto",
@@ -115,7 +115,7 @@ def perspective(
         By how many degrees, counter-clockwise, what is copied is turned: everywhere, or at each pixel; an array of another size
         is stretched. Of a `texrs.fields.Field` of two axes, or its words, as ``"circular"`` or ``"zigzag:period=64,angle=30"``,
         how it turns. On a plane or another surface it turns there.
-    measuring : Measuring, optional
+    scale_measurement : Measuring, optional
         How the ``scale_map`` "auto" is measured in a mask of features (`texrs.scale_maps.Measuring`), rather than by a plane.
     method : {None, "paper"}
         Which algorithm. "paper": the literal one, kept for comparison: averages, and slow. It does not wrap, and
@@ -194,7 +194,7 @@ def perspective(
             scale_kind=scale_kind,
             fov=fov,
             direction=direction,
-            measuring=measuring,
+            scale_measurement=scale_measurement,
             method=method,
             scale_weight=scale_weight,
             augment_scales=augment_scales,
@@ -222,7 +222,7 @@ def perspective(
         found.coordinates, asked.exemplar.shape, label=found.patches, frame=found.frames
     ).finished(asked.wrap, interpolation=asked.interpolation, antialias=True)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation, antialias=True)
-    stages = {"sheet": laid.sheet.show(asked.exemplar.image), "target": laid.wanted, "composite": composite}
+    stages = {"sheet": laid.sheet.show(asked.exemplar.image), "target": laid.wanted, "before_blending": composite}
     return Synthesis(composite, source, stages, describe(asked, laid, found))
 
 

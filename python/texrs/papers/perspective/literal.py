@@ -62,7 +62,7 @@ def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
         "measured": asked.describe_measured(),
         "energies": energies,
     }
-    return Synthesis(made.reshape(composite.shape), source, {"target": target, "composite": composite}, report)
+    return Synthesis(made.reshape(composite.shape), source, {"target": target, "before_blending": composite}, report)
 
 
 def average(

@@ -110,7 +110,7 @@ class Request:
         scale_kind: Kind | None,
         fov: float | None,
         direction: object,
-        measuring: Measuring | None,
+        scale_measurement: Measuring | None,
         method: Method,
         scale_weight: float,
         augment_scales: Sizes,
@@ -143,7 +143,7 @@ class Request:
             raise InvalidInput(
                 "method: the paper's knows no surfaces and no directions; give a scale map as target, or leave out the method"
             )
-        plane, scale, measured = find_scale(known, scale_map, measuring)
+        plane, scale, measured = find_scale(known, scale_map, scale_measurement)
         mine = as_map(scale, "scale_map", known.shape)
         kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said
         if surface is None:
@@ -182,11 +182,13 @@ class Request:
 
 
 def find_scale(
-    exemplar: Exemplar, scale_map: Array | Plane | str, measuring: Measuring | None
+    exemplar: Exemplar, scale_map: Array | Plane | str, scale_measurement: Measuring | None
 ) -> tuple[Plane | None, Array, Measured | None]:
     """Return the plane that an exemplar shows, if it is given, how large its elements are, and how that was measured."""
-    if measuring is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
-        raise InvalidInput("measuring: a scale map is given, so that nothing is measured; leave out one of them")
+    if scale_measurement is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
+        raise InvalidInput(
+            "scale_measurement: a scale map is given, so that nothing is measured; leave out one of them"
+        )
     if is_words(scale_map):
         scale_map = read_plane(scale_map, exemplar.shape, "scale_map")
     if isinstance(scale_map, Plane):
@@ -199,12 +201,12 @@ def find_scale(
         return None, scale_map, None
     if as_choice(scale_map, "scale_map", ("auto", "front")) == "front":
         return Plane((exemplar.shape[0], exemplar.shape[1]), 0.0), np.ones(exemplar.shape, np.float32), None
-    if measuring is None:
+    if scale_measurement is None:
         found = measure_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
         return None, found.scale, found
-    if not isinstance(measuring, Measuring):
-        raise InvalidInput(f"measuring: needs a texrs.scale_maps.Measuring, got {measuring!r}")
-    return None, measuring.measure(exemplar.image), None
+    if not isinstance(scale_measurement, Measuring):
+        raise InvalidInput(f"scale_measurement: needs a texrs.scale_maps.Measuring, got {scale_measurement!r}")
+    return None, scale_measurement.measure(exemplar.image), None
 
 
 def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: bool) -> None:

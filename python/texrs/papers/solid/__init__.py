@@ -236,7 +236,8 @@ def synthesize(
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         How patches are put together. "large": a quarter larger than the default, which tears fewer things and copies more in
         one piece. "unmasked": seams may run through elements. "auto": each is tried twice at the exemplar's size and judged
-        (`texrs.judging`), and what is clearly better than the default is taken; the report's "tried" says how each was judged.
+        (`texrs.judging`), and what is clearly better than the default is taken; the report's "candidates" contains the
+        figures of each.
     method : {None, "paper", "paper-compensated"}
         Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of
         Lefebvre and Hoppe, which the paper leaves out. They have no ``quality``, take no constraints
@@ -312,7 +313,7 @@ def synthesize(
 
 def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
     """Grow the source map, coarse to fine or from patches, and look the exemplar up through it."""
-    said: dict[str, Any] = {"patches": None, "tried": None}
+    said: dict[str, Any] = {"patches": None, "candidates": None}
     show = partial(show_places, asked.exemplar.pixels)
     if asked.method is not None:
         grown = grow_as_printed(
@@ -333,7 +334,7 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
     source = as_source(asked, grown).finished(asked.region.wrap, interpolation=asked.interpolation)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
     last = {} if grown.patches else {f"level {len(grown.levels)}": show(grown.places, asked.region, 1)}
-    stages = {**grown.stages, **last, "composite": composite}
+    stages = {**grown.stages, **last, "before_blending": composite}
     return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, grown) | said)
 
 
@@ -343,7 +344,7 @@ def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown
     start = PLANS[name].start(asked.exemplar, asked.seed, asked.quality, asked.bend_patches)
     frames = partial(to_fixed, asked.field)
     grown = grow(asked.region, 1, start, keep, frames, ask=asked.conditions.at, show=show, progress=progress)
-    return grown, {"patches": name, "tried": tried}
+    return grown, {"patches": name, "candidates": tried}
 
 
 def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:
@@ -400,9 +401,9 @@ def describe(asked: Request, grown: Grown) -> dict[str, Any]:
         "quality": None if asked.method else asked.quality,
         "seed": asked.seed,
         "field": None if asked.field is None else asked.field.describe(),
-        "repeats": list(asked.exemplar.repeat),
+        "periodic_axes": list(asked.exemplar.repeat),
         "interpolation": asked.interpolation,
-        "held": asked.conditions.count,
+        "constrained_points": asked.conditions.count,
         "guided": asked.conditions.maps is not None,
         "elements": _count_elements(asked),
         "stitched": None if grown.patches is None else grown.patches.report(),

@@ -199,10 +199,10 @@ class Texture(Endless):
             "seed": self._seed,
             "origin": list(start),
             "field": None if self._field is None else self._field.describe(),
-            "repeats": list(self._exemplar.repeat),
+            "periodic_axes": list(self._exemplar.repeat),
             "interpolation": self._how,
         }
-        made = Synthesis(image, source, {"composite": image}, report)
+        made = Synthesis(image, source, {"before_blending": image}, report)
         return made if self._material is None else finish(made, [self._material], progress)
 
     def sample(

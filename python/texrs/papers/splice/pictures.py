@@ -52,9 +52,9 @@ def draw_stages(
     extension = match.extension
     origin = np.array(extension.origin)
     shown = to_picture(a.image)
-    draw: dict[str, Callable[[], Array]] = {"points of a": lambda: mark_points(shown, a.points, RED)}
+    draw: dict[str, Callable[[], Array]] = {"source points": lambda: mark_points(shown, a.points, RED)}
     if b is not None:
-        draw["points of b"] = lambda: mark_points(to_picture(b.image), b.points, BLUE)
+        draw["target points"] = lambda: mark_points(to_picture(b.image), b.points, BLUE)
     draw |= {
         "mask": lambda: dim_ground(shown, a.mask),
         "matching": lambda: draw_lines(
@@ -66,7 +66,7 @@ def draw_stages(
     draw |= {
         "before refinement": lambda: show_draft(shown, draft),
         "filled": lambda: shown[filled.places[..., 0], filled.places[..., 1]],
-        "composite": lambda: image,
+        "before_blending": lambda: image,
     }
     return Stages(draw)
 

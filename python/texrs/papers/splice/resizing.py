@@ -33,12 +33,12 @@ def crop(a: Elements, size: Sequence[int]) -> Synthesis:
     source = source.finished((False, False), interpolation="nearest")
     image = source.render(a.image, interpolation="nearest")
     matches = [
-        {"target": place, "found": place, "realised": None, "element": k, "point": list_place(point)}
+        {"target": place, "found": place, "displacement_reached": None, "element": k, "point": list_place(point)}
         for k, point in enumerate(list_element_points(a))
         for place in [list_place(point - first)]
     ]
     report = {"method": "default", "size": list(size), "layout": a.layout.value, "matches": matches}
-    return Synthesis(image, source, {"composite": image}, report)
+    return Synthesis(image, source, {"before_blending": image}, report)
 
 
 def read_elements(a: Elements, made: Synthesis) -> Elements:
@@ -87,5 +87,5 @@ def report_resized(
         "edit": list(steps),
         "elements": [list_place(point) for point in entry.points],
     }
-    stages = {"resized": resized.image, **edited.stages, "composite": whole.render(a.image)}
+    stages = {"resized": resized.image, **edited.stages, "before_blending": whole.render(a.image)}
     return Synthesis(edited.image, whole, stages, report)

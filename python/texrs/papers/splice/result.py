@@ -59,7 +59,7 @@ def compose(
         "size": list(size),
         "layout": a.layout.value,
         **match.report(),
-        "realised": realised,
+        "displacement_reached": realised,
         "screening": screening,
         "holes": float(1 - warp.known.mean()),
         "triangles": warp.triangles,
@@ -88,7 +88,7 @@ def compose_edit(a: Elements, laid: Rearrangement, *, seed: int, screening: floa
         "size": list(shape),
         "layout": a.layout.value,
         **laid.match.report(),
-        "realised": realised,
+        "displacement_reached": realised,
         "screening": screening,
         "holes": float(1 - laid.draft.known.mean()),
         "triangles": 0,
@@ -135,7 +135,7 @@ def _list_matches(a: Elements, match: Match) -> tuple[list[dict[str, Any]], floa
         {
             "target": list_place(goal),
             "found": list_place(there),
-            "realised": part,
+            "displacement_reached": part,
             "element": int(element),
             "point": list_place(points[element]),
         }
@@ -183,9 +183,9 @@ def report_ways(
     Returns
     -------
     summary : dict
-        "present", the share that is shown, and "realised", how much of their ways they go.
+        "present", the share that is shown, and "displacement_reached", how much of their ways they go.
     matches : list of dict
-        A target each: "target", "found" and "realised".
+        A target each: "target", "found" and "displacement_reached".
 
     """
     from scipy.spatial import cKDTree
@@ -197,8 +197,8 @@ def report_ways(
     parts, _ = measure_realised(start, goal, found)
     _, realised = measure_realised(start[inside], goal[inside], found[inside])
     present = round(float(there[inside].mean()) if inside.any() else 0.0, 4)
-    return {"present": present, "realised": realised}, [
-        {"target": list_place(g), "found": list_place(f) if shown else None, "realised": part}
+    return {"present": present, "displacement_reached": realised}, [
+        {"target": list_place(g), "found": list_place(f) if shown else None, "displacement_reached": part}
         for g, f, shown, part in zip(goal, found, there, parts, strict=True)
     ]
 

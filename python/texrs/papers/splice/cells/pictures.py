@@ -26,12 +26,12 @@ def draw_cell_stages(
     targets = wanted.labels[m:-m, m:-m]
     return Stages(
         {
-            "cells of a": lambda: _draw_cells(to_picture(a.image), cells),
-            "layout of b": lambda: mark_points(to_picture(b.image), b.points, BLUE),
+            "source cells": lambda: _draw_cells(to_picture(a.image), cells),
+            "target layout": lambda: mark_points(to_picture(b.image), b.points, BLUE),
             "target cells": lambda: draw_outlines(np.full((*targets.shape, 3), 255, np.uint8), targets, BLUE),
             "assignment": lambda: _shade(joined.chart, charts.source, cells.count),
             "cuts": lambda: draw_outlines(to_picture(image), joined.chart + 1, GREEN),
-            "composite": lambda: image,
+            "before_blending": lambda: image,
         }
     )
 

@@ -20,11 +20,11 @@ def draw_net_stages(a: Elements, b: Elements, targets: Points, label: NDArray[np
     """Return the stages of a splice by nets."""
     return Stages(
         {
-            "net of a": lambda: _draw_net(to_picture(a.image), a.points),
-            "layout of b": lambda: mark_points(to_picture(b.image), b.points, BLUE),
+            "source net": lambda: _draw_net(to_picture(a.image), a.points),
+            "target layout": lambda: mark_points(to_picture(b.image), b.points, BLUE),
             "target net": lambda: _draw_net(np.full((*label.shape, 3), 255, np.uint8), targets),
             "cuts": lambda: draw_outlines(to_picture(image), label.astype(np.int32) + 1, GREEN),
-            "composite": lambda: image,
+            "before_blending": lambda: image,
         }
     )
 
