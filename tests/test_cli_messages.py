@@ -153,6 +153,14 @@ def test_help_texts_never_mention_python(command: str) -> None:
         ("tile volume.tif -o out.png", "texrs slice and texrs solid take volumes"),
         ("perspective in.png --direction bogus -o out.png", "--direction: there is no 'bogus'"),
         ("samples dots -o made --size 5x5x5", "--size: needs WIDTHxHEIGHT"),
+        (
+            "inpaint in.png --hole in.png -o out.png",
+            "No such option: --hole; give its value by its place: texrs inpaint IMAGE HOLE",
+        ),
+        (
+            "rectify in.png --corners 9,9 80,9 80,50 9,50 -o out.png",
+            "put places in quotes, as in '20,20 104,24 110,100 14,112'",
+        ),
         ("samples gravel -o made --size 64 --strict", "gravel: --size is not used, because it is a photograph"),
     ],
 )

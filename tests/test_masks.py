@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io as bytes_io
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -481,3 +482,47 @@ def test_warnings_of_python_are_only_of_what_is_not_used() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", InputWarning)
         texrs.inpaint(BRICKS, as_layer((0, 0, 0), WHITE))
+
+
+def test_words_after_a_name_say_how_a_mask_is_read(here: Path, capsys: Capture) -> None:
+    """Commands take several masks, so the words belong to one of them, and `texrs rerun` finds the file."""
+    seen = np.full(BRICKS.shape[:2], 255, np.uint8)
+    seen[:12] = 0
+    io.write("seen.png", seen)
+    io.write("unseen.png", 255 - seen)
+    io.write("faint.png", seen // 4 + np.uint8(4))
+    view = "rectify in.png --slant 30 --fov 60 -o"
+    results = []
+    for number, words in enumerate(("seen.png", "unseen.png:invert", "faint.png:threshold=0.1")):
+        assert main([*f"{view} {number}.png".split(), "--ground", words]) == 0
+        results.append(io.read(f"{number}.png"))
+    assert all((made == results[0]).all() for made in results)
+    capsys.readouterr()
+    assert main([*f"{view} grown.png".split(), "--ground", "unseen.png:invert,grow=-4"]) == 0
+    share = float(np.mean(np.arange(len(seen)) >= 16))
+    assert f"unseen.png: read as a mask that marks {100 * share:.3g} % of it" in capsys.readouterr().err
+    Path("other").mkdir()
+    assert (
+        main(
+            ["rectify", "in.png", "--slant", "30", "--fov", "60", "--ground", "unseen.png:invert", "-o", "other/o.png"]
+        )
+        == 0
+    )
+    assert "../unseen.png" in json.loads(str(io.read_notes("other/o.png").made))["inputs"]
+    assert main(["rerun", "other/o.png"]) == 0
+    assert main([*f"{view} no.png".split(), "--ground", "seen.png:grow=much"]) == 2
+    assert "--grow: needs a number, as in grow=2; got 'much'" in capsys.readouterr().err
+    for command in ("scale-map in.png -o s.npy --mask", "analyse in.png -o e.npz --mask"):
+        assert main([*command.split(), "unseen.png:invert,grow=-99"]) == 2
+        assert "marks nothing" in capsys.readouterr().err
+
+
+def test_samples_without_a_header_are_made_again_from_another_folder(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    np.tile(BRICKS[:16, :16, 0], (16, 1, 1)).tofile("a.raw")
+    Path("other").mkdir()
+    assert main(["solid", "a.raw:16x16x16:uint8", "--size", "16x16x16", "--quality", "fast", "-o", "other/o.tif"]) == 0
+    assert "../a.raw" in json.loads(str(io.read_notes("other/o.tif").made))["inputs"]
+    monkeypatch.chdir("other")
+    assert main(["rerun", "o.tif"]) == 0

@@ -75,6 +75,18 @@ def test_a_command_shows_it_stores_it_and_is_strict_if_asked(folder, tmp_path, c
     assert not (tmp_path / "other").exists()
 
 
+def test_variants_report_what_is_noticed_while_they_are_made() -> None:
+    tiles = np.kron(np.random.default_rng(3).integers(0, 2, (8, 8), np.uint8), np.full((6, 6), 200, np.uint8))
+    material = texrs.Material({"albedo": tiles, "height": tiles}, spaces={"albedo": "srgb"})
+    several = list(texrs.design_variants(material, 2, 48))
+    assert len(several) == 2
+    for made in several:
+        assert (
+            "maps: few colours, looked up to the nearest pixel and never corrected; see --no-palette"
+            in made.report["assumed"]
+        )
+
+
 def test_an_array_alone_gives_no_notices() -> None:
     made = texrs.tile(np.asarray(texrs.samples.pebbles((48, 48)).image))
     assert "ignored" not in made.report

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
@@ -138,7 +138,18 @@ def _report(made: Any, notices: Notices) -> Any:
     """Return results whose reports contain the notices."""
     if isinstance(made, Synthesis):
         return replace(made, report=notices.add_to(made.report)) if notices else made
-    return (_report(one, notices) for one in made)
+    return _report_each(made, notices)
+
+
+def _report_each(made: Iterator[Any], notices: Notices) -> Iterator[Any]:
+    """Return results one by one; each report contains the notices of the call and of its own work."""
+    while True:
+        # A block must not be open while the caller works with a result.
+        with collect() as own:
+            one = next(made, None)
+        if one is None:
+            return
+        yield _report(_report(one, notices), own)
 
 
 def _analyse(material: object, guide: Array, name: str, progress: Progress | None) -> Elements:

@@ -163,6 +163,8 @@ def blend(
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
+    if inside is not None and not inside.any():
+        raise InvalidInput("within: marks nothing, so there is nothing to correct")
     apart = None if parts is None else as_array(parts, "parts", np.uint16, source.shape)
     several = [as_ndarray(e, "exemplars") for e in as_list(exemplars)]
     result = source.render(several, interpolation=interpolation, antialias=antialias, map_type=map_type, green=green)

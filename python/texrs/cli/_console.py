@@ -188,6 +188,10 @@ def name_commands(message: str) -> str:
     return re.sub(r"\btexrs\.(?:[a-z_]+\.)*([a-z_]+)\b", turn, message)
 
 
+EXTRA_PLACES = re.compile(r"extra argument.*\(-?[\d.]+,-?[\d.]+\b")
+"""Message about places that a shell has taken apart."""
+
+
 def say_error(error: Exception) -> str:
     """Return what an error says, in the words of the command line."""
     return name_commands(say_sizes(str(error)))
@@ -294,9 +298,18 @@ def _end_stopped(number: int) -> int:
 def _describe_usage(failure: Exception) -> str:
     """Return what was wrong with the arguments, and where the right ones are listed."""
     message = failure.format_message() if hasattr(failure, "format_message") else str(failure)
-    if (wrong := getattr(failure, "option_name", None)) and hasattr(failure, "possibilities"):
+    wrong = getattr(failure, "option_name", None)
+    if wrong and hasattr(failure, "possibilities"):
         message = f"No such option: {wrong}{suggest(wrong, failure.possibilities or ())}"
     context = getattr(failure, "ctx", None)
+    parameters = context.command.params if context is not None else ()
+    # Fields of a parameter are joined to its name: "hole_marks" is the marks of HOLE.
+    placed = [p.name.removesuffix("_marks") for p in parameters if p.param_type_name == "argument"]
+    if context is not None and wrong is not None and wrong.lstrip("-").replace("-", "_") in placed:
+        usage = " ".join(name.upper() for name in placed)
+        message = f"No such option: {wrong}; give its value by its place: {context.command_path} {usage}"
+    if EXTRA_PLACES.search(message):
+        message += "; put places in quotes, as in '20,20 104,24 110,100 14,112'"
     command = context.command_path if context is not None else "texrs"
     # The command of a batch is not below that of texrs.
     command = command if command.startswith("texrs") else f"texrs {command}"

@@ -103,20 +103,22 @@ ENTRIES = replace(
     many=True,
 )
 WHITE = "White is marked; of a layer, its opaque pixels."
+WORDS = f"{WHITE} FILE:invert marks the other pixels; FILE:threshold=0.2,grow=4 as the options of remove."
 """What masks mark."""
-MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WHITE, file=True)
+MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WORDS, file=True)
 GROUNDS = replace(
     MASK,
     metavar=f"FILE|{FOUND}",
     words=(FOUND,),
     read=lambda texts, about: [None if text == FOUND else read_mask(text, about.axes) for text in texts],
-    note=f"{WHITE} Repeat the option for several planes, one of which may be {FOUND}.",
+    note=f"{WORDS} Repeat the option for several planes, one of which may be {FOUND}.",
     many=True,
 )
+QUOTED = "Four places in quotes, as in '20,20 104,24 110,100 14,112'."
 CORNERS = Kind(
     "X,Y ...",
     lambda texts, about: [None if text == FOUND else parse_corners(text, about) for text in texts],
-    f"Four, with spaces between them; of several planes in the order of their grounds, or {FOUND}.",
+    f"{QUOTED} Of several planes in the order of their grounds, or {FOUND}.",
     many=True,
 )
 EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grounds, or {FOUND}.", many=True)
@@ -200,7 +202,7 @@ KINDS = {
     "within": MASK,
     "ground": MASK,
     "allowed": MASK,
-    "corners": Kind("X,Y ...", parse_corners, "Four, with spaces between them.", plain=True),
+    "corners": Kind("X,Y ...", parse_corners, QUOTED, plain=True),
     "labels": Kind("FILE", read_labels, "Or an entry that texrs analyse wrote (.npz).", file=True),
     "values": Kind("FILE", read_values, file=True),
     "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),

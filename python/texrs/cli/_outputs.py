@@ -23,12 +23,12 @@ from texrs._typing import Array
 from texrs.cli import _provenance
 from texrs.cli._places import PLACED, say_places
 from texrs.cli._provenance import RUNNING, check_free, read_status
+from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
 from texrs.io._files import find_suffix
 from texrs.io._formats import RAW, STORE, check, holds_spacing, keeps_spacing
 from texrs.io._pillow import write_indexed
-from texrs.io._raw import strip_raw
 from texrs.io._temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
 
@@ -157,7 +157,7 @@ def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> No
 
 def list_files(texts: Iterable[str]) -> list[str]:
     """Return what names may stand for: of folders the files in them."""
-    return [file for text in texts for file in (_provenance.list_folder(text) or [strip_raw(text)])]
+    return [file for text in texts for file in (_provenance.list_folder(text) or [split_tail(text)[0]])]
 
 
 def find_texts(value: object) -> list[str]:

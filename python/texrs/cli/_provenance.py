@@ -22,6 +22,7 @@ from typing import Any
 from texrs import io
 from texrs._version import __version__
 from texrs.cli._places import has_rows_first
+from texrs.cli._tails import split_tail
 from texrs.errors import InvalidInput
 from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
 from texrs.materials._conventions import guess_roles
@@ -98,7 +99,11 @@ class Record:
         """Return the name of a file as it is seen from a folder; any other text as it is."""
         if isinstance(text, list):
             return [self.rename(t, folder) for t in text]
-        if not isinstance(text, str) or not (text in self.files or text == self.folder or text in self.stacks):
+        if not isinstance(text, str):
+            return text
+        if (named := split_tail(text))[1]:
+            return self.rename(named[0], folder) + named[1]
+        if not (text in self.files or text == self.folder or text in self.stacks):
             return text
         if text in self.original:
             return self.original[text]
@@ -137,7 +142,7 @@ class Record:
         folders = {Path(f) for f in (self.folder, *(s for s in self.stacks if s in texts)) if f is not None}
         inside = {n for n in self.files if Path(n).parent in folders}
         inside |= {n for s in self.stacks if s in texts for n in expand_braces(s)} & self.files.keys()
-        return {t for t in texts if isinstance(t, str)} | inside
+        return {split_tail(t)[0] for t in texts if isinstance(t, str)} | inside
 
 
 RUNNING: ContextVar[Record | None] = ContextVar("record", default=None)
@@ -200,6 +205,7 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     if shared and given.get("origin", "") is None and given.get("chunks") is None:
         # Who makes it does not change the result, but that it is a part of what has no borders does.
         options["--origin"] = "0,0,0" if command.name == "solid" else "0,0"
+    names = [split_tail(name)[0] for name in names]
     files = {name: status for name in names if (status := read_status(name)) is not None}
     stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
     said = [str(text).partition("=")[0] for text in given.get("role") or ()]

@@ -20,6 +20,7 @@ from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.cli._places import turn_centre
 from texrs.cli._provenance import expand_braces
+from texrs.cli._tails import make_mask
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import check_file
@@ -153,9 +154,10 @@ def read_density(text: str, about: About) -> Any:
 
 
 def read_mask(path: str, axes: int = 2) -> Array:
-    """Read a mask of any size, as `texrs.Mask` describes, and report how much it marks."""
-    name_file(path)
-    marked = mark(path, path, ("planes", "rows", "columns")[3 - axes :])
+    """Read a mask of any size, as `texrs.Mask` and the words after its name describe, and report how much it marks."""
+    mask = make_mask(path)
+    path = name_file(mask.marks)
+    marked = mark(mask, path, ("planes", "rows", "columns")[3 - axes :])
     if not marked.any():
         raise InvalidInput(f"{path}: marks nothing; a mask is white where it marks")
     assume(f"{os.path.basename(path)}: read as a mask that marks {100 * float(marked.mean()):.3g} % of it")

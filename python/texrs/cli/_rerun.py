@@ -24,6 +24,7 @@ from texrs.cli._outputs import Quiet, Threads, describe, make_argument, show_sid
 from texrs.cli._places import put_rows_first
 from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING, expand_braces
 from texrs.cli._stacks import is_stack
+from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
 from texrs.io._formats import detect_kind
@@ -89,10 +90,15 @@ class Recipe:
     def make_command(self, names: Mapping[str, str], folder: str) -> list[str]:
         """Return the command that makes the file in a folder, of files that are called otherwise now."""
         target = folder if self.file is not None else os.path.join(folder, os.path.basename(self.path))
-        words = [self.verb, *(target if a is None else names.get(a, a) for a in self.arguments)]
+
+        def find(text: str) -> str:
+            file, tail = split_tail(text)
+            return names.get(text, text) if not tail else names.get(file, file) + tail
+
+        words = [self.verb, *(target if a is None else find(a) for a in self.arguments)]
         for flag, value in self.options.items():
             for text in value if isinstance(value, list) else [value]:
-                words += [flag] if text is True else [flag, names.get(text, str(text))]
+                words += [flag] if text is True else [flag, find(str(text))]
         if None in self.arguments:
             return words
         if self.output not in ("--out", "--sheet"):

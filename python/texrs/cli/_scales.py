@@ -17,6 +17,7 @@ from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note
+from texrs.cli._kinds import WORDS
 from texrs.cli._options import Options, check_needed, make_choice, take_options
 from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.cli._readers import read_mask, read_picture, read_scale_map
@@ -43,7 +44,7 @@ def scale_map_command(
     image: Annotated[str, make_argument("IMAGE", "The texture: an image file, or sample:NAME.")],
     out: Annotated[str, to_write("out")],
     given: dict[str, Any],
-    mask: Annotated[str | None, make_option("FILE", "Measure in a mask of the elements: what is not black.")] = None,
+    mask: Annotated[str | None, make_option("FILE", f"Measure in a mask of the elements. {WORDS}")] = None,
     auto: Annotated[bool, typer.Option("--auto", help="Measure in a mask that is found in the image.")] = False,
     scale_map: Annotated[
         str | None, make_option("FILE", "A map made before, to edit or to bring to another size.")
@@ -51,7 +52,7 @@ def scale_map_command(
     hole: Annotated[
         str | None,
         make_option(
-            "FILE", "With --mask or --auto: what is not black is no texture, and the map is continued into it."
+            "FILE", f"With --mask or --auto: mask of the part without texture, into which the map is continued. {WORDS}"
         ),
     ] = None,
     stages: Annotated[str | None, to_write("stages")] = None,
