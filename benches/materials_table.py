@@ -120,7 +120,9 @@ def main() -> None:
 def report(name: str, verb: str, words: list[str], example: Path, given: argparse.Namespace) -> None:
     """Do one command, and print its row."""
     made = given.out / f"{name}-{verb}"
-    beside = {flag: str(made) + end for flag, end in (("--preview", ".png"), ("--gltf", ".glb"), ("--map", ".npz"))}
+    beside = {
+        flag: str(made) + end for flag, end in (("--preview", ".png"), ("--gltf", ".glb"), ("--source-map", ".npz"))
+    }
     beside |= {"--mipmaps": f"{made}-mipmaps", "--materialx": f"{made}-materialx"}
     line = [sys.executable, "-m", "texrs", verb, *words, "-o", str(made), "-q", "--force"]
     start = time.monotonic()

@@ -30,8 +30,8 @@ TOGETHER = 6
 AGAIN = 10
 """Kills after which a command is run to its end."""
 COMMANDS: dict[str, tuple[str, str]] = {
-    "tile": ("tile in.png -o out.png --map map.npz --stages stages", "out.png map.npz"),
-    "design": ("design in.png -o out.png --size 96 --motion keep --map map.npz", "out.png map.npz"),
+    "tile": ("tile in.png -o out.png --source-map map.npz --stages stages", "out.png map.npz"),
+    "design": ("design in.png -o out.png --size 96 --motion keep --source-map map.npz", "out.png map.npz"),
     "synthesize": ("synthesize in.png -o out.zarr --size 128 --chunks 64", ""),
     "synthesize, to a file": ("synthesize in.png -o out.tif --size 128 --chunks 64", "out.tif"),
     "tiles": ("tiles in.png -o tiles --tile-size 32 --pictures 1 --motion keep", ""),

@@ -30,7 +30,7 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("apply")
     io.write(folder / "a.png", PEBBLES)
     words = ["synthesize", str(folder / "a.png"), "-o", str(folder / "b.png"), "--size", "96x96", "-q"]
-    assert main([*words, "--field", "circular", "--map", str(folder / "m.npz")]) == 0
+    assert main([*words, "--field", "circular", "--source-map", str(folder / "m.npz")]) == 0
     io.write(folder / "rock_normal_gl.png", UP)
     io.write(folder / "rock_nor_dx.png", np.dstack([UP[..., 0], 255 - UP[..., 1], UP[..., 2]]))
     io.write(folder / "rock_flow.png", UP)

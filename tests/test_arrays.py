@@ -211,7 +211,7 @@ def test_what_is_masked_is_a_hole():
     for verb in (texrs.tile, texrs.design, texrs.Exemplar, texrs.elements.analyse):
         with pytest.raises(InvalidInput, match=r": 672 of 12288 values are masked, which is a hole: texrs.inpaint"):
             verb(known)
-    with pytest.raises(InvalidInput, match="hole: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image"):
+    with pytest.raises(InvalidInput, match="mask: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image"):
         texrs.inpaint(PEBBLES)
 
 
@@ -269,9 +269,9 @@ def test_a_mask_may_be_a_file_or_a_coloured_picture(tmp_path: Path):
     marked[HOLE, 1] = 9
     texrs.io.write(tmp_path / "hole.png", marked)
     for given in (tmp_path / "hole.png", Image.fromarray(marked), Image.fromarray(marked[..., :3])):
-        assert np.array_equal(as_mask(given, "hole", HOLE.shape), HOLE)
-    with pytest.raises(InvalidInput, match="hole: needs shape"):
-        as_mask(marked, "hole", HOLE.shape)
+        assert np.array_equal(as_mask(given, "mask", HOLE.shape), HOLE)
+    with pytest.raises(InvalidInput, match="mask: needs shape"):
+        as_mask(marked, "mask", HOLE.shape)
 
 
 def test_what_cannot_be_taken_is_said_in_a_sentence(tmp_path: Path):

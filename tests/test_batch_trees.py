@@ -162,7 +162,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
     for number, words in enumerate(
         (
             ["--argument", "photos/hole.png"],
-            ["--set", "hole=photos/hole.png"],
+            ["--set", "mask=photos/hole.png"],
             ["--argument={input}", "--argument=photos/hole.png"],
         )
     ):
@@ -210,7 +210,7 @@ def test_results_of_other_kinds_have_their_own_formats(here: Path) -> None:
 
 def test_files_that_a_batch_writes_are_not_inputs(here: Path) -> None:
     put("in/a.png")
-    words = ["--set", "map=in/{name}.npz", "--set", "size=48", "--set", "copies=1", "--sheet", "sheet.png", "-q"]
+    words = ["--set", "source-map=in/{name}.npz", "--set", "size=48", "--set", "copies=1", "--sheet", "sheet.png", "-q"]
     for _ in range(2):
         assert main(["batch", "design", "in", "-o", "in/{name}-big.png", *words]) == 0
         assert made("in") == ["a-big.png", "a.npz", "a.png"]

@@ -27,7 +27,8 @@ from texrs.elements import Elements
 def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
     options = "--seed 3 --wrap x --element-layers 2 --element-segmentation grid"
     options += " --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-allow-mirror"
-    more = "--start 0.3 --growth-rate 1.9 --patch-size 12 --copies 2 --operations 1 --stages stages --map source.npz -o out.png"
+    more = "--start 0.3 --growth-rate 1.9 --patch-size 12 --copies 2 --operations 1"
+    more += " --stages stages --source-map source.npz -o out.png"
     assert main(["design", "in.png", "--size", "56x40", *options.split(), *more.split()]) == 0
     expected = texrs.design(
         COLOURS,
@@ -61,7 +62,7 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
 
 def test_same_command_same_bytes(here: Path, capsys: Capture) -> None:
     for out, *more in (("a.png",), ("b.png",), ("c.png", "--threads", "1"), ("d.png", "--threads", "3")):
-        arguments = ["design", "in.png", "-q", *TINY, "--seed", "5", "-o", out, "--map", f"{out}.npz", *more]
+        arguments = ["design", "in.png", "-q", *TINY, "--seed", "5", "-o", out, "--source-map", f"{out}.npz", *more]
         assert main(arguments) == 0
     assert main(["design", "in.png", "-q", *TINY, "--seed", "6", "-o", "e.png"]) == 0
     assert capsys.readouterr() == ("", "")
@@ -83,7 +84,7 @@ def test_several_examples_and_several_variants(here: Path, capsys: Capture) -> N
         "3:1",
         "-o",
         "mixed.png",
-        "--map",
+        "--source-map",
         "mixed.npz",
     ]
     assert main(mixed) == 0
@@ -105,7 +106,7 @@ def test_several_examples_and_several_variants(here: Path, capsys: Capture) -> N
 def test_variants_that_are_made_stay_when_the_next_fails(
     here: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int
 ) -> None:
-    command = ["design", "in.png", "-q", *TINY, "--variants", "3", "--stages", "st", "--map", "s.npz"]
+    command = ["design", "in.png", "-q", *TINY, "--variants", "3", "--stages", "st", "--source-map", "s.npz"]
     assert main([*command, "-o", "whole.png"]) == 0
     before = files(here)
     made = []
@@ -207,7 +208,7 @@ def test_any_image_goes_out_as_it_came(here: Path, name: str) -> None:
 
 
 def test_apply(here: Path, capsys: Capture) -> None:
-    assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--map", "s.npz"]) == 0
+    assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--source-map", "s.npz"]) == 0
     places = SourceMap.load("s.npz")
     height = GREY.astype(np.float32) - 100
     np.save("height.npy", height)
@@ -243,8 +244,10 @@ def test_apply(here: Path, capsys: Capture) -> None:
 
 
 def test_apply_blends(here: Path) -> None:
-    assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--map", "s.npz"]) == 0
-    assert main(["design", "in.png", "-q", *TINY, "--screening", "0", "-o", "plain.png", "--map", "plain.npz"]) == 0
+    assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--source-map", "s.npz"]) == 0
+    assert (
+        main(["design", "in.png", "-q", *TINY, "--screening", "0", "-o", "plain.png", "--source-map", "plain.npz"]) == 0
+    )
     # The map of a result that was not blended can be, and the other way round.
     for source, blend, same in (("s.npz", "0", "plain.png"), ("plain.npz", "0.15", "out.png")):
         assert main(["apply", source, "in.png", "-q", "--screening", blend, "-o", "again.png", "--force"]) == 0

@@ -89,7 +89,9 @@ def test_a_hole_in_alpha_is_filled_from_a_picture_without(tmp_path: Path, monkey
     ):
         io.write(f"in.{suffix}", pixels)
         io.write(f"from.{suffix}", other)
-        assert main(["inpaint", f"in.{suffix}", "alpha", "--from", f"from.{suffix}", "-o", f"out.{suffix}", "-q"]) == 0
+        assert (
+            main(["inpaint", f"in.{suffix}", "alpha", "--exemplar", f"from.{suffix}", "-o", f"out.{suffix}", "-q"]) == 0
+        )
         made = io.read(f"out.{suffix}")
         assert made.dtype == pixels.dtype
         assert made.shape == pixels.shape

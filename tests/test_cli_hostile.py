@@ -37,7 +37,7 @@ def test_hostile_inputs(here: Path, capsys: Capture, name: str) -> None:
     if content is not None:
         Path("bad.png").write_bytes(content)
     before = files(here)
-    assert main(["design", "bad.png", "-o", "out.png", "-q", "--map", "s.npz", "--stages", "st"]) == 2
+    assert main(["design", "bad.png", "-o", "out.png", "-q", "--source-map", "s.npz", "--stages", "st"]) == 2
     line = complaint(capsys)
     assert words in line
     assert "bad.png" in line
@@ -77,8 +77,8 @@ ARGUMENTS: dict[str, str] = {
     "translate": "design in.png --translate -0.1",
     "operations": "design in.png --operations 9",
     "labels missing": "design in.png --element-labels no.png",
-    "map suffix": "design in.png --map s.png",
-    "map folder": "design in.png --map no/s.npz",
+    "map suffix": "design in.png --source-map s.png",
+    "map folder": "design in.png --source-map no/s.npz",
     "stages are a file": "design in.png --stages in.png",
     "stages below a file": "design in.png --stages in.png/st",
     "stages the result": "design in.png --stages out.png",
@@ -141,7 +141,7 @@ def test_outputs_are_checked_before_the_work(
     assert NAMES[name] in complaint(capsys)
     assert main(["design", "in.png", "-o", "out.jpg", "--size", "16x65501"]) == 2
     assert "65500" in complaint(capsys)
-    assert main(["design", "in.png", "-o", "s.npz", "--map", "./s.npz"]) == 2
+    assert main(["design", "in.png", "-o", "s.npz", "--source-map", "./s.npz"]) == 2
     assert "--out" in complaint(capsys)
     assert files(here) == before
 
@@ -172,7 +172,7 @@ def test_failures_in_the_work(
     replace_design(monkeypatch, error)
     monkeypatch.setattr("texrs.cli._console.os.dup2", lambda *descriptors: None)
     before = files(here)
-    assert main(["design", "in.png", "-o", "out.png", "--map", "s.npz", "--stages", "st"]) == code
+    assert main(["design", "in.png", "-o", "out.png", "--source-map", "s.npz", "--stages", "st"]) == code
     if words is None:
         assert capsys.readouterr() == ("", "")
     else:
@@ -193,6 +193,6 @@ def test_failed_writing_leaves_what_was_there(here: Path, capsys: Capture, monke
 
     monkeypatch.setattr(SourceMap, "save", full)
     before = files(here)
-    assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--map", "s.npz"]) == 2
+    assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--source-map", "s.npz"]) == 2
     assert "no space left on device" in complaint(capsys)
     assert files(here) == before

@@ -17,6 +17,7 @@ from commands import COLOURS, TINY, Capture, complaint, files
 from texrs import SourceMap, samples
 from texrs.cli import COMMANDS, app, main
 from texrs.cli._outputs import OUTPUTS
+from texrs.cli._provenance import as_flag
 from texrs.errors import InvalidInput
 
 COMMAND: Any = typer.main.get_command(app)
@@ -52,14 +53,14 @@ def test_all_commands_are_known_to_read_and_write() -> None:
     assert both >= {"design", "apply", "tile", "inpaint", "scale-map", "perspective", "solid", "synthesize", "slice"}
     assert both >= {"splice", "self-splice", "analyse", "database"}
     assert ("apply", "source", "out") in pairs()
-    assert any(command == "solid" and "guide" in read and written == "map" for command, read, written in pairs())
+    assert any(command == "solid" and "guide" in read and written == "source_map" for command, read, written in pairs())
     assert any(command == "design" and "labels" in read and written == "stages" for command, read, written in pairs())
 
 
 @pytest.mark.parametrize(("command", "read", "written"), pairs(), ids="-".join)
 def test_no_command_writes_over_what_it_reads(here: Path, command: str, read: str, written: str) -> None:
     Path("st").mkdir()
-    target = "st/01-known.png" if written == "stages" else "there.npz" if written == "map" else "there.png"
+    target = "st/01-known.png" if written == "stages" else "there.npz" if written == "source_map" else "there.png"
     Path(target).write_bytes(b"dear")
     Path("symbolic.png").symlink_to(target)
     os.link(target, "hard.png")
@@ -74,7 +75,7 @@ def test_no_command_writes_over_what_it_reads(here: Path, command: str, read: st
                     arguments += values
                 else:
                     options += [max(p.opts, key=len), *values]
-        with pytest.raises(InvalidInput, match=f"--{written}: {target} is read"):
+        with pytest.raises(InvalidInput, match=f"{as_flag(written)}: {target} is read"):
             find_command(command).main([*arguments, *options], standalone_mode=False)
         assert files(here) == before
 

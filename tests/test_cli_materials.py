@@ -33,7 +33,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["design", "rock", "-o", "new", *SIZE, "--seed", "3", "--preview", "lit.png", "--map", "map.npz"]
+    words = ["design", "rock", "-o", "new", *SIZE, "--seed", "3", "--preview", "lit.png", "--source-map", "map.npz"]
     assert main([*words, "--role", "rock_wet.png=other"]) == 0
     assert sorted(p.name for p in Path("new").iterdir()) == ["rock_albedo.png", "rock_height.png", "rock_wet.png"]
     material = Material.read("rock", roles={"rock_wet": "other"})
@@ -56,7 +56,7 @@ def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixtur
 def test_colours_are_brought_into_even_light_and_heights_are_not(here: Path) -> None:
     lit = (io.read("rock/rock_albedo.png") * np.linspace(0.4, 1, 64)[:, np.newaxis]).astype(np.uint8)
     io.write("rock/rock_albedo.png", lit)
-    assert main(["tile", "rock", "-o", "new", "--flatten-lighting", "--map", "map.npz", "-q"]) == 0
+    assert main(["tile", "rock", "-o", "new", "--flatten-lighting", "--source-map", "map.npz", "-q"]) == 0
     source = texrs.SourceMap.load("map.npz")
     for name in ("albedo", "height"):
         assert main(["apply", "map.npz", f"rock/rock_{name}.png", "-o", f"{name}.png", "-q"]) == 0
@@ -106,7 +106,7 @@ def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str
     Path("rock/rock_wet.png").unlink()
     io.write("rock/rock_albedo.png", dots)
     io.write("rock/rock_height.png", dots[..., 1].astype(np.uint16) * 257)
-    shown = "--preview lit.png --gltf it.glb --map map.npz -q"
+    shown = "--preview lit.png --gltf it.glb --source-map map.npz -q"
     assert main([*VERBS[verb].split(), "-o", "new", *shown.split()]) == 0, capsys.readouterr().err
     made = Material.read("new")
     assert {name: str(each.pixels.dtype) for name, each in made.items()} == {"albedo": "uint8", "height": "uint16"}

@@ -154,8 +154,8 @@ def test_help_texts_never_mention_python(command: str) -> None:
         ("perspective in.png --direction bogus -o out.png", "--direction: there is no 'bogus'"),
         ("samples dots -o made --size 5x5x5", "--size: needs WIDTHxHEIGHT"),
         (
-            "inpaint in.png --hole in.png -o out.png",
-            "No such option: --hole; give its value by its place: texrs inpaint IMAGE HOLE",
+            "inpaint in.png --mask in.png -o out.png",
+            "No such option: --mask; give its value by its place: texrs inpaint IMAGE MASK",
         ),
         (
             "rectify in.png --corners 9,9 80,9 80,50 9,50 -o out.png",

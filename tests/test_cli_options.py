@@ -241,7 +241,7 @@ def test_a_word_means_the_same_in_every_command() -> None:
     several = {flag for flag, found in forms.items() if len(found) > 1}
     assert several == {"--out", "--method", "--size", "--slant", "--tilt", "--fov"}
     assert not {"--source", "--source-image", "--held", "--rim", "--children"} & set(forms)
-    assert forms["--map"] == {"OUT.npz"}
+    assert forms["--source-map"] == {"OUT.npz"}
 
 
 def test_commands_are_those_of_the_verbs() -> None:

@@ -175,7 +175,7 @@ def test_a_window_of_a_picture(files: Path) -> None:
         (["--out", "x.zarr", "--workers", "2", "--scheduler", "tcp://a"], "one of them can be asked for"),
         (["--out", "x.zarr", "--workers", "0"], "--workers: needs an integer"),
         (["--out", "x.zarr", "--wrap", "xyz"], "--wrap: is for results that are made at once"),
-        (["--out", "x.zarr", "--map", "m.npz"], "--map: is for results that are made at once"),
+        (["--out", "x.zarr", "--source-map", "m.npz"], "--source-map: is for results that are made at once"),
         (["--out", "x.zarr", "--origin", "1,2"], "--origin: needs X,Y,Z"),
         (["--out", "x.npy", "--size", "2048"], "to OUT.zarr, or with --chunks, it is made in parts"),
         (["--out", "x.zarr", "--chunks", "0"], "--chunks: each side must be at least 1"),
@@ -197,7 +197,10 @@ def test_how_maps_are_written_is_not_ignored(option: str, files: Path, capsys: p
 def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     weave, heights = f"{files}/weave.png", f"{files}/heights.npy"
     np.save(heights, WEAVE[..., 1].astype(np.float32))
-    assert main(["synthesize", weave, "-o", f"{files}/a.png", "--size", "80x60", "--map", f"{files}/m.npz", "-q"]) == 0
+    assert (
+        main(["synthesize", weave, "-o", f"{files}/a.png", "--size", "80x60", "--source-map", f"{files}/m.npz", "-q"])
+        == 0
+    )
     words = ["apply", f"{files}/m.npz", "-o"]
     assert main([*words, f"{files}/b.npy", heights, "-q"]) == 0
     assert main([*words, f"{files}/b.zarr", heights]) == 0
@@ -249,7 +252,7 @@ def test_voxels_of_results_lie_as_far_apart_as_those_of_examples(files: Path) ->
     apart = (2.0, 0.5, 0.25)
     io.write_volume(files / "a.nrrd", np.resize(STRIPES, (32, 32, 32, 3)), spacing=apart)
     words = ["solid", f"{files}/a.nrrd", "--size", "16", "--quality", "fast", "-q", "-o"]
-    assert main([*words, f"{files}/once.vti", "--map", f"{files}/m.npz"]) == 0
+    assert main([*words, f"{files}/once.vti", "--source-map", f"{files}/m.npz"]) == 0
     for name, more in (("b.zarr", []), ("b.raw", []), ("b.vti", ["--chunks", "8"])):
         assert main([*words, f"{files}/{name}", *more]) == 0
     assert main(["apply", f"{files}/m.npz", f"{files}/a.nrrd", "-o", f"{files}/again.nii.gz", "-q"]) == 0

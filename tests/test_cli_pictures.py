@@ -51,15 +51,15 @@ def files(folder: Path) -> dict[str, bytes]:
     ],
 )
 def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, arguments: str, options: dict) -> None:
-    more = ["--stages", "stages", "--map", "s.npz"]
+    more = ["--stages", "stages", "--source-map", "s.npz"]
     assert main(["tile", "in.png", "-o", "out.png", *arguments.split(), *more]) == 0
     expected = texrs.tile(COLOURS, **options)
     assert (iio.imread("out.png") == expected.image).all()
     assert (SourceMap.load("s.npz").coordinates == expected.source.coordinates).all()
     assert sorted(p.name for p in Path("stages").iterdir()) == [
-        "01-swapped.png",
-        "02-pieces.png",
-        "03-composite.png",
+        "01-shifted.png",
+        "02-source-regions.png",
+        "03-before-blending.png",
         "report.json",
     ]
     rows, columns = expected.image.shape[:2]
@@ -72,7 +72,9 @@ def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, argume
 
 
 def test_inpaint_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    options = "--patch-size 10 --boundary-width 2 --no-allow-mirror --wrap x --seed 4 --stages stages --map s.npz"
+    options = (
+        "--patch-size 10 --boundary-width 2 --no-allow-mirror --wrap x --seed 4 --stages stages --source-map s.npz"
+    )
     assert main(["inpaint", "in.png", "hole.png", "-o", "out.png", *options.split()]) == 0
     expected = texrs.inpaint(
         COLOURS, HOLE, patch_size=10, boundary_width=2, allow_mirror=False, wrap=(False, True), seed=4
@@ -86,7 +88,7 @@ def test_inpaint_writes_what_the_function_makes(here: Path, capsys: Capture) -> 
 
 
 def test_inpaint_from_another_picture_and_apply(here: Path) -> None:
-    command = ["inpaint", "in.png", "hole.png", "--from", "other.png", "-o", "out.png", "--map", "s.npz"]
+    command = ["inpaint", "in.png", "hole.png", "--exemplar", "other.png", "-o", "out.png", "--source-map", "s.npz"]
     assert main([*command, "-q"]) == 0
     expected = texrs.inpaint(COLOURS, HOLE, exemplar=iio.imread("other.png")).image
     assert (iio.imread("out.png") == expected).all()
@@ -140,13 +142,13 @@ REFUSED = {
     "tile in.png --overlap 33": "--overlap: needs an integer from 1 to 32, got 33: at most half of the 64 rows",
     "tile in.png --overlap 41x10": "from 1 to 40, got 41: at most half of the 80 columns",
     "tile in.png --overlap a": "--overlap: needs WIDTHxHEIGHT",
-    "tile in.png --map s.png": "--map: needs a name that ends in .npz",
+    "tile in.png --source-map s.png": "--source-map: needs a name that ends in .npz",
     "tile in.png --stages in.png": "in.png: is not a folder",
     "tile in.png --stages out.png": "--stages: out.png is already the file of --out",
     "tile in.png --threads 0": "--threads: needs",
     "tile in.png hole.png": "--help",
     "tile": "--help",
-    "inpaint in.png": "HOLE: must be a mask",
+    "inpaint in.png": "MASK: must be a mask",
     "inpaint in.png no.png": "no.png",
     "inpaint no.png hole.png": "no.png",
     "inpaint in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
@@ -157,8 +159,8 @@ REFUSED = {
     "inpaint in.png hole.png --boundary-width -1": "--boundary-width: needs",
     "inpaint in.png hole.png --seed -1": "--seed: needs",
     "inpaint in.png hole.png --wrap yes": "--wrap: allowed are",
-    "inpaint in.png hole.png --from hole.png": "hole.png: needs the dtype and channels of the image",
-    "inpaint in.png hole.png --from no.png": "no.png",
+    "inpaint in.png hole.png --exemplar hole.png": "hole.png: needs the dtype and channels of the image",
+    "inpaint in.png hole.png --exemplar no.png": "no.png",
     "inpaint nan.npy hole.png": "nan.npy",
     "inpaint in.png nan.npy": "nan.npy: must be finite",
 }
@@ -216,6 +218,6 @@ def test_failed_writing_leaves_what_was_there(
 
     monkeypatch.setattr(SourceMap, "save", full)
     before = files(here)
-    assert main([*command.split(), "-q", "-o", "out.png", "--map", "s.npz"]) == 2
+    assert main([*command.split(), "-q", "-o", "out.png", "--source-map", "s.npz"]) == 2
     assert "no space left on device" in capsys.readouterr().err
     assert files(here) == before

@@ -13,7 +13,7 @@ import pytest
 from commands import TINY, files, start
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and terminals of POSIX")
-LONG = ["design", "in.png", "-o", "out.png", "--size", "3000", "--map", "s.npz", "--stages", "st"]
+LONG = ["design", "in.png", "-o", "out.png", "--size", "3000", "--source-map", "s.npz", "--stages", "st"]
 
 
 @posix

@@ -581,7 +581,7 @@ def test_packed_maps_are_taken_apart(tmp_path: Path) -> None:
 def test_a_packed_map_is_applied_as_the_material_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     write_stack(tmp_path / "in", "hdrp")
-    assert main(["design", "in", "-o", "out", "--size", "64x64", "--map", "map.npz", "-q"]) == 0
+    assert main(["design", "in", "-o", "out", "--size", "64x64", "--source-map", "map.npz", "-q"]) == 0
     assert main(["apply", "map.npz", "in/Stone02_1K_MaskMap.png", "-o", "again.png", "-q"]) == 0
     made = io.read("out/Stone02_1K_MaskMap.png")
     assert (io.read("again.png") == made).all()

@@ -131,7 +131,7 @@ def test_patches_do_not_mirror_or_repeat_what_is_beside_them():
 def test_empty_hole_is_refused():
     none = np.zeros((96, 112), bool)
     for more in ({}, {"exemplar": PEBBLES[:20]}, {"method": "optimise"}):
-        with pytest.raises(InvalidInput, match="hole: marks nothing, so there is nothing to fill"):
+        with pytest.raises(InvalidInput, match="mask: marks nothing, so there is nothing to fill"):
             texrs.inpaint(PEBBLES, none, **more)
 
 
@@ -331,17 +331,17 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
 @pytest.mark.parametrize(
     ("image", "hole", "options", "words"),
     [
-        (PEBBLES, HOLE[1:], {}, "hole: needs shape (96, 112), got (95, 112)"),
-        (PEBBLES, np.dstack([HOLE] * 5), {}, "hole: needs shape (96, 112), got (96, 112, 5)"),
-        (PEBBLES, HOLE.astype(complex), {}, "hole: needs bool, integers or floats"),
-        (PEBBLES, NAN, {}, "hole: must be finite"),
+        (PEBBLES, HOLE[1:], {}, "mask: needs shape (96, 112), got (95, 112)"),
+        (PEBBLES, np.dstack([HOLE] * 5), {}, "mask: needs shape (96, 112), got (96, 112, 5)"),
+        (PEBBLES, HOLE.astype(complex), {}, "mask: needs bool, integers or floats"),
+        (PEBBLES, NAN, {}, "mask: must be finite"),
         (
             PEBBLES,
             np.ones_like(HOLE),
             {},
-            "hole: covers the whole image, so there is nothing to copy from; give an exemplar",
+            "mask: covers the whole image, so there is nothing to copy from; give an exemplar",
         ),
-        (PEBBLES, EVERY_THIRD, {}, "hole: leaves no 4 x 4 pixels in one piece to copy from; give an exemplar"),
+        (PEBBLES, EVERY_THIRD, {}, "mask: leaves no 4 x 4 pixels in one piece to copy from; give an exemplar"),
         (PEBBLES, HOLE, {"patch_size": 3}, "patch_size: needs an integer from 4 to 96, got 3"),
         (PEBBLES, HOLE, {"patch_size": 97}, "patch_size: needs an integer from 4 to 96, got 97"),
         (

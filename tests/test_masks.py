@@ -50,7 +50,7 @@ def as_jpeg(mask: np.ndarray, quality: int) -> np.ndarray:
 
 def read(mask: object) -> tuple[np.ndarray, list[str]]:
     with collect() as notices:
-        marked = mark(mask, "hole", SIZE)
+        marked = mark(mask, "mask", SIZE)
     return marked, notices.assumed
 
 
@@ -141,19 +141,19 @@ def test_threshold_and_grey() -> None:
 def test_grow_is_the_same_in_any_number_of_axes(shape: tuple[int, ...]) -> None:
     some = np.random.default_rng(2).random(shape) < 0.03
     ball = ((np.indices((7,) * len(shape)) - 3) ** 2).sum(axis=0) <= 9
-    np.testing.assert_array_equal(mark(Mask(some, grow=3), "hole", shape), binary_dilation(some, ball))
+    np.testing.assert_array_equal(mark(Mask(some, grow=3), "mask", shape), binary_dilation(some, ball))
     large = binary_dilation(some, ball, 2)
     np.testing.assert_array_equal(
-        mark(Mask(large, grow=-3), "hole", shape), binary_erosion(large, ball, border_value=True)
+        mark(Mask(large, grow=-3), "mask", shape), binary_erosion(large, ball, border_value=True)
     )
-    np.testing.assert_array_equal(mark(Mask(~some, invert=True, grow=3), "hole", shape), widen(some, 3))
+    np.testing.assert_array_equal(mark(Mask(~some, invert=True, grow=3), "mask", shape), widen(some, 3))
 
 
 def test_grow_goes_across_cyclic_borders() -> None:
     point = np.zeros(SIZE, bool)
     point[0, 50] = True
-    assert mark(Mask(point, grow=3), "hole", SIZE, (True, False))[-3:, 50].all()
-    assert not mark(Mask(point, grow=3), "hole", SIZE)[-3:].any()
+    assert mark(Mask(point, grow=3), "mask", SIZE, (True, False))[-3:, 50].all()
+    assert not mark(Mask(point, grow=3), "mask", SIZE)[-3:].any()
 
 
 @pytest.mark.parametrize(
@@ -163,22 +163,22 @@ def test_grow_goes_across_cyclic_borders() -> None:
         (lambda: Mask(WHITE, grow=9999), "grow: needs an integer"),
         (lambda: Mask(WHITE, feather=-1), "feather: needs an integer"),
         (lambda: Mask(WHITE, invert="no"), "invert: needs True or False"),
-        (lambda: read(WHITE[:40]), r"hole: needs shape \(96, 112\), got \(40, 112\); a mask has the size of the image"),
-        (lambda: read(np.full(SIZE, np.nan)), "hole: must be finite"),
-        (lambda: read(np.dstack([WHITE] * 5)), "hole: needs shape"),
-        (lambda: read(WHITE.astype(complex)), "hole: needs bool, integers or floats"),
-        (lambda: texrs.inpaint(BRICKS, 0 * WHITE), "hole: marks nothing, so there is nothing to fill"),
-        (lambda: texrs.inpaint(BRICKS, Mask(WHITE, grow=-20)), "hole: marks nothing"),
-        (lambda: texrs.inpaint(BRICKS, Mask(DISC | True, invert=True)), "hole: marks nothing"),
-        (lambda: texrs.inpaint(BRICKS, Mask(WHITE, feather=200)), "hole: covers the whole image"),
+        (lambda: read(WHITE[:40]), r"mask: needs shape \(96, 112\), got \(40, 112\); a mask has the size of the image"),
+        (lambda: read(np.full(SIZE, np.nan)), "mask: must be finite"),
+        (lambda: read(np.dstack([WHITE] * 5)), "mask: needs shape"),
+        (lambda: read(WHITE.astype(complex)), "mask: needs bool, integers or floats"),
+        (lambda: texrs.inpaint(BRICKS, 0 * WHITE), "mask: marks nothing, so there is nothing to fill"),
+        (lambda: texrs.inpaint(BRICKS, Mask(WHITE, grow=-20)), "mask: marks nothing"),
+        (lambda: texrs.inpaint(BRICKS, Mask(DISC | True, invert=True)), "mask: marks nothing"),
+        (lambda: texrs.inpaint(BRICKS, Mask(WHITE, feather=200)), "mask: covers the whole image"),
         (lambda: texrs.remove(BRICKS, 0 * WHITE), "mask: marks nothing, so there is nothing to remove"),
-        (lambda: texrs.inpaint(BRICKS), "hole: must be a mask, 'alpha', 'nan'"),
-        (lambda: texrs.inpaint(BRICKS, "nan"), "hole: no pixel of the image is NaN or infinite"),
-        (lambda: texrs.inpaint(BRICKS, 300), "hole: no pixel of the image is 300"),
-        (lambda: texrs.inpaint(BRICKS, 10**400), "hole: must be a number that a double can hold"),
-        (lambda: texrs.inpaint(BRICKS, "nodata"), "hole: 'nodata' needs an image of a file"),
+        (lambda: texrs.inpaint(BRICKS), "mask: must be a mask, 'alpha', 'nan'"),
+        (lambda: texrs.inpaint(BRICKS, "nan"), "mask: no pixel of the image is NaN or infinite"),
+        (lambda: texrs.inpaint(BRICKS, 300), "mask: no pixel of the image is 300"),
+        (lambda: texrs.inpaint(BRICKS, 10**400), "mask: must be a number that a double can hold"),
+        (lambda: texrs.inpaint(BRICKS, "nodata"), "mask: 'nodata' needs an image of a file"),
         (lambda: texrs.inpaint(BRICKS, Mask(7, threshold=0.5)), "threshold: must be given with a mask"),
-        (lambda: texrs.inpaint(BRICKS, "alpha"), "hole: 'alpha' needs an image with an alpha channel"),
+        (lambda: texrs.inpaint(BRICKS, "alpha"), "mask: 'alpha' needs an image with an alpha channel"),
     ],
 )
 def test_what_marks_nothing_is_refused(make: Callable[[], object], words: str) -> None:
@@ -195,7 +195,7 @@ def test_the_share_that_is_filled_is_reported() -> None:
     assert "assumed" not in made.report
     much = texrs.inpaint(BRICKS, 255 - WHITE)
     assert much.report["filled"] == (~DISC).mean()
-    assert much.report["assumed"] == ["hole: marks 92 % of the image; if the rest is meant, invert the mask (--invert)"]
+    assert much.report["assumed"] == ["mask: marks 92 % of the image; if the rest is meant, invert the mask (--invert)"]
     np.testing.assert_array_equal(
         texrs.inpaint(BRICKS, Mask(255 - WHITE, invert=True)).image, texrs.inpaint(BRICKS, DISC).image
     )
@@ -224,7 +224,7 @@ def test_a_softly_erased_hole_keeps_nothing_of_the_brush(dtype: type) -> None:
 
 def test_an_image_without_an_opaque_pixel_says_what_to_do() -> None:
     veiled = np.dstack([BRICKS, np.where(DISC, 0, 254).astype(np.uint8)])
-    with collect() as notices, pytest.raises(InvalidInput, match="hole: covers the whole image"):
+    with collect() as notices, pytest.raises(InvalidInput, match="mask: covers the whole image"):
         texrs.inpaint(veiled, "alpha")
     assert "with a threshold of 1 only fully transparent ones are" in notices.assumed[0]
     assert texrs.inpaint(veiled, Mask("alpha", threshold=1)).report["filled"] == DISC.mean()
@@ -299,7 +299,7 @@ def test_one_mask_fills_all_maps_of_a_material() -> None:
 @pytest.mark.parametrize("hole", ["alpha", "nan", "nodata", 0, None, Mask("alpha")])
 def test_a_hole_of_a_material_is_a_mask(hole: object) -> None:
     rock = texrs.Material({"color": BRICKS, "height": HEIGHTS})
-    with pytest.raises(InvalidInput, match="hole: must be a mask, because the image is a material"):
+    with pytest.raises(InvalidInput, match="mask: must be a mask, because the image is a material"):
         texrs.inpaint(rock, hole)  # type: ignore[arg-type]
 
 
@@ -443,13 +443,13 @@ def test_an_inverted_mask_is_warned_of(here: Path, capsys: Capture) -> None:
 
 def test_options_of_masks_are_those_of_the_class(here: Path, capsys: Capture) -> None:
     options = "--threshold 0.2 --grow 3 --feather 4 --seed 2"
-    assert main(["inpaint", "in.png", "hole.png", "-o", "out.png", "--map", "map.npz", *options.split()]) == 0
+    assert main(["inpaint", "in.png", "hole.png", "-o", "out.png", "--source-map", "map.npz", *options.split()]) == 0
     expected = texrs.inpaint(BRICKS, Mask(WHITE, threshold=0.2, grow=3, feather=4), seed=2)
     np.testing.assert_array_equal(io.read("out.png"), expected.image)
     assert main(["apply", "map.npz", "in.png", "-o", "again.png", "-q"]) == 0
     np.testing.assert_array_equal(io.read("again.png"), expected.image)
     assert main(["inpaint", "in.png", "-o", "no.png", "--grow", "3"]) == 2
-    assert "--grow: needs HOLE too" in capsys.readouterr().err
+    assert "--grow: needs MASK too" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,10 @@ def run(folder, text):
 
 
 def test_a_picture_is_grown(files):
-    assert run(files, "perspective @floor.png --scale-map @scale.npy -o @out.png --size 80x48 --map @map.npz -q") == 0
+    assert (
+        run(files, "perspective @floor.png --scale-map @scale.npy -o @out.png --size 80x48 --source-map @map.npz -q")
+        == 0
+    )
     assert io.read(files / "out.png").shape == (48, 80, 3)
     assert SourceMap.load(files / "map.npz").shape == (48, 80)
 
@@ -98,7 +101,7 @@ def test_holes_are_filled_by_scale(files):
             "perspective @floor.png --scale-map @scale.npy --min-feature-size 3 --foreshortened -o @out.png",
             "--min-feature-size and --foreshortened: a scale map is given",
         ),
-        ("inpaint @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
+        ("inpaint @floor.png alpha -o @out.png", "MASK: 'alpha' needs an image with an alpha channel"),
         ("inpaint @floor.png @hole.png -o @out.png --method heal", "--method: allowed are"),
         (
             "inpaint @floor.png @hole.png -o @out.png --method optimise --patch-size 9",

@@ -126,9 +126,9 @@ def test_transparency_is_the_hole(floor):
     result = texrs.inpaint(np.dstack([image, alpha]), "alpha", seed=1)
     np.testing.assert_array_equal(result.image[..., :3], fill(image, hole).image)
     assert (result.image[..., 3] == 255).all()
-    with pytest.raises(InvalidInput, match="hole: no pixel of the image is transparent"):
+    with pytest.raises(InvalidInput, match="mask: no pixel of the image is transparent"):
         texrs.inpaint(result.image, "alpha")
-    with pytest.raises(FileError, match="hole: beta: there is no such file"):
+    with pytest.raises(FileError, match="mask: beta: there is no such file"):
         texrs.inpaint(result.image, "beta")
 
 
@@ -204,21 +204,21 @@ def test_an_output_that_wraps(floor):
             "exemplar: method 'optimise' needs at least 16",
         ),
         (
-            {"hole": np.ones((64, 64), bool), "scale_map": "auto", "exemplar": np.zeros((40, 40), np.uint8)},
+            {"mask": np.ones((64, 64), bool), "scale_map": "auto", "exemplar": np.zeros((40, 40), np.uint8)},
             "scale_map: 'auto' measures what is known",
         ),
         ({"screening": "soft"}, "screening: needs a number"),
-        ({"hole": "alpha"}, "hole: 'alpha' needs an image with an alpha channel"),
+        ({"mask": "alpha"}, "mask: 'alpha' needs an image with an alpha channel"),
         ({"method": "optimise", "patch_size": 12}, "patch_size: method 'optimise' has no patches"),
-        ({"method": "optimise", "hole": np.ones((64, 64), bool)}, "hole: covers the whole image"),
-        ({"method": "optimise", "hole": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "hole: leaves no part"),
+        ({"method": "optimise", "mask": np.ones((64, 64), bool)}, "mask: covers the whole image"),
+        ({"method": "optimise", "mask": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "mask: leaves no part"),
     ],
 )
 def test_bad_input_is_named(options, sentence):
     hole = hole_in((64, 64), (20, 30, 20, 30))
     image = np.random.default_rng(0).integers(0, 255, (64, 64), np.uint8)
     with pytest.raises(InvalidInput, match=sentence):
-        texrs.inpaint(image, options.pop("hole", hole), **options)
+        texrs.inpaint(image, options.pop("mask", hole), **options)
 
 
 def test_pictures_without_an_axis_of_channels_are_filled_in_perspective():

@@ -153,7 +153,7 @@ def test_maps_stages_and_pages_are_not_replaced(here: Path, capsys: Capture) -> 
     Path("page.html").write_text("dear")
     Path("big.npy.json").write_text("[]")
     before = files(here)
-    for more in (["--map", "map.npz"], ["--stages", "st"]):
+    for more in (["--source-map", "map.npz"], ["--stages", "st"]):
         assert main(["tile", "in.png", "-o", "new.png", *more]) == 2
         assert "is there already" in capsys.readouterr().err
     assert main([*WRITERS["analyse"].format("e").split(), "--page", "page.html"]) == 2
@@ -254,17 +254,18 @@ def test_variants_that_are_done_stay(here: Path, number: int) -> None:
 AGAIN = {
     "apply": "apply map.npz in.png -o r.png --interpolation linear",
     "analyse": "analyse in.png --mask mask.png --layout disjoint -o r.npz --stages st --page r.html",
-    "inpaint": "inpaint in.png hole.png -o r.jpg --map r.npz",
+    "inpaint": "inpaint in.png hole.png -o r.jpg --source-map r.npz",
     "database": "database db matrix -o r.png --each each --cell 32",
-    "design": "design in.png --size 64x48 --copies 1 --seed 3 --element-labels mask.png -o r.exr --map r.npz --stages st",
+    "design": "design in.png --size 64x48 --copies 1 --seed 3 --element-labels mask.png "
+    "-o r.exr --source-map r.npz --stages st",
     "sample": "tile sample:weave -o r.webp --wrap x",
     "scale-map": "scale-map in.png --slant 40 --tilt 80 -o r.png --stages st",
     "scale-map npy": "scale-map in.png --slant 30 -o r.npy",
     "slice": "slice in.tif --cube -o r.png",
     "turntable": "slice in.tif --turntable --frames 3 --size 32 -o r.gif",
-    "solid": "solid in.tif --size 16 -o r.vti --map r.npz",
+    "solid": "solid in.tif --size 16 -o r.vti --source-map r.npz",
     "tile": "tile in.png -o r.bmp --stages st",
-    "variants": "design in.png --size 48 --copies 1 --variants 2 --seed 7 -o r.png --map r.npz --stages st",
+    "variants": "design in.png --size 48 --copies 1 --variants 2 --seed 7 -o r.png --source-map r.npz --stages st",
     "samples": "samples weave dots -o st --size 48",
     "add": "database db add in.png --name again --mask mask.png --layout disjoint",
 }

@@ -167,7 +167,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
                 "45",
                 "--fov",
                 "55",
-                "--map",
+                "--source-map",
                 source,
                 "--stages",
                 str(tmp_path / "s"),

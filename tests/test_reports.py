@@ -171,7 +171,7 @@ def test_heights_in_the_alpha_of_normals(here: Path) -> None:
     packed = np.dstack([np.rint((normals + 1) * 127.5), GREY]).astype(np.uint8)
     Image.fromarray(packed).save("rock/rock_normal.png")
     Image.fromarray(PEBBLES).save("rock/rock_albedo.png")
-    assert main(["design", "rock", "-o", "out", "--size", "96", "--map", "map.npz", "-q"]) == 0
+    assert main(["design", "rock", "-o", "out", "--size", "96", "--source-map", "map.npz", "-q"]) == 0
     (found,) = Path("out").glob("*normal*.png")
     source = texrs.SourceMap.load("map.npz")
     made = read(found)

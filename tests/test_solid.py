@@ -321,8 +321,8 @@ def test_reports_and_stages_are_saved(result, tmp_path):
     assert [level["shape"] for level in result.report["levels"]] == [[33, 40, 21]]
     assert list(result.stages) == ["patches", "before_blending"]
     names = [p.name for p in result.save_stages(tmp_path / "stages")]
-    assert names == ["01-patches.png", "02-composite.png", "report.json"]
-    shown = iio.imread(tmp_path / "stages" / "02-composite.png")
+    assert names == ["01-patches.png", "02-before-blending.png", "report.json"]
+    shown = iio.imread(tmp_path / "stages" / "02-before-blending.png")
     np.testing.assert_array_equal(shown, volume.slices(result.image))
     corrected = texrs.solid(STRIPES, (33, 40, 21), quality="fast")
     assert [level["shape"] for level in corrected.report["levels"]] == [[17, 20, 11], [33, 40, 21]]

@@ -38,7 +38,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
     options = "--size 18x24x20 --field zigzag:period=16 --seed 3 --quality fast --wrap zx --interpolation cubic"
-    more = "--no-labels --memory-limit 1G --threads 1 --stages stages --map map.npz"
+    more = "--no-labels --memory-limit 1G --threads 1 --stages stages --source-map map.npz"
     assert main(["solid", "v.npy", "-o", "out.tif", *options.split(), *more.split()]) == 0
     expected = texrs.solid(
         VOLUME,
@@ -55,7 +55,7 @@ def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> No
     report = json.loads(Path("stages/report.json").read_text())
     assert report.pop("texrs")["verb"] == "solid"
     assert report == json.loads(json.dumps(expected.report))
-    assert sorted(p.name for p in Path("stages").iterdir())[3] == "04-composite.png"
+    assert sorted(p.name for p in Path("stages").iterdir())[3] == "04-before-blending.png"
     said = capsys.readouterr()
     assert said.out == ""
     assert "blocks" in said.err
@@ -70,7 +70,7 @@ def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> No
 
 
 def test_synthesize_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    arguments = "--size 56x40 --field spiral:angle=15 --seed 9 --wrap y --quality fast --map s.npz --quiet"
+    arguments = "--size 56x40 --field spiral:angle=15 --seed 9 --wrap y --quality fast --source-map s.npz --quiet"
     assert main(["synthesize", "in.png", "-o", "out.png", *arguments.split()]) == 0
     spiral = fields.spiral(15, axes=2)
     expected = texrs.synthesize(PICTURE, (40, 56), field=spiral, seed=9, wrap=(True, False), quality="fast")
@@ -152,7 +152,7 @@ WRONG = [
     ),
     ("solid v.npy -o out.tif --threads 0", "--threads: needs an integer from 1"),
     ("solid v.npy -o out.png", "out.png: .png cannot hold volumes of uint8 with 3 channels"),
-    ("solid v.npy -o out.tif --map m.txt", "--map: needs a name that ends in .npz"),
+    ("solid v.npy -o out.tif --source-map m.txt", "--source-map: needs a name that ends in .npz"),
     ("solid v.npy -o none/out.tif", "there is no folder"),
     ("solid w.npy -o out.tif", "w.npy: there is no such file"),
     ("solid in.png -o out.tif", "in.png: is an image of 64 x 64, but a volume is needed"),

@@ -42,7 +42,7 @@ def test_splice(tmp_path: Path) -> None:
         "0",
         "-q",
     ]
-    assert main([*line, "--map", str(source), "--stages", str(stages)]) == 0
+    assert main([*line, "--source-map", str(source), "--stages", str(stages)]) == 0
     image = io.read(out)
     assert image.shape == (96, 112, 3)
     np.testing.assert_array_equal(view(texrs.SourceMap.load(source), texrs.samples.dots().image), image)

@@ -116,8 +116,8 @@ def test_holes_of_any_shape() -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"hole": np.ones((40, 40, 40), bool)}, "hole: "),
-        ({"hole": np.ones((40, 40, 4), bool)}, "hole: "),
+        ({"mask": np.ones((40, 40, 40), bool)}, "mask: "),
+        ({"mask": np.ones((40, 40, 4), bool)}, "mask: "),
         ({"scale_map": "auto"}, "scale_map: is for pictures"),
         ({"method": "optimise"}, "method: is for pictures"),
         ({"wrap": True}, "wrap: is for pictures"),
@@ -125,13 +125,13 @@ def test_holes_of_any_shape() -> None:
         ({"patch_size": 41}, "patch_size: "),
         ({"screening": -1}, "screening: "),
         (
-            {"image": np.zeros((40, 40, 8), np.uint8), "hole": np.ones((40, 40, 8), bool)},
-            "hole: ",
+            {"image": np.zeros((40, 40, 8), np.uint8), "mask": np.ones((40, 40, 8), bool)},
+            "mask: ",
         ),
     ],
 )
 def test_refusals(options: dict[str, object], says: str) -> None:
-    given = {"image": make_noise(), "hole": make_ball((40, 40, 40), 8)} | options
+    given = {"image": make_noise(), "mask": make_ball((40, 40, 40), 8)} | options
     with pytest.raises(InvalidInput, match=says):
         texrs.inpaint(**given)
 

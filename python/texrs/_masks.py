@@ -152,7 +152,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     Examples
     --------
     >>> import numpy as np
-    >>> mark(np.uint8([[0, 2, 255]]), "hole", ("rows", "columns"))
+    >>> mark(np.uint8([[0, 2, 255]]), "mask", ("rows", "columns"))
     array([[False, False,  True]])
 
     """
@@ -252,10 +252,10 @@ def check_share(marked: Bools, name: str, called: str, verb: str, *, invertible:
     Examples
     --------
     >>> import numpy as np
-    >>> check_share(np.zeros((4, 4), bool), "hole", "hole.png", "fill")
+    >>> check_share(np.zeros((4, 4), bool), "mask", "mask.png", "fill")
     Traceback (most recent call last):
         ...
-    texrs.errors.InvalidInput: hole: marks nothing, so there is nothing to fill
+    texrs.errors.InvalidInput: mask: marks nothing, so there is nothing to fill
 
     """
     share = float(marked.mean())

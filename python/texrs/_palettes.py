@@ -89,7 +89,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
         if isinstance(value, str | os.PathLike):
             with suppress(TexrsError):
                 # A verb that fills holes does not use pixels without data as values.
-                value = given[name] = as_ndarray(value, name, used="hole" not in usual)
+                value = given[name] = as_ndarray(value, name, used="mask" not in usual)
         elif isinstance(value, list | tuple) and any(isinstance(each, str | os.PathLike) for each in value):
             with suppress(TexrsError):
                 paths = (str, os.PathLike)

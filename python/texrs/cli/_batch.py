@@ -273,7 +273,7 @@ class Work:
 def is_done(command: Any, context: Any, job: Job) -> bool:
     """Return whether all that a command writes is there, and was made as it would be now."""
     record = _provenance.make_record(command, context.params, force=False)
-    for option in ("out", "map", "page"):
+    for option in ("out", "source_map", "page"):
         path = context.params.get(option)
         if path is None:
             continue

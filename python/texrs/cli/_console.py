@@ -303,7 +303,7 @@ def _describe_usage(failure: Exception) -> str:
         message = f"No such option: {wrong}{suggest(wrong, failure.possibilities or ())}"
     context = getattr(failure, "ctx", None)
     parameters = context.command.params if context is not None else ()
-    # Fields of a parameter are joined to its name: "hole_marks" is the marks of HOLE.
+    # Fields of a parameter are joined to its name: "mask_marks" is the marks of MASK.
     placed = [p.name.removesuffix("_marks") for p in parameters if p.param_type_name == "argument"]
     if context is not None and wrong is not None and wrong.lstrip("-").replace("-", "_") in placed:
         usage = " ".join(name.upper() for name in placed)

@@ -125,7 +125,7 @@ EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grou
 """Of each plane of a photograph."""
 THING = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
 """A mask that the function reads, as its other options say."""
-HOLE = Kind(
+FILLED = Kind(
     "FILE|alpha|nan|nodata|VALUE",
     read_hole,
     "nan: pixels that are NaN or infinite; nodata: the value that the file states; or a value.",

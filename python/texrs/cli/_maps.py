@@ -44,7 +44,7 @@ APPLIED = Options(
 
 @take_options(APPLIED)
 def apply_command(
-    source: Annotated[str, make_argument("MAP.npz", "A source map that --map wrote.")],
+    source: Annotated[str, make_argument("MAP.npz", "A source map that --source-map wrote.")],
     maps: Annotated[list[str], make_argument("IMAGE", "Images in register with the exemplar.")],
     out: Annotated[str, to_write("out", text="Image file or .zarr to write; a folder for several.")],
     given: dict[str, Any],

@@ -22,7 +22,7 @@ from texrs._notices import ignore
 from texrs._typing import Array
 from texrs.cli import _provenance
 from texrs.cli._places import PLACED, say_places
-from texrs.cli._provenance import RUNNING, check_free, read_status
+from texrs.cli._provenance import RUNNING, as_flag, check_free, read_status
 from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
@@ -50,7 +50,7 @@ MATTER = ("out", "folder", "size", "seed", "seeds", "options", "field", "wrap", 
 
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "out": (("--out", "-o"), "OUT", "File to write; its name says the format."),
-    "map": (("--map",), "OUT.npz", "File for the source map, for texrs apply."),
+    "source_map": (("--source-map",), "OUT.npz", "File for the source map, for texrs apply."),
     "stages": (("--stages",), "DIR", "Folder for pictures of the stages and report.json."),
     "sheet": (("--sheet",), "OUT.png", "Contact sheet of all results."),
     "preview": (("--preview",), "OUT.png", "Picture of a material under a light, tiled 2 x 2."),
@@ -151,7 +151,7 @@ def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> No
     for name, value in outputs.items():
         if isinstance(value, str) and os.path.realpath(value) in read:
             raise InvalidInput(
-                f"--{name}: {value} is read, and would hold other maps beside its own; write to another folder"
+                f"{as_flag(name)}: {value} is read, and would hold other maps beside its own; write to another folder"
             )
 
 
@@ -175,10 +175,10 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
         if path is not None:
             other = seen.setdefault(os.path.realpath(path), option)
             if other != option:
-                raise InvalidInput(f"--{option}: {path} is already the file of --{other}")
-    if (source := paths.get("map")) is not None:
-        check_suffix("map", source)
-        check_output(source, option="map")
+                raise InvalidInput(f"{as_flag(option)}: {path} is already the file of {as_flag(other)}")
+    if (source := paths.get("source_map")) is not None:
+        check_suffix("source_map", source)
+        check_output(source, option="source_map")
     if (shown := paths.get("preview")) is not None:
         check_output(shown, np.zeros((1, 1, 3), np.uint8), option="preview")
     if (solid := paths.get("gltf")) is not None:
@@ -194,7 +194,7 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
 def check_suffix(option: str, path: str, suffix: str = ".npz") -> None:
     """Check that the name of a file says what it is: by default, of arrays."""
     if Path(path).suffix.lower() != suffix:
-        raise InvalidInput(f"--{option}: needs a name that ends in {suffix}, got {path!r}")
+        raise InvalidInput(f"{as_flag(option)}: needs a name that ends in {suffix}, got {path!r}")
 
 
 def check_folder(path: str) -> None:
@@ -237,7 +237,9 @@ def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> Non
             for name, status in found:
                 if old is not None and os.path.samestat(old, status):
                     known = "" if name == file else f" as {name}"
-                    raise InvalidInput(f"--{option}: {file} is read{known}, and would be lost; write to another file")
+                    raise InvalidInput(
+                        f"{as_flag(option)}: {file} is read{known}, and would be lost; write to another file"
+                    )
 
 
 class _Enough(Exception):
@@ -345,7 +347,7 @@ def name_arguments(**names: str) -> Iterator[None]:
         several = argument.split(", ")
         if not colon or not all(each.isidentifier() for each in several):
             raise
-        called = dict.fromkeys(names.get(each, "--" + each.replace("_", "-")) for each in several)
+        called = dict.fromkeys(names.get(each, as_flag(each)) for each in several)
         said = say_places(rest) if set(several) & set(PLACED) else rest
         # Other arguments may be in the text; a name of two words is not a word of its own.
         for other in (name for name in names if "_" in name):
@@ -413,8 +415,8 @@ def deliver_beside(
     result: Synthesis, paths: Mapping[str, str | None], suffix: str, made: _provenance.Record | None
 ) -> None:
     """Write what was asked for beside a result: its map, and pictures of its stages."""
-    if (source := paths.get("map")) is not None:
-        with write_output(source, "map", suffix=suffix, made=made) as place:
+    if (source := paths.get("source_map")) is not None:
+        with write_output(source, "source_map", suffix=suffix, made=made) as place:
             result.source.save(place)
     if (stages := paths.get("stages")) is not None:
         with write_folder(stages, "stages", suffix=suffix, made=made) as folder:
@@ -425,7 +427,7 @@ def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str |
     """Return the names of what is written of one of several results: each ends in its seed."""
     for option, path in paths.items():
         if path is not None and not Path(path).name:
-            raise InvalidInput(f"--{option}: needs a name that the seed of a variant can follow, got {path!r}")
+            raise InvalidInput(f"{as_flag(option)}: needs a name that the seed of a variant can follow, got {path!r}")
     named: dict[str, str | None] = {}
     for option, path in paths.items():
         suffix = "" if path is None else find_suffix(Path(path))

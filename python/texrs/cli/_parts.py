@@ -24,6 +24,7 @@ from texrs.cli import _outputs, _provenance
 from texrs.cli._console import note, show_progress
 from texrs.cli._options import make_parameter
 from texrs.cli._outputs import name_arguments, read_kept_spacing
+from texrs.cli._provenance import as_flag
 from texrs.cli._stacks import Stack
 from texrs.cli._texts import About, parse_numbers, parse_size
 from texrs.cli._verb import Verb
@@ -81,7 +82,7 @@ class InParts(Verb):
         paths = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         for name, path in paths.items():
             if path is not None and name != "out":
-                raise InvalidInput(f"--{name}: is for results that are made at once, without {_list(said)}")
+                raise InvalidInput(f"{as_flag(name)}: is for results that are made at once, without {_list(said)}")
         stack = Stack.take(given)
         for flag, value in stack.list_writing().items():
             if value is not None:
@@ -96,7 +97,7 @@ class InParts(Verb):
         usual = {p.name: p.default for p in inspect.signature(options.function).parameters.values()}
         for name, value in call.items():
             if name not in (*TAKEN, "size", "progress") and value is not usual[name] and value != usual[name]:
-                raise InvalidInput(f"--{name.replace('_', '-')}: is for results that are made at once")
+                raise InvalidInput(f"{as_flag(name)}: is for results that are made at once")
         kind = SolidTexture if axes == 3 else PlaneTexture
         with name_arguments(**options.name_values(given), shape="--size", origin="--origin", chunks="--chunks"):
             texture = kind(**{name: call[name] for name in TAKEN if name in call})

@@ -38,7 +38,7 @@ LEFT = (
     "strict",
     "each",
     "out",
-    "map",
+    "source_map",
     "stages",
     "preview",
     "mipmaps",
@@ -126,7 +126,7 @@ class Record:
             said["seed"] = self.seed
         used = self._find_used()
         said["inputs"] = {self.rename(name, folder): self.find_hash(name) for name in self.files if name in used}
-        said["output"] = f"--{output}"
+        said["output"] = as_flag(output)
         if inside:
             said["file"] = os.path.basename(target)
         if self.placed and not has_rows_first():
@@ -149,6 +149,11 @@ RUNNING: ContextVar[Record | None] = ContextVar("record", default=None)
 """Of the command that runs."""
 ORIGINAL: ContextVar[Mapping[str, str] | None] = ContextVar("original", default=None)
 """What files are to be called that are read again."""
+
+
+def as_flag(name: str) -> str:
+    """Return the option of a parameter: ``--source-map`` for ``source_map``."""
+    return "--" + name.replace("_", "-")
 
 
 def read_status(path: str) -> os.stat_result | None:
@@ -283,7 +288,7 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
     if status is not None and status.st_size > 0:
         reason = _find_other(running, path)
         if reason:
-            raise InvalidInput(f"--{option}: {path} {reason}; --force replaces it, or write to another file")
+            raise InvalidInput(f"{as_flag(option)}: {path} {reason}; --force replaces it, or write to another file")
     beside = str(name_sidecar(Path(real)))
     if (
         needs_sidecar(Path(real))
@@ -292,7 +297,7 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
         and io.read_notes(beside).made is None
     ):
         raise InvalidInput(
-            f"--{option}: {beside}, which is to say how {path} was made, is there already; --force replaces it"
+            f"{as_flag(option)}: {beside}, which is to say how {path} was made, is there already; --force replaces it"
         )
     running.checked.add(real)
 

@@ -80,7 +80,7 @@ class Verb:
             parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
         # Materials are pictures.
         stacked = self.options.axes == 2
-        for name in ("map", "stages", *(SHOWN if stacked else ())):
+        for name in ("source_map", "stages", *(SHOWN if stacked else ())):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
         parameters += [make_parameter(name, type_, None) for name, type_ in OPTIONS.items() if stacked]
         if stacked:

@@ -20,8 +20,8 @@ from texrs.cli._kinds import (
     ENTRIES,
     ENTRY,
     EXAMPLE,
+    FILLED,
     GROUNDS,
-    HOLE,
     LAYOUT,
     MAP_OR_AUTO,
     NUMBERS,
@@ -71,8 +71,7 @@ def make_verb(name: str) -> Verb:
             from texrs.inpainting import inpaint
 
             kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
-            names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
-            arguments, marked = {"image": UNKNOWN, "hole.marks": HOLE}, names | {"hole.marks": "hole"}
+            arguments, marked = {"image": UNKNOWN, "mask.marks": FILLED}, {"mask.marks": "mask"}
             flat = Options(inpaint, arguments=arguments, kinds=kinds, names=marked, optional={"marks": ""})
             deep = Options(
                 inpaint,
@@ -148,8 +147,8 @@ class Filling(Verb):
 
     def run(self, **given: Any) -> None:
         """Fill a volume if the hole is one, else a picture."""
-        texts = [given["hole_marks"], given["image"]]
-        named = next(text for text in texts if text is not None and text not in HOLE.words)
+        texts = [given["mask_marks"], given["image"]]
+        named = next(text for text in texts if text is not None and text not in FILLED.words)
         deep = None
         # A file that cannot be read is refused later, by its reader.
         with suppress(FileError):

@@ -54,7 +54,7 @@ def _maps(workshop: Workshop) -> str:
         )
     return code(
         "texrs design STONES -o NEW --size 2048x2048 --preview lit.png   # a folder of maps, and a folder of maps\n"
-        "texrs design albedo.png -o new.png --map map.npz                # or one by one,\n"
+        "texrs design albedo.png -o new.png --source-map map.npz                # or one by one,\n"
         "texrs apply map.npz normals.png -o new-normals.png --map-type normal # finished as the first was"
     ) + "".join(rows)
 

@@ -50,7 +50,7 @@ __all__ = ["inpaint"]
 @takes_materials("image", "exemplar", check=check_material)
 def inpaint(
     image: Array | Exemplar | Material,
-    hole: Array | Mask | str | float | None = None,
+    mask: Array | Mask | str | float | None = None,
     *,
     exemplar: Array | Exemplar | Material | None = None,
     allowed: Array | Mask | str | None = None,
@@ -74,7 +74,7 @@ def inpaint(
         The picture or the volume, any real dtype, at least 4 pixels or 16 voxels a side. Values in the hole are ignored and
         may be NaN. A volume takes ``patch_size``, ``boundary_width``, ``screening`` and ``seed``; the other options
         are for pictures.
-    hole : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
+    mask : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
         Mask of the pixels to fill, white where it marks. "alpha": all pixels that are not fully opaque. "nan": all pixels
         that are NaN or infinite. "nodata": the value that the file of the image states for pixels without data. A number:
         all pixels of this value. Default: all pixels that are masked, NaN or infinite. See `texrs.Mask` for how a mask is
@@ -166,7 +166,7 @@ def inpaint(
     """
     progress = listen(progress)
     as_method(method, "patch", "optimise")
-    if is_volume(image, hole):
+    if is_volume(image, mask):
         flat = {
             "exemplar": exemplar is not None,
             "allowed": allowed is not None,
@@ -182,7 +182,7 @@ def inpaint(
         volume: Any = image
         return inpaint_volume(
             volume,
-            hole,
+            mask,
             patch_size=patch_size,
             boundary_width=boundary_width,
             screening=screening,
@@ -197,7 +197,7 @@ def inpaint(
     if allow_mirror is not None or scale_map is not None:
         allow_mirror = False if allow_mirror is None else as_bool(allow_mirror, "allow_mirror")
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
-    cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), as_marks(hole)
+    cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), as_marks(mask)
     picture, marked = find_hole(image.image if isinstance(image, Exemplar) else image, mask, cyclic)
     open_ = widen(marked, mask.feather, cyclic)
     pictures = check_pictures(picture, marked, open_, exemplar)
@@ -317,7 +317,7 @@ def check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | N
     pixels = as_image(array, "image", minimum=LEAST)
     if exemplar is None:
         if open_.all():
-            raise InvalidInput("hole: covers the whole image, so there is nothing to copy from; give an exemplar")
+            raise InvalidInput("mask: covers the whole image, so there is nothing to copy from; give an exemplar")
         return [pixels.reshape(array.shape)]
     known = as_exemplar(exemplar, minimum=LEAST)
     other = known.pixels

@@ -47,17 +47,17 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
     elif worded:
         hole = adjust(mask, _mark_missing(image, pixels, marks, masked, axes), wrap)
     else:
-        hole = mark(mask, "hole", shape, wrap)
+        hole = mark(mask, "mask", shape, wrap)
     hole = hole if masked is None else hole | masked
-    check_share(hole, "hole", name_marks(mask, "hole"), "fill", invertible=not (worded or alpha))
+    check_share(hole, "mask", name_marks(mask, "mask"), "fill", invertible=not (worded or alpha))
     return pixels, hole
 
 
 def check_material(given: dict[str, Any]) -> None:
     """Refuse a hole that is found in the values of one image, where there are several maps."""
-    marks = as_marks(given.get("hole")).marks
+    marks = as_marks(given.get("mask")).marks
     if _is_alpha(marks) or _is_value(marks):
-        raise InvalidInput("hole: must be a mask, because the image is a material, whose maps have it in common")
+        raise InvalidInput("mask: must be a mask, because the image is a material, whose maps have it in common")
 
 
 def _is_alpha(marks: object) -> bool:
@@ -83,7 +83,7 @@ def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bool
     """Return which pixels are not fully opaque, or are as transparent as a threshold says."""
     if pixels.ndim != axes + 1 or pixels.shape[-1] not in (2, 4):
         raise InvalidInput(
-            f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
+            f"mask: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
         )
     alpha = pixels[..., -1]
     full = float(np.iinfo(alpha.dtype).max) if alpha.dtype.kind in "ui" else 1.0
@@ -95,7 +95,7 @@ def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bool
             "image: no pixel is fully opaque, so all are filled; with a threshold of 1 only fully transparent ones are"
         )
     if not hole.any():
-        raise InvalidInput("hole: no pixel of the image is transparent, so there is nothing to fill")
+        raise InvalidInput("mask: no pixel of the image is transparent, so there is nothing to fill")
     return hole
 
 
@@ -108,14 +108,14 @@ def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | N
         known = (
             f"{path} states no nodata value" if path else "'nodata' needs an image of a file, which states the value"
         )
-        raise InvalidInput(f"hole: {known}; give the value, or 'nan'")
+        raise InvalidInput(f"mask: {known}; give the value, or 'nan'")
     value = math.nan if marks == "nan" else stated if marks in (None, "nodata") else _as_number(marks)
     if value is not None and math.isfinite(value):
         missing |= find_value(pixels, value, axes)
     if marks is None:
         if masked is None and not missing.any():
             raise InvalidInput(
-                "hole: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image must be a masked array or hold NaN"
+                "mask: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image must be a masked array or hold NaN"
             )
         if missing.any():
             what = "NaN or infinite" if stated is None else f"without data ({stated:g}), NaN or infinite"
@@ -125,7 +125,7 @@ def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | N
         return missing if masked is None else missing | masked
     if not missing.any():
         what = f"is {value:g}" if value is not None and math.isfinite(value) else "is NaN or infinite"
-        raise InvalidInput(f"hole: no pixel of the image {what}, so there is nothing to fill")
+        raise InvalidInput(f"mask: no pixel of the image {what}, so there is nothing to fill")
     return missing
 
 
@@ -133,7 +133,7 @@ def _as_number(value: object) -> float:
     try:
         return float(value)  # type: ignore[arg-type]
     except OverflowError:
-        raise InvalidInput("hole: must be a number that a double can hold") from None
+        raise InvalidInput("mask: must be a number that a double can hold") from None
 
 
 def _find_nodata(image: object) -> tuple[str, float | None]:

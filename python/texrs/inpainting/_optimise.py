@@ -123,7 +123,7 @@ def _make_atlas(
     atlas = Atlas.of(guidance(ground), scale, sizes, levels=levels, wanted=wanted, known=free)
     if not atlas.usable:
         why = (
-            "hole: leaves no part of the image that is free"
+            "mask: leaves no part of the image that is free"
             if len(pictures) == 1
             else "exemplar: has no part large enough"
         )

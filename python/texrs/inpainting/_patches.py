@@ -232,5 +232,5 @@ def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:
         if np.count_nonzero(mark_corners(free, side)) >= PLACES:
             return [side]
     if not mark_corners(free, LEAST).any():
-        raise InvalidInput(f"hole: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give an exemplar")
+        raise InvalidInput(f"mask: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give an exemplar")
     return [LEAST]

@@ -140,7 +140,7 @@ def check_volume(image: object, hole: object) -> tuple[Array, Bools]:
     pixels, mask = find_hole(image, asked, (False,) * 3, axes=3)
     volume = pixels.copy()
     if mask.all():
-        raise InvalidInput("hole: covers the whole volume, so there is nothing to copy from")
+        raise InvalidInput("mask: covers the whole volume, so there is nothing to copy from")
     volume[mask] = volume[np.unravel_index(mask.argmin(), mask.shape)]
     as_image(volume, "image", axes=3, minimum=LEAST)
     check_memory(24 * mask.size, "image")
@@ -232,7 +232,7 @@ def stitch(
     laid = shown < len(made.frames)
     if hole[tuple(np.moveaxis(found, -1, 0))].any():
         raise InvalidInput(
-            f"hole: leaves too few known voxels around it for patches of {side}; choose a smaller patch, at least 6"
+            f"mask: leaves too few known voxels around it for patches of {side}; choose a smaller patch, at least 6"
         )
     places[part], label[part] = found, np.where(laid, shown + 1, 0)
     return places, label, made.frames, made.seams
