@@ -58,7 +58,9 @@ _COLLECTORS: ContextVar[tuple[_Collector, ...]] = ContextVar("collectors", defau
 
 
 @contextmanager
-def collect(*, show: Callable[[str], object] | None = None, strict: bool = False) -> Iterator[Notices]:
+def collect(
+    *, show: Callable[[str], object] | None = None, strict: bool = False, apart: bool = False
+) -> Iterator[Notices]:
     """Collect the notices of a block.
 
     Parameters
@@ -67,6 +69,8 @@ def collect(*, show: Callable[[str], object] | None = None, strict: bool = False
         Called with the text of each notice when it is given. Without it, an ignored part is also a Python warning.
     strict : bool
         If True, an ignored part raises `texrs.errors.InvalidInput`.
+    apart : bool
+        If True, the notices do not reach outer blocks and are not warnings. Default: False.
 
     Yields
     ------
@@ -75,7 +79,10 @@ def collect(*, show: Callable[[str], object] | None = None, strict: bool = False
 
     """
     notices = Notices()
-    token = _COLLECTORS.set((*_COLLECTORS.get(), _Collector(notices, show, strict)))
+    outer = () if apart else _COLLECTORS.get()
+    if apart and show is None:
+        show = bool
+    token = _COLLECTORS.set((*outer, _Collector(notices, show, strict)))
     try:
         yield notices
     finally:

@@ -31,7 +31,7 @@ def check_command(
     """Test whether a picture tiles along each axis, and how bold its borders are."""
     if out is not None:
         _outputs.check_output(out)
-    given = read_example(file, About())
+    given = read_example(file, About(), single=False)
     shown = np.asarray(given.base if isinstance(given, Material) else given)
     if out is not None:
         _outputs.check_output(out, shown)

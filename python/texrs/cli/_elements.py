@@ -31,6 +31,7 @@ from texrs.elements import analyse, pictures
 from texrs.elements import page as draw_page
 from texrs.errors import FileError, InvalidInput
 from texrs.materials import Material
+from texrs.materials._single import SingleMap
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
@@ -79,7 +80,7 @@ def analyse_command(
         options |= PICTURED.read(given, about, which=lambda o: o.file)
     for warning in left:
         note(str(warning.message), quiet=quiet)
-    material = isinstance(options["image",], Material)
+    material = isinstance(options["image",], Material) and not isinstance(options["image",], SingleMap)
     if role and not material:
         raise InvalidInput("--role: is for materials, which are folders of maps or EXR files of layers")
     names = {o.path[-1]: o.flag for o in PICTURED} | {"image": given["image"], "count": "--threads"}

@@ -98,7 +98,7 @@ LAYOUT = Kind(
 )
 ENTRIES = replace(
     ENTRY,
-    read=lambda texts, about: [read_entry(text, about) for text in texts],
+    read=lambda texts, about: [read_entry(text, about, single=len(texts) == 1) for text in texts],
     note="Files, folders of the maps of a material, sample:NAME, or entries that texrs analyse wrote (.npz).",
     many=True,
 )

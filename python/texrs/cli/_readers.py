@@ -52,16 +52,15 @@ def match_alpha(image: Any, like: Array | None) -> Any:
     return image
 
 
-def read_example(text: str, about: About, *, finite: bool = True) -> Any:
-    """Read a picture, or a material: a folder of maps, or an EXR file of several layers."""
+def read_example(text: str, about: About, *, finite: bool = True, single: bool = True) -> Any:
+    """Read a picture, or a material: a folder of maps, an EXR file of several layers, or a single map by its name."""
     from texrs.cli._stacks import is_stack
-    from texrs.materials import Material, Role, guess_role
+    from texrs.materials import Material
+    from texrs.materials._single import read_single
 
     if text.startswith(SAMPLE) or not is_stack(text):
-        role = None if text.startswith(SAMPLE) else guess_role(Path(text).stem)
-        if role is not None and (role.normal or role.labelled or role is Role.VECTOR):
-            assume(f"{text}: read as colours; the role {role.value} of its name counts in a folder of maps")
-        return read_picture(text, finite=finite)
+        alone = read_single(text) if single and os.path.isfile(text) else None
+        return read_picture(text, finite=finite) if alone is None else alone
 
     with name_arguments(roles="--role", maps=text):
         return Material.read(expand_braces(text) or text, roles=about.roles)
@@ -242,11 +241,11 @@ def read_direction(text: str, about: About) -> Any:
     return io.read(text) if suffix and suffix != ".npz" and "=" not in text else read_field(text, about)
 
 
-def read_entry(text: str, about: About) -> Any:
+def read_entry(text: str, about: About, *, single: bool = True) -> Any:
     """Read analysed elements, or a picture, which is analysed by whoever takes it."""
     from texrs import elements
 
-    return elements.load(text) if text.lower().endswith(".npz") else read_example(text, about)
+    return elements.load(text) if text.lower().endswith(".npz") else read_example(text, about, single=single)
 
 
 def read_layout(text: str, about: About) -> Any:

@@ -22,6 +22,7 @@ from texrs.cli._stacks import Roles, Stack, is_stack
 from texrs.cli._texts import About, parse_size
 from texrs.errors import InvalidInput
 from texrs.materials import Material
+from texrs.materials._single import SingleMap
 from texrs.papers.design import design_variants
 from texrs.tile_set import TileSet
 
@@ -98,7 +99,8 @@ def tiles_command(
         {path: v for path, v in values.items() if path not in {o.path for o in TILED}}
     )
     example = call["exemplar"]
-    if isinstance(example, Material):
+    single = isinstance(example, SingleMap)
+    if isinstance(example, Material) and not single:
         if windowed and not parts:
             stack.check_outputs(example, {"out": out}, [])
     elif role:
@@ -118,7 +120,7 @@ def tiles_command(
         return
     with name_arguments(size="--size", origin="--origin"):
         made = tiles.window(asked.origin, sides)
-    if made.material is None:
+    if made.material is None or single:
         notes = io.read_notes(given["exemplar"]) if os.path.isfile(given["exemplar"]) else io.Notes()
         like = io.Notes(profile=notes.profile, srgb=notes.srgb, multiplied=notes.multiplied)
         with _outputs.write_output(out, like=like) as temporary:

@@ -30,6 +30,7 @@ from texrs.cli._stacks import OPTIONS, SHOWN, Stack
 from texrs.cli._texts import About
 from texrs.errors import LimitExceeded
 from texrs.materials import Material, guess_role
+from texrs.materials._single import SingleMap
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
@@ -181,7 +182,7 @@ class Verb:
         names = getattr(self.options.function, "takes", ())
         several = (value for path, value in values.items() if path[0] in names)
         every = (each for value in several for each in (value if isinstance(value, list) else [value]))
-        return next((each for each in every if isinstance(each, Material)), None)
+        return next((each for each in every if isinstance(each, Material) and not isinstance(each, SingleMap)), None)
 
     def find_example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
         """Return the pixels of the first input."""

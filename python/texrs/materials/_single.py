@@ -1,0 +1,68 @@
+"""A single file that is a map of a material by its name and its values, such as ``rock_normal.png``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from texrs._notices import assume, collect, ignore
+from texrs._typing import Array
+from texrs.errors import FileError, InvalidInput
+from texrs.materials._material import Material
+from texrs.materials._roles import Role, guess_role
+
+__all__ = ["SingleMap", "read_single"]
+
+UNIT, SPARE = 0.1, 8
+"""Largest difference of the usual length of normals from 1, and least number of pixels for each value of labels."""
+
+
+class SingleMap(Material):
+    """A material of one map that was read from one file. Results are written as an image."""
+
+
+def read_single(path: str) -> SingleMap | None:
+    """Return the only map of a material; None if the name or the values of a file are those of an image.
+
+    Colours and heights are looked up and corrected like any image. Normals and vectors turn with the surface. There are no values
+    between labels.
+    """
+    role = guess_role(Path(path).stem)
+    if role is None or not (role.normal or role.labelled or role is Role.VECTOR):
+        return None
+    with collect(apart=True) as notices:
+        try:
+            read = Material.read([path])
+        except (FileError, InvalidInput):
+            # The reader of images says what is wrong.
+            return None
+    each = next(iter(read.values()))
+    if not _agrees(each.pixels, each.role):
+        assume(f"{path}: read as colours, because its values are not those of the role {role.value} of its name")
+        return None
+    for line in notices.ignored:
+        ignore(line)
+    for line in notices.assumed:
+        assume(line)
+    assume(f"{path}: read as {each.role.value}, because its name and its values say so")
+    # All maps of a role have one name, so that one file can be filled from another.
+    return SingleMap({"map": each})
+
+
+def _agrees(pixels: Array, role: Role) -> bool:
+    """Return whether values are those of a role."""
+    kind, flat = pixels.dtype.kind, pixels.reshape(-1, pixels.shape[2] if pixels.ndim == 3 else 1)
+    if role.labelled:
+        return kind in "bui" and len(np.unique(flat, axis=0)) * SPARE <= len(flat)
+    if not role.normal:
+        return flat.shape[1] in (2, 3)
+    if flat.shape[1] != 3 or kind not in "uf":
+        return False
+    shares = flat / np.iinfo(pixels.dtype).max if kind == "u" else flat if flat.min() >= 0 else (flat + 1) / 2
+    vectors = 2 * shares.astype(np.float64) - 1
+    if role.bare:
+        # Engines that store x and y fill the third channel with one value.
+        return bool(np.ptp(flat[:, 2]) == 0 and (np.hypot(*vectors[:, :2].T) <= 1 + UNIT).mean() >= 0.99)
+    lengths = np.linalg.norm(vectors, axis=1)
+    return bool(abs(np.median(lengths) - 1) <= UNIT and np.median(vectors[:, 2]) > 0)
