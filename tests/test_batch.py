@@ -166,7 +166,7 @@ def test_patterns_folders_and_places(here: Path, capsys: Capture) -> None:
         ("", "needs verb"),
         ('verb = "design"', "needs inputs"),
         ('verb = "design"\ninputs = "stones"', "needs out"),
-        ('verb = "design"\ninputs = "stones"\nout = "o"\nseed = 3', "has 'seed'; allowed are verb, inputs"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\nseed = 3', "unknown key 'seed'; must be one of verb, inputs"),
         ('verb = "desing"\ninputs = "stones"\nout = "o"', "got 'desing'"),
         ('verb = "batch"\ninputs = "stones"\nout = "o"', "got 'batch'"),
         ('verb = "design"\ninputs = "no/*.png"\nout = "o"', "nothing is found for 'no/*.png'"),

@@ -245,9 +245,9 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("design rock -o new --depth 12", "--depth: allowed are 8, 16 and 32, got 12"),
-        ("design rock -o new --format jpg", "--format: allowed are png, tif and exr, got 'jpg'"),
-        ("design rock -o new --pack rgb", "--pack: allowed are orm and none, got 'rgb'"),
+        ("design rock -o new --depth 12", "--depth: must be one of 8, 16, 32; got 12"),
+        ("design rock -o new --format jpg", "--format: must be one of png, tif, exr; got 'jpg'"),
+        ("design rock -o new --pack rgb", "--pack: must be one of orm, none; got 'rgb'"),
         ("design rock -o new --gltf rock.gltf", "--gltf: needs a name that ends in .glb"),
         ("design rock/rock_albedo.png -o new.png --mipmaps small", "--mipmaps: is for materials"),
         ("solid sample:stripes -o new.tif --size 32x32x32 --depth 16", "No such option: --depth"),

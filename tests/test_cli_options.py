@@ -190,8 +190,8 @@ def test_types_and_names_say_how_an_option_is_read() -> None:
     expected = {"colour": Colour.RED, "size": (3, 4), "mirror": False, "knobs": knobs}
     assert OPTIONS.call(OPTIONS.read(given)) == expected
     for name, text, message in (
-        ("colour", "green", "--colour: allowed are default, red and blue; got 'green'"),
-        ("mode", "best", "--mode: allowed are plain and fine; got 'best'"),
+        ("colour", "green", "--colour: must be one of default, red, blue; got 'green'"),
+        ("mode", "best", "--mode: must be one of plain, fine; got 'best'"),
         ("knobs_kind", "near", "--knob-kind: needs --knob-width too"),
     ):
         with pytest.raises(InvalidInput) as caught:

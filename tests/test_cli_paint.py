@@ -101,7 +101,7 @@ def test_colours_of_corners(here: Path) -> None:
         (["-o", "a.glb", "--along", "y"], "--along: needs --directions"),
         (["-o", "a.glb", "--directions", "up"], "--directions: needs x, y, z"),
         (["-o", "a.glb", "--directions", "x", "--field", "circular"], "one of them can be asked for"),
-        (["-o", "a.glb", "--bits", "12"], "--bits: allowed are 8 and 16"),
+        (["-o", "a.glb", "--bits", "12"], "--bits: must be one of 8, 16"),
         (["-o", "a.glb", "--role", "a=height"], "--role: is for materials"),
         (["-o", "a.glb", "--voxels", "0"], "--voxels"),
     ],

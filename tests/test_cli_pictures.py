@@ -137,7 +137,7 @@ def test_photograph_by_name(here: Path) -> None:
 
 REFUSED = {
     "tile no.png": "no.png",
-    "tile in.png --wrap z": "--wrap: allowed are",
+    "tile in.png --wrap z": "--wrap: must be one of",
     "tile in.png --overlap 0": "--overlap: each side must be at least 1",
     "tile in.png --overlap 33": "--overlap: needs an integer from 1 to 32, got 33: at most half of the 64 rows",
     "tile in.png --overlap 41x10": "from 1 to 40, got 41: at most half of the 80 columns",
@@ -158,7 +158,7 @@ REFUSED = {
     "inpaint in.png hole.png --patch-size 60": "--patch-size: 60 has no place",
     "inpaint in.png hole.png --boundary-width -1": "--boundary-width: needs",
     "inpaint in.png hole.png --seed -1": "--seed: needs",
-    "inpaint in.png hole.png --wrap yes": "--wrap: allowed are",
+    "inpaint in.png hole.png --wrap yes": "--wrap: must be one of",
     "inpaint in.png hole.png --exemplar hole.png": "hole.png: needs the dtype and channels of the image",
     "inpaint in.png hole.png --exemplar no.png": "no.png",
     "inpaint nan.npy hole.png": "nan.npy",

@@ -103,7 +103,7 @@ def test_measures_know_the_best_and_the_worst() -> None:
         ({"tasks": ["all"]}, "tasks"),
         ({"side": 8}, "side"),
         ({"side": 96, "size": 64}, "size"),
-        ({"programs": {"gimp": "gimp"}}, "allowed are embark, resynthesizer"),
+        ({"programs": {"gimp": "gimp"}}, "must be one of embark, resynthesizer"),
         ({"programs": {"embark": "/nowhere"}}, "is not a program that can be run"),
         ({"pictures": {"small": GRIT[:20]}}, "small"),
     ],

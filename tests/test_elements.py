@@ -248,7 +248,7 @@ HALF[:, :40] = True
         ({"background": [(5, 5), (5, 5)]}, "background: point 1, .* is there twice"),
         ({"background": [BOX[:2]]}, "background: contradicts the box"),
         ({"mask": MASK, "background": [tuple(CENTRES[3])]}, "background: contradicts the mask"),
-        ({"layout": "F=x"}, "layout: allowed are disjoint"),
+        ({"layout": "F=x"}, "layout: must be one of disjoint"),
         ({"mask": HALF, "box": None, "background": None}, "box: is needed with this mask"),
         (
             {"mask": HALF, "box": (80, 30, 30, 30), "background": None},
@@ -268,9 +268,9 @@ HALF[:, :40] = True
         ({"search": {"scales": []}}, "scales: needs 1 to 16 numbers"),
         ({"search": {"scales": [9.0]}}, "scales\\[0\\]: needs a number"),
         ({"search": {"threshold": 3}}, "threshold: needs a number from -1 to 1"),
-        ({"search": {"channel": "third"}}, "channel: allowed are"),
-        ({"search": {"model": "forest"}}, "model: allowed are"),
-        ({"method": "letter"}, "method: allowed are None and 'paper'"),
+        ({"search": {"channel": "third"}}, "channel: must be one of"),
+        ({"search": {"model": "forest"}}, "model: must be one of"),
+        ({"method": "letter"}, "method: must be one of None, 'paper'"),
     ],
 )
 def test_bad_input_gets_a_sentence(change: dict, message: str) -> None:

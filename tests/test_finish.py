@@ -76,7 +76,7 @@ def test_labels_are_never_mixed() -> None:
     labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
     found = texrs.apply(source, labels, map_type="label")
     assert set(np.unique(found)) <= set(np.unique(labels))
-    with pytest.raises(InvalidInput, match="kind: allowed are colour, normal, vector and label"):
+    with pytest.raises(InvalidInput, match="map_type: must be one of colour, normal, vector, label"):
         texrs.apply(source, labels, map_type="labels")  # type: ignore[arg-type]
 
 

@@ -365,7 +365,7 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
         ),
         (PEBBLES, HOLE, {"exemplar": PEBBLES / 255}, "got float64 and 3"),
         (PEBBLES, HOLE, {"exemplar": PEBBLES[:3]}, "exemplar: each side must be at least 4"),
-        (PEBBLES, HOLE, {"method": "heal"}, "method: allowed are 'patch' and 'optimise', got 'heal'"),
+        (PEBBLES, HOLE, {"method": "heal"}, "method: must be one of 'patch', 'optimise'; got 'heal'"),
         (PEBBLES, HOLE, {"boundary_width": -1}, "boundary_width: needs an integer from 0"),
         (PEBBLES, HOLE, {"allow_mirror": 1}, "allow_mirror: needs True or False"),
         (PEBBLES, HOLE, {"seed": -1}, "seed: needs"),

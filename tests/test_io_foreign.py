@@ -316,7 +316,7 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
         ("flow.npy:around=z", 3, "knows along=, order=, up=, signed= after a file"),
         ("flow.npy:up=1x", 3, "up= needs three numbers"),
         ("flow.npy:signed=1", 3, "signed= needs yes or no"),
-        ("flow.npy:along=w", 3, "along: allowed are z, y and x"),
+        ("flow.npy:along=w", 3, "along: must be one of z, y, x"),
         ("cubes.npy", 3, "cubes.npy: needs directions"),
     ],
 )

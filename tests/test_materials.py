@@ -203,7 +203,7 @@ def test_depths_and_formats_of_files(tmp_path: Path) -> None:
     stones.save(tmp_path, depth=16, suffix=".tif")
     assert io.read(tmp_path / "albedo.tif").dtype == io.read(tmp_path / "height.tif").dtype == np.uint16
     assert (io.read(tmp_path / "albedo.tif") == STONES["albedo"].pixels.astype(np.uint16) * 257).all()
-    with pytest.raises(InvalidInput, match="depth: allowed are 8, 16 and 32, got 12"):
+    with pytest.raises(InvalidInput, match="depth: must be one of 8, 16, 32; got 12"):
         stones.save(tmp_path, depth=12)  # type: ignore[arg-type]
 
 
@@ -233,7 +233,7 @@ def test_bad_materials_are_refused() -> None:
         ({"normal": picture[..., 0]}, {}, "normal: a map of role normal must have 2, 3 or 4 channels, got 1"),
         ({"albedo": picture}, {"roles": {"albedo": "shiny"}}, "allowed roles are"),
         ({"albedo": picture}, {"roles": {"colour": "mask"}}, "there is no map 'colour'"),
-        ({"albedo": picture}, {"spaces": {"albedo": "lab"}}, "allowed are srgb and linear"),
+        ({"albedo": picture}, {"spaces": {"albedo": "lab"}}, "must be one of srgb, linear"),
         ({"albedo": picture}, {"weights": {"albedo": -1}}, "weights"),
         ({"albedo": picture, "mask": picture}, {"weights": {"albedo": 0, "mask": 0}}, "nothing to decide on"),
         ({"albedo": np.zeros((4, 4, 4, 4, 4))}, {}, "albedo: needs shape"),

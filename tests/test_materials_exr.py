@@ -119,7 +119,7 @@ def test_a_depth_that_is_asked_for(tmp_path: Path) -> None:
         assert (back["labels"].pixels == stones["labels"].pixels).all()
         linear = decode_srgb(stones["albedo"].pixels / np.float32(255))
         np.testing.assert_allclose(back["albedo"].pixels, linear, atol=1e-3)
-    with pytest.raises(InvalidInput, match="depth: allowed are 16 and 32, got 8"):
+    with pytest.raises(InvalidInput, match="depth: must be one of 16, 32; got 8"):
         stones.save_exr(tmp_path / "a.exr", depth=8)  # type: ignore[arg-type]
 
 

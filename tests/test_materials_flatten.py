@@ -153,7 +153,7 @@ def test_materials_are_flattened_by_their_roles() -> None:
     [
         ({"amount": 2}, "amount: needs a number from 0 to 1"),
         ({"size": 1}, "size: needs a number from 4"),
-        ({"space": "lab"}, "allowed are srgb and linear"),
+        ({"space": "lab"}, "must be one of srgb, linear"),
         ({"wrap": 3}, "wrap"),
     ],
 )

@@ -271,9 +271,9 @@ def test_pictures_of_16_bit(tmp_path: Path) -> None:
         ("none/a.glb", {}, FileError, "there is no folder"),
         ("a.glb", {"shapes": []}, InvalidInput, "shapes: needs plane, sphere or both"),
         ("a.glb", {"shapes": ["plane", "plane"]}, InvalidInput, "shapes: needs plane, sphere or both"),
-        ("a.glb", {"shapes": ["cube"]}, InvalidInput, "allowed are plane and sphere"),
+        ("a.glb", {"shapes": ["cube"]}, InvalidInput, "must be one of plane, sphere"),
         ("a.glb", {"repeat": 0}, InvalidInput, "repeat: needs an integer from 1"),
-        ("a.glb", {"depth": 32}, InvalidInput, "depth: allowed are 8 and 16"),
+        ("a.glb", {"depth": 32}, InvalidInput, "depth: must be one of 8, 16"),
     ],
 )
 def test_bad_options_are_refused(name: str, options: dict[str, Any], error: type, words: str, tmp_path: Path) -> None:

@@ -167,7 +167,7 @@ def test_a_folder_with_mipmaps_is_still_a_material(tmp_path: Path) -> None:
 
 def test_bad_ways_to_save_are_refused(tmp_path: Path) -> None:
     stones = Material({"albedo": STONES})
-    with pytest.raises(InvalidInput, match="pack: allowed are 'orm' and 'none', got 'rma'"):
+    with pytest.raises(InvalidInput, match="pack: must be one of 'orm', 'none'; got 'rma'"):
         stones.save(tmp_path, pack="rma")  # type: ignore[arg-type]
     with pytest.raises(InvalidInput, match="mipmaps: needs True or False"):
         stones.save(tmp_path, mipmaps=3)  # type: ignore[arg-type]

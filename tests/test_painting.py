@@ -257,7 +257,7 @@ def test_directions_lie_in_the_surface_as_they_are_said(tmp_path: Path) -> None:
         (lambda: paint(BALL, TEXTURE, atlas=4), InvalidInput, "atlas"),
         (lambda: paint("nowhere.obj", TEXTURE), FileError, "nowhere.obj"),
         (lambda: follow(BALL, "north", scale=1), InvalidInput, "directions: needs x, y, z"),
-        (lambda: follow(BALL, "curvature:some", scale=1), InvalidInput, "allowed are curvature"),
+        (lambda: follow(BALL, "curvature:some", scale=1), InvalidInput, "must be one of curvature"),
         (lambda: follow(BALL, "[]", scale=1), InvalidInput, "needs strokes"),
         (lambda: follow(BALL, [[[0, 0, 1]]], scale=1), InvalidInput, "stroke 0 needs at least two points"),
         (lambda: follow(BALL, "nowhere.json", scale=1), FileError, "nowhere.json"),

@@ -178,7 +178,7 @@ BAD = [
     ({"size": 0}, "size: "),
     ({"size": "large"}, "size: "),
     ({"seed": -1}, "seed: "),
-    ({"method": "fast"}, "method: allowed are None and 'paper'"),
+    ({"method": "fast"}, "method: must be one of None, 'paper'"),
     ({"scale_weight": 17}, "scale_weight: "),
     ({"augment_scales": "some"}, "augment_scales: needs 'auto'"),
     ({"augment_scales": [9.0]}, "augment_scales: "),

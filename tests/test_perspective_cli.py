@@ -84,7 +84,7 @@ def test_holes_are_filled_by_scale(files):
         ("perspective @floor.png --scale-map @hole.png -o @out.png --size 0", "--size"),
         (
             "perspective @floor.png --scale-map @scale.npy -o @out.png --method best",
-            "--method: allowed are default and paper",
+            "--method: must be one of default, paper",
         ),
         (
             "perspective @floor.png --scale-map @scale.npy -o @out.png --augment-scales big",
@@ -96,13 +96,13 @@ def test_holes_are_filled_by_scale(files):
             "--scale-weight: needs a number",
         ),
         ("perspective @floor.png --min-feature-size 0 -o @out.png", "--min-feature-size: needs a number from 0.5"),
-        ("perspective @floor.png --trend steep -o @out.png", "--trend: allowed are none, plane, linear and quadratic"),
+        ("perspective @floor.png --trend steep -o @out.png", "--trend: must be one of none, plane, linear, quadratic"),
         (
             "perspective @floor.png --scale-map @scale.npy --min-feature-size 3 --foreshortened -o @out.png",
             "--min-feature-size and --foreshortened: a scale map is given",
         ),
         ("inpaint @floor.png alpha -o @out.png", "MASK: 'alpha' needs an image with an alpha channel"),
-        ("inpaint @floor.png @hole.png -o @out.png --method heal", "--method: allowed are"),
+        ("inpaint @floor.png @hole.png -o @out.png --method heal", "--method: must be one of"),
         (
             "inpaint @floor.png @hole.png -o @out.png --method optimise --patch-size 9",
             "--patch-size: method 'optimise' has no",

@@ -186,8 +186,8 @@ def test_an_output_that_wraps(floor):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"method": "paint"}, "method: allowed are 'patch' and 'optimise'"),
-        ({"scale_map": "guess"}, "scale_map: allowed are 'auto'"),
+        ({"method": "paint"}, "method: must be one of 'patch', 'optimise'"),
+        ({"scale_map": "guess"}, "scale_map: must be 'auto'"),
         ({"scale_map": np.ones((3, 3))}, "scale_map: needs shape"),
         ({"scale_map": np.zeros((64, 64))}, "scale_map: |scale: "),
         ({"exemplar_scale_map": np.ones((40, 40))}, "exemplar_scale_map: needs an exemplar"),

@@ -101,7 +101,7 @@ def test_coordinates_may_jump_and_end():
     [
         (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4, 3))), "normals: no pixel shows a surface"),
         (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4))), "normals: needs numbers of shape"),
-        (lambda: scale_maps.jacobians_of_normals(make_column(), green="left"), "green: allowed are up and down"),
+        (lambda: scale_maps.jacobians_of_normals(make_column(), green="left"), "green: must be one of up, down"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 2))), "coordinates: no pixel shows a surface"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((1, 4, 2))), "coordinates: needs two rows"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 3))), "coordinates: needs shape"),
@@ -269,7 +269,7 @@ def test_a_column_that_repeats(weave):
         ({"target": np.ones((8, 8, 3, 3))}, "target: needs shape"),
         ({"target": make_column(8), "method": "paper"}, "method: the paper's knows no surfaces"),
         ({"scale_map": "plane:slant=x"}, "scale_map: needs plane:slant=DEGREES"),
-        ({"scale_map": "above"}, "scale_map: allowed are auto and front"),
+        ({"scale_map": "above"}, "scale_map: must be one of auto, front"),
         ({"scale_map": Plane((9, 9), 20)}, "scale_map: needs a plane in a picture of"),
         ({"fov": 400}, "fov: needs a number from 1 to 170"),
         ({"scale_map": "plane:slant=30", "fov": 40}, "fov: the plane has one already"),

@@ -138,7 +138,7 @@ def test_user_and_angles_do_not_need_a_map() -> None:
 @pytest.mark.parametrize(
     ("arguments", "options", "message"),
     [
-        ((FLOOR, (5, 5), "tile"), {}, r"^mode: allowed are stretch, extend, user and angles; got 'tile'$"),
+        ((FLOOR, (5, 5), "tile"), {}, r"^mode: must be one of stretch, extend, user, angles; got 'tile'$"),
         ((FLOOR, (5, 5), "user"), {}, r"^pattern: the mode 'user' needs a pattern of scales$"),
         ((FLOOR, (5, 5), "angles"), {"slant": 4}, r"^tilt: the mode 'angles' needs a slant and a tilt$"),
         ((FLOOR, (5, 0)), {}, r"^size: each side must be at least 1"),
@@ -214,7 +214,7 @@ def test_extend_refuses(scale: np.ndarray, known: np.ndarray, message: str) -> N
 
 
 def test_an_unknown_trend_is_refused() -> None:
-    with pytest.raises(InvalidInput, match=r"^trend: allowed are none, plane, linear and quadratic; got 'cubic'$"):
+    with pytest.raises(InvalidInput, match=r"^trend: must be one of none, plane, linear, quadratic; got 'cubic'$"):
         scale_maps.extend(FLOOR, FLOOR > 1, trend="cubic")
 
 
@@ -254,7 +254,7 @@ def test_128_is_the_normal_size_and_the_ends_hold() -> None:
     [
         (np.ones((4, 4)), "log2", r"^image: needs grey levels in uint8 or uint16, got float64; floats are scales"),
         (np.eye(3, dtype=np.uint8)[None], "log2", r"^image: needs grey levels, got colours; a false-colour"),
-        (np.ones((4, 4), np.uint8), "log10", r"^encoding: allowed are log2 and paper; got 'log10'$"),
+        (np.ones((4, 4), np.uint8), "log10", r"^encoding: must be one of log2, paper; got 'log10'$"),
     ],
 )
 def test_decode_refuses(image: np.ndarray, encoding: str, message: str) -> None:

@@ -162,7 +162,7 @@ def test_any_list_gives_a_map_of_any_size(edits: list, rows: int, columns: int) 
         ([{"op": "erase"}], r"^steps: step 1 needs an 'op' among .*'erase'}$"),
         ([{"op": ["set"]}], r"^steps: step 1 needs an 'op' among .*\['set'\]}$"),
         ([ALL[0], {"op": "set"}], r"^steps: step 2, set, needs value$"),
-        ([{"op": "set", "value": 1, "fog": 2}], r"^steps: step 1, set, knows no fog; allowed are value, region"),
+        ([{"op": "set", "value": 1, "fog": 2}], r"^steps: step 1, set, has no option fog; must be one of value, region"),
         ([{"op": "set", "value": 0}], r"^steps: step 1, set: value needs a number from 0.125 to 8, got 0$"),
         ([{"op": "magnify", "factor": 0.5}], r"factor needs a number from 1 to 8, got 0.5$"),
         ('[{"op": "magnify", "factor": NaN}]', r"factor needs a number from 1 to 8, got nan$"),

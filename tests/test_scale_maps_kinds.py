@@ -67,7 +67,7 @@ def test_each_maker_says_what_it_makes():
     wide = Plane((48, 64), 40).scale_map()
     np.testing.assert_allclose(wide.as_kind("area"), Plane((48, 64), 40).scale_map("area"), rtol=1e-5)
     np.testing.assert_allclose(wide.as_kind("area").as_kind("width"), wide, rtol=1e-5)
-    with pytest.raises(InvalidInput, match="kind: allowed are width and area"):
+    with pytest.raises(InvalidInput, match="kind: must be one of width, area"):
         ScaleMap(np.ones((4, 4), np.float32), "height")
 
 
@@ -109,7 +109,7 @@ def test_a_target_of_the_other_kind_asks_for_the_same():
         floor.image, plane.scale_map("area"), target=np.asarray(target), scale_kind="width", seed=1
     )
     np.testing.assert_allclose(other.stages["target"], target.as_kind("area"), rtol=1e-5)
-    with pytest.raises(InvalidInput, match="kind: allowed are width and area"):
+    with pytest.raises(InvalidInput, match="kind: must be one of width, area"):
         texrs.perspective(floor.image, plane.scale_map(), scale_kind="length")
 
 
@@ -128,7 +128,7 @@ def test_files_keep_the_kind(tmp_path, monkeypatch, capsys, name):
         assert io.read_description("two.tif") == f"scale map: {kind}"
     assert main(["perspective", "floor.png", "-o", "out.png", "--scale-map", name, "--size", "32", "-q"]) == 0
     assert main(["perspective", "floor.png", "-o", "out.png", "--scale-map", name, "--scale-kind", "length"]) == 2
-    assert "--scale-kind: allowed are" in capsys.readouterr().err
+    assert "--scale-kind: must be one of" in capsys.readouterr().err
 
 
 def test_holes_are_filled_by_maps_of_either_kind(tmp_path, monkeypatch, capsys):
@@ -148,7 +148,7 @@ def test_holes_are_filled_by_maps_of_either_kind(tmp_path, monkeypatch, capsys):
         texrs.inpaint(floor.image, hole, scale_map=other, scale_kind="area").image, by_areas.image
     )
     assert (by_areas.image != texrs.inpaint(floor.image, hole, scale_map=other, scale_kind="width").image).any()
-    with pytest.raises(InvalidInput, match="kind: allowed are width and area"):
+    with pytest.raises(InvalidInput, match="kind: must be one of width, area"):
         texrs.inpaint(floor.image, hole, scale_map=one, scale_kind="length")
     with pytest.raises(InvalidInput, match="kind: says what a scale map holds"):
         texrs.inpaint(floor.image, hole, scale_kind="width")
@@ -158,7 +158,7 @@ def test_holes_are_filled_by_maps_of_either_kind(tmp_path, monkeypatch, capsys):
     assert main([*command, "area", "-q"]) == 0
     np.testing.assert_array_equal(io.read("out.png"), by_areas.image)
     assert main([*command, "length"]) == 2
-    assert "--scale-kind: allowed are" in capsys.readouterr().err
+    assert "--scale-kind: must be one of" in capsys.readouterr().err
 
 
 def test_descriptions_come_back(tmp_path):

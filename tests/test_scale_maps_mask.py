@@ -274,8 +274,8 @@ BLANK = np.zeros((64, 64), bool)
         (TILES.mask, {"known": np.zeros((256, 256), bool)}, r"^known: no pixel of the mask is known"),
         (TILES.mask, {"known": TILES.mask}, r"^mask: marks every pixel"),
         (TILES.mask, {"window": 8}, r"^window: needs an integer from 16 to 256, got 8$"),
-        (TILES.mask, {"measure": "volume"}, r"^measure: allowed are boundary, skeleton, count and area; got 'volume'$"),
-        (TILES.mask, {"trend": "cubic"}, r"^trend: allowed are none, plane, linear and quadratic; got 'cubic'$"),
+        (TILES.mask, {"measure": "volume"}, r"^measure: must be one of boundary, skeleton, count, area; got 'volume'$"),
+        (TILES.mask, {"trend": "cubic"}, r"^trend: must be one of none, plane, linear, quadratic; got 'cubic'$"),
     ],
 )  # fmt: skip
 def test_masks_without_features_are_refused(mask: np.ndarray, options: dict, message: str) -> None:
@@ -292,7 +292,7 @@ def test_masks_without_features_are_refused(mask: np.ndarray, options: dict, mes
         (TILES.image, {"known": BLANK}, r"^known: needs shape \(256, 256\), got \(64, 64\)$"),
         (TILES.image, {"known": np.zeros((256, 256), bool)}, r"^known: no pixel of the picture is known"),
         (TILES.image, {"min_feature_size": 0}, r"^min_feature_size: needs a number from 0.5 to 64.0, got 0$"),
-        (TILES.image, {"trend": "flat"}, r"^trend: allowed are"),
+        (TILES.image, {"trend": "flat"}, r"^trend: must be one of"),
     ],
 )
 def test_pictures_without_features_are_refused(image: np.ndarray, options: dict, message: str) -> None:

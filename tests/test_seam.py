@@ -314,7 +314,7 @@ def test_no_overlap_and_no_b_only_pixel():
         ({"penalty": np.full((4, 4), np.nan)}, "penalty: NaN"),
         ({"penalty": np.full((4, 4), 3e38)}, "penalty: too large"),
         ({"penalty": ["much"]}, "penalty: needs real numbers"),
-        ({"cost": "l2"}, "cost: allowed are gradient and paper"),
+        ({"cost": "l2"}, "cost: must be one of gradient, paper"),
         ({"wrap": "yes"}, "wrap: needs"),
         ({"old": seam.OldSeams([], [], [])}, r"old\.kept: needs 2 arrays"),
         ({"old": seam.OldSeams(*[[np.full((4, 4), -1.0)] * 2] * 3)}, "old: -1"),

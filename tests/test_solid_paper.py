@@ -77,7 +77,7 @@ def test_what_it_does_not_do():
     given = texrs.Constraints(mask=np.ones((32, 32), bool), values=weave[:32, :32])
     with pytest.raises(InvalidInput, match="constraints: the paper's method knows none"):
         texrs.synthesize(weave, 32, method="paper", constraints=given)
-    with pytest.raises(InvalidInput, match="method: allowed are None, 'paper' and 'paper-compensated'"):
+    with pytest.raises(InvalidInput, match="method: must be one of None, 'paper', 'paper-compensated'"):
         texrs.synthesize(weave, 32, method="su")
     with pytest.raises(ValueError, match="stop"):
         texrs.synthesize(weave, 32, method="paper", progress=stop)

@@ -347,7 +347,7 @@ def test_regular_layouts() -> None:
         ({"mask": np.zeros((5, 5), bool)}, "mask: needs bool of shape"),
         ({"mask": np.ones(SIZE, bool)}, "all foreground"),
         ({"mask": np.zeros(SIZE, bool)}, "no foreground"),
-        ({"layout": "F=e"}, "layout: allowed are disjoint"),
+        ({"layout": "F=e"}, "layout: must be one of disjoint"),
         ({"image": np.zeros((8, 8))}, "at least 16"),
     ],
 )
@@ -366,7 +366,7 @@ def test_bad_entries(change: dict[str, Any], words: str) -> None:
         ({"op": "scale", "factor": 0}, "factor of scale"),
         ({"op": "scale", "factor": "big"}, "needs factor"),
         ({"op": "shift", "by": [1e9, 0]}, "further than|four times"),
-        ({"op": "shift", "up": 3}, "knows no up"),
+        ({"op": "shift", "up": 3}, "has no option up"),
         ({"op": "points", "points": [[1, 2], [1, 2]]}, "twice"),
         ({"op": "points", "points": [[float("nan"), 2]]}, "finite"),
         ({"op": "randomise", "amount": -1}, "amount of randomise"),

@@ -78,7 +78,7 @@ def test_turntables_and_samples(here, capsys):
         ("v.npy -o out.png --oblique 900,2,1/1,0,0", "does not meet"),
         ("v.npy -o out.png --cube --at plane=3", "--at and --cube: one of them"),
         ("v.npy -o out.png --cube --size 9", "--size: needs an integer from 16"),
-        ("v.npy -o out.png --cube --interpolation best", "--interpolation: allowed are nearest"),
+        ("v.npy -o out.png --cube --interpolation best", "--interpolation: must be one of nearest"),
         (
             "v.npy -o out.png --interpolation cubic",
             "--interpolation: needs --oblique or --cube or --turntable, got --at",

@@ -203,7 +203,7 @@ def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | s
     if wanted.kind in "ui" and array.size and not np.can_cast(array.dtype, wanted):
         info, low, high = np.iinfo(wanted), int(array.min()), int(array.max())
         if low < info.min or high > info.max:
-            raise InvalidInput(f"{name}: allowed are {info.min} to {info.max}, got {low} to {high}")
+            raise InvalidInput(f"{name}: must be {info.min} to {info.max}, got {low} to {high}")
     return _make_contiguous(array, name, wanted)
 
 

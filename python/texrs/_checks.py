@@ -186,7 +186,7 @@ def as_bool(value: object, name: str) -> bool:
 def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
     """Check a choice by name."""
     if not isinstance(value, str) or value not in allowed:
-        raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
+        raise InvalidInput(f"{name}: must be one of {', '.join(allowed)}; got {value!r}")
     return value
 
 
@@ -195,7 +195,7 @@ def as_one(value: Any, name: str, *allowed: str | int | None) -> Any:
     plain = isinstance(value, str | numbers.Integral | None) and not isinstance(value, bool)
     if not plain or value not in allowed:
         names = [str(each) if isinstance(each, int) else repr(each) for each in allowed if each is not None]
-        raise InvalidInput(f"{name}: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
+        raise InvalidInput(f"{name}: must be one of {', '.join(names)}; got {value!r}")
     return value
 
 
@@ -210,7 +210,7 @@ def as_method(value: object, *allowed: str | None) -> None:
     """Check the name of an algorithm; None is the usual one."""
     if not isinstance(value, str | None) or value not in allowed:
         names = [repr(name) for name in allowed]
-        raise InvalidInput(f"method: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
+        raise InvalidInput(f"method: must be one of {', '.join(names)}; got {value!r}")
 
 
 def as_progress(value: object, name: str = "progress", *, stages: bool = False) -> Callable[..., object] | None:

@@ -120,7 +120,7 @@ def database_command(
     """Keep analysed textures in a folder: add, list, remove, or splice them."""
     names = list(items or ())
     if action not in ACTIONS:
-        raise InvalidInput(f"{'|'.join(ACTIONS)}: allowed are {', '.join(ACTIONS)}; got {action!r}")
+        raise InvalidInput(f"{'|'.join(ACTIONS)}: must be one of {', '.join(ACTIONS)}; got {action!r}")
     check_needed(given, ACTIONS, action)
     for flag, value, users in (("--out", out, ("splice", "matrix")), ("--each", each, ("matrix",))):
         if value is not None and action not in users:

@@ -36,7 +36,11 @@ APPLIED = Options(
         "finish.fade": "the verb knows where its filling fades",
     },
     optional=dict.fromkeys(
-        ("wrap", "interpolation", "antialias", "screening", "across", "outlines", "flatten_lighting"), "as the map says"
+        (
+            *("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines"),
+            *("flatten_lighting", "within"),
+        ),
+        "as the map says",
     )
     | dict.fromkeys(("map_type", "green"), "as the name says"),
 )

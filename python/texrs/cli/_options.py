@@ -212,9 +212,11 @@ class Options:
         elif kind is not None and "default" in kind.words and name not in self.optional:
             default = "default"
         shown = self.optional.get(name) or default not in (None, MISSING)
+        # The command shows its own default: that of the function would be a second one.
+        stated = MISSING if self.optional.get(name) else parameter.default
         words = () if kind is None or kind.file else kind.pick(kind.metavar, self.axes).split("|")
         texts = (
-            _shorten(text, flags, flag if type_ is bool else "", parameter.default, words),
+            _shorten(text, flags, flag if type_ is bool else "", stated, words),
             kind.pick(kind.note, self.axes) if kind else "",
         )
         help_ = " ".join(t for t in texts if t)
@@ -327,8 +329,8 @@ def make_choice(words: Sequence[str], make: Callable[[str], Any] | None = None, 
         try:
             return chosen(AMERICAN.get(text, text))
         except (KeyError, ValueError):
-            wanted = f"{', '.join(allowed[:-1])} and {allowed[-1]}"
-            raise InvalidInput(f"{about.option}: allowed are {wanted}; got {text!r}") from None
+            wanted = ", ".join(allowed)
+            raise InvalidInput(f"{about.option}: must be one of {wanted}; got {text!r}") from None
 
     def show(value: Any) -> str:
         return str(getattr(value, "value", value))
@@ -364,6 +366,8 @@ def _shorten(text: str, flags: Mapping[str, str], flag: str, default: Any, words
     # What None does is not what happens when the option is left out, unless it is the default, and cannot be asked for.
     beside = ("See ", "`texrs.") if default is None else ("See ", "`texrs.", "None")
     first, *further = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
+    if "yes" in words:
+        further = [re.sub(r"\bFalse\b", "no", re.sub(r"\bTrue\b", "yes", each)) for each in further]
     if len(first) > LONGEST:
         ends = [m.start() for m in re.finditer("[:;] ", first[:LONGEST]) if first[: m.start()].count("``") % 2 == 0]
         first = f"{first[: ends[-1]]}." if ends else first

@@ -67,7 +67,7 @@ def paint_command(
     """Paint a mesh with a texture of space, made from a volume."""
     start, mesh = time.monotonic(), given["mesh"]
     if bits not in (None, 8, 16):
-        raise InvalidInput(f"--bits: allowed are 8 and 16, got {bits}")
+        raise InvalidInput(f"--bits: must be one of 8, 16; got {bits}")
     with name_arguments(**{out: "--out"}):
         check_suffix(out, baked=not corners)
     folder = os.path.dirname(os.path.realpath(out))

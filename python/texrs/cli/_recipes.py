@@ -90,7 +90,7 @@ def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
     """Return a recipe whose parts have the right types."""
     for key in said:
         if key not in KEYS:
-            raise InvalidInput(f"{where}: has {key!r}; allowed are {', '.join(KEYS)}")
+            raise InvalidInput(f"{where}: unknown key {key!r}; must be one of {', '.join(KEYS)}")
     for key, kind, wanted in (
         ("verb", str, "the name of a command"),
         ("out", str, "a folder, or a name such as made/{name}-{seed}.png"),

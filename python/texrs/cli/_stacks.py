@@ -93,11 +93,11 @@ class Stack:
         roles, depth, suffix, pack, convention = (given.pop(name, None) for name in OPTIONS)
         said = read_roles(roles)
         if depth not in (None, *DEPTHS):
-            raise InvalidInput(f"--depth: allowed are 8, 16 and 32, got {depth}")
+            raise InvalidInput(f"--depth: must be one of 8, 16, 32; got {depth}")
         if suffix not in (None, "png", "tif", "exr"):
-            raise InvalidInput(f"--format: allowed are png, tif and exr, got {suffix!r}")
+            raise InvalidInput(f"--format: must be one of png, tif, exr; got {suffix!r}")
         if pack not in (None, "orm", "none"):
-            raise InvalidInput(f"--pack: allowed are orm and none, got {pack!r}")
+            raise InvalidInput(f"--pack: must be one of orm, none; got {pack!r}")
         if convention is not None:
             as_convention(convention, "--convention")
             if pack is not None:

@@ -57,7 +57,7 @@ def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[boo
     letters = text.strip().lower()
     if letters != "none" and (not letters or set(letters) - set(known) or len(set(letters)) < len(letters)):
         wanted = (
-            "allowed are default, xy, x, y and none"
+            "must be one of default, xy, x, y, none"
             if axes == 2
             else "needs axes among x, y and z, each once, or none, or default"
         )

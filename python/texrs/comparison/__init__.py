@@ -148,7 +148,7 @@ def check_programs(programs: Mapping[str, str]) -> dict[str, str]:
     """Check that the programs are known, and are there to be run."""
     for name, path in programs.items():
         if name not in PROGRAMS:
-            raise InvalidInput(f"programs: allowed are {', '.join(PROGRAMS)}, got {name!r}")
+            raise InvalidInput(f"programs: must be one of {', '.join(PROGRAMS)}; got {name!r}")
         if not (os.path.isfile(path) and os.access(path, os.X_OK)):
             raise InvalidInput(f"programs: {path!r}, which is to be {name}, is not a program that can be run")
     return {name: os.path.abspath(path) for name, path in programs.items()}

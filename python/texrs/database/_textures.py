@@ -206,7 +206,7 @@ class TextureDatabase:
         unknown = sorted(set(options) - AnalyseOptions.__annotations__.keys())
         if unknown:
             raise InvalidInput(
-                f"{unknown[0]}: is no option; allowed are {', '.join(sorted(AnalyseOptions.__annotations__))}"
+                f"{unknown[0]}: is not an option; must be one of {', '.join(sorted(AnalyseOptions.__annotations__))}"
             )
         file = os.path.abspath(os.fspath(image)) if isinstance(image, str | os.PathLike) else None
         if name is None:
@@ -340,8 +340,10 @@ class TextureDatabase:
 
         Parameters
         ----------
-        elements, layout : str
-            Names of the texture whose elements are shown, and of that whose layout they take.
+        elements : str
+            Name of the texture whose elements are shown.
+        layout : str
+            Name of the texture whose layout they take.
         size : (rows, columns), optional
             Of the result, in pixels; that of ``elements`` by default.
         progress : callable or True, optional
@@ -389,8 +391,10 @@ class TextureDatabase:
 
         Parameters
         ----------
-        rows, columns : sequence of str, optional
-            Names of those that give elements, and of those that give arrangements; by default all.
+        rows : sequence of str, optional
+            Names of the textures whose elements are shown. By default all.
+        columns : sequence of str, optional
+            Names of the textures whose arrangement they take. By default all.
         size : (rows, columns), optional
             Of each result.
         cell : int

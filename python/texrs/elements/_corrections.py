@@ -108,8 +108,8 @@ def read_steps(steps: object) -> list[dict[str, Any]]:
         unknown = sorted(map(str, set(step) - {"op", *allowed}))
         missing = [name for name in allowed if name not in step and name != "radius"]
         if unknown or missing:
-            said = f"knows no {', '.join(unknown)}" if unknown else f"needs {', '.join(missing)}"
-            raise InvalidInput(f"corrections: step {number}, {step['op']}, {said}; allowed are {', '.join(allowed)}")
+            said = f"has no option {', '.join(unknown)}" if unknown else f"needs {', '.join(missing)}"
+            raise InvalidInput(f"corrections: step {number}, {step['op']}, {said}; must be one of {', '.join(allowed)}")
         found.append({str(name): _to_plain(value, number) for name, value in step.items()})
     return found
 

@@ -37,8 +37,7 @@ class Layout(StrEnum):
         if isinstance(value, str) and value in tags:
             return tags[value]
         raise InvalidInput(
-            "layout: allowed are disjoint (separate elements), connected (a connected foreground) and jointed "
-            f"(elements parted by joints), or the paper's F=d, F=c and B=c; got {value!r}"
+            f"layout: must be one of disjoint, connected, jointed, or the paper's F=d, F=c, B=c; got {value!r}"
         )
 
 

@@ -381,7 +381,7 @@ def _as_angle(value: float, name: str = "angle") -> float:
 def _as_letter(value: object, letters: str, name: str) -> str:
     letter = _WORDS.get(value, value) if isinstance(value, str) else value
     if not isinstance(letter, str) or len(letter) != 1 or letter not in letters:
-        raise InvalidInput(f"{name}: allowed are {', '.join(sorted(letters))}; got {value!r}")
+        raise InvalidInput(f"{name}: must be one of {', '.join(sorted(letters))}; got {value!r}")
     return letter
 
 
@@ -394,7 +394,7 @@ def _as_plane(value: object, axes: int, name: str) -> tuple[int, int]:
     letters = LETTERS[axes - 2]
     if not isinstance(value, str) or len(value) != 2 or not set(value) <= set(letters) or value[0] == value[1]:
         allowed = ", ".join(a + b for a in sorted(letters) for b in sorted(letters) if a != b)
-        raise InvalidInput(f"{name}: allowed are {allowed}; got {value!r}")
+        raise InvalidInput(f"{name}: must be one of {allowed}; got {value!r}")
     return letters.index(value[0]), letters.index(value[1])
 
 

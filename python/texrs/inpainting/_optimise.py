@@ -47,7 +47,7 @@ def recover_scale(
     known = ~open_
     if isinstance(given, str):
         if given != "auto":
-            raise InvalidInput(f"{name}: allowed are 'auto', a map or None; got {given!r}")
+            raise InvalidInput(f"{name}: must be 'auto', a map or None; got {given!r}")
         if not known.any():
             raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
         found = measure_scale(picture, known)

@@ -88,7 +88,7 @@ def gather(
     else:
         index = as_array(which, "which", np.uint16, shape)
         if index.size and index.max() >= len(images):
-            raise InvalidInput(f"which: allowed are 0 to {len(images) - 1}, got {index.min()} to {index.max()}")
+            raise InvalidInput(f"which: must be 0 to {len(images) - 1}, got {index.min()} to {index.max()}")
     how = as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
     dtype = images[0].dtype
     if dtype.kind in "ui" and dtype.itemsize == 8:

@@ -112,7 +112,7 @@ def memory(
 
     """
     if not isinstance(verb, str) or verb not in COSTS:
-        raise InvalidInput(f"verb: allowed are {', '.join(COSTS)}; got {verb!r}")
+        raise InvalidInput(f"verb: must be one of {', '.join(COSTS)}; got {verb!r}")
     axes = 3 if verb == "solid" else 2
     shapes = [_as_shape(each, axes) for each in _list_shapes(exemplar)]
     result = shapes[0][:axes] if size is None else _as_shape(size, axes, "size")

@@ -94,7 +94,7 @@ def follow(
     if kind == "curvature":
         if rest not in ("", "most", "least"):
             raise InvalidInput(
-                f"directions: allowed are curvature, curvature:most and curvature:least, got {directions!r}"
+                f"directions: must be one of curvature, curvature:most, curvature:least; got {directions!r}"
             )
         found = _agree(points, near, *_bend(points, normals, near, least=rest == "least"))
     elif (

@@ -63,7 +63,7 @@ def write_mesh(
     baked = surface.uv is not None
     suffix, target = check_suffix(path, baked=baked), FilePath(path)
     if depth not in (None, 8, 16):
-        raise InvalidInput(f"depth: allowed are 8 and 16, got {depth!r}")
+        raise InvalidInput(f"depth: must be one of 8, 16; got {depth!r}")
     deep = any(each.pixels.dtype.itemsize > 1 for several in maps for each in several.values())
     bits = depth or (16 if deep else 8)
     normals = shade(surface)

@@ -121,7 +121,9 @@ def _read(one: object, number: int) -> tuple[str, dict[str, Any]]:
     allowed = [p.name for p in parameters]
     for key in options:
         if key not in allowed:
-            raise InvalidInput(f"steps: step {number}, {operation}, knows no {key}; allowed are {', '.join(allowed)}")
+            raise InvalidInput(
+                f"steps: step {number}, {operation}, has no option {key}; must be one of {', '.join(allowed)}"
+            )
     for parameter in parameters:
         if parameter.default is parameter.empty and parameter.name not in options:
             raise InvalidInput(f"steps: step {number}, {operation}, needs {parameter.name}")

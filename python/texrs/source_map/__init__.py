@@ -283,7 +283,7 @@ class SourceMap(Parted):
             or green not in ("up", "down")
         ):
             raise InvalidInput(
-                f"map_type, green: allowed are colour, normal, vector or slope, up or down; got {map_type!r}, {green!r}"
+                f"map_type, green: must be one of colour, normal, vector, slope, and of up, down; got {map_type!r}, {green!r}"
             )
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
         bare = map_type == "normal" and self.axes == 2 and not stores_z(images)

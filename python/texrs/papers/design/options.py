@@ -39,10 +39,11 @@ class DeformationOptions:
         Start of the logistic map (Eq. 2), within (-1, 1); the seed draws one for each element by default.
     growth_rate : float
         The lambda of the logistic map (Eq. 2), 0 to 2; below about 1.4 its sequence is periodic.
-    u, v : int
-        What a value h of the logistic map is divided by, 1 to 256, and how many operations there are to choose from, 1 to
-        4, of translation, rotation, mirror and scale in this order: the one chosen is mod(mod(h, u), v). As printed the
-        extent is n = mod(h, u) as well, so the larger u the finer are the extents; by default it is another value's.
+    u : int
+        Divisor of a value h of the logistic map, 1 to 256. The operation is mod(mod(h, u), v). As printed the extent is
+        n = mod(h, u) as well, so the larger u the finer are the extents; by default it is another value's.
+    v : int
+        Number of operations to choose from, 1 to 4: translation, rotation, mirror and scale, in this order.
     xi : float
         As printed, what n is multiplied by for the scaling extent e, 0.001 to 2; it is brought within ``scale``. By default
         extents are drawn within ``scale`` evenly.

@@ -95,8 +95,8 @@ def perspective(
     size : int or (int, int), optional
         Size of the result in pixels: by default that of the ``target``, else twice the exemplar's.
     target : array or Plane, optional
-        How large they are to be at each pixel of the result, in the units of ``scale_map``: a map (rows, columns); or a surface
-        that the texture is to lie on. `texrs.Plane` or its words give another plane, with elements of size 1 in its middle.
+        How large they are to be at each pixel of the result, in the units of ``scale_map``: a scale map; or a surface that the
+        texture is to lie on. `texrs.Plane` or its words give another plane, with elements of size 1 in its middle.
         Normals (rows, columns, 3) of a curved surface, seen from far away. Coordinates (rows, columns, 2) on a surface, or
         Jacobians (rows, columns, 2, 2): for each pixel the step on the texture that a step in the picture is
         (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`, `texrs.Plane.jacobians`). One of
@@ -125,9 +125,9 @@ def perspective(
         0 to 16. Copies are chosen by that alone; what is seen on a plane has its size anyway, but another sharpness. 0
         synthesises without regard to scales.
     augment_scales : {"auto", True, False} or sequence of float
-        Whether the exemplar may be resized. True: a plane is flattened and seen at any depth, of anything else there are
-        resized copies. "auto": the same, but no copies where the exemplar has enough of every wanted scale. Sizes, 1/8 to
-        4: those copies, and no plane. False: as it is; scales that it has not are brought to those it has, with a warning.
+        Whether the exemplar may be resized. True: a plane is flattened and seen at any depth, anything else is copied in
+        other sizes. "auto": as True, but without copies if the exemplar has enough of every wanted scale. False: wanted
+        scales that it lacks are brought to the nearest that it has, with a warning. Sizes, 1/8 to 4: these copies, no plane.
     wrap : bool or (rows, columns), optional
         Axes along which the result is to repeat; None: neither. The target must repeat, too.
     seed : int

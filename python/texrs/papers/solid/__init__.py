@@ -100,15 +100,15 @@ def solid(
     exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
         are labels and along which axes it repeats, which are measured otherwise.
-    size : int or (int, int, int)
-        Size of the result in voxels (planes, rows, columns); one number is a cube.
+    size : int or (planes, rows, columns)
+        Size of the result in voxels; one number is a cube.
     field : Field, str, array_like or path_like, optional
         Frame field that turns and scales the texture at each voxel (`texrs.fields`); none leaves it as it is. A field, its
         words, or directions (P, R, C, 3) or frames (P, R, C, 3, 3), spread over the output, as an array or a file.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
-    wrap : bool or (bool, bool, bool), optional
-        Axes along which the result is to repeat: planes, rows, columns; None: none of them.
+    wrap : bool or (planes, rows, columns), optional
+        Axes along which the result is to repeat; None: none of them.
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
@@ -219,14 +219,14 @@ def synthesize(
         Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
         along which axes it repeats, which are measured otherwise.
     size : int or (int, int)
-        Size of the result in pixels (rows, columns); one number is a square.
+        Size of the result in pixels; one number is a square.
     field : Field, str, array_like or path_like, optional
         Frame field that turns and scales the texture at each pixel (`texrs.fields`); none leaves it as it is. A field, its
         words, or directions (R, C, 2) or frames (R, C, 2, 2), spread over the output, as an array or a file.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
-    wrap : bool or (bool, bool), optional
-        Axes along which the result is to repeat: rows, columns; None: neither.
+    wrap : bool or (rows, columns), optional
+        Axes along which the result is to repeat; None: neither.
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.

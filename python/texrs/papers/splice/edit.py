@@ -56,7 +56,7 @@ def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
         unknown = sorted(map(str, set(given) - {"op", *allowed}))
         if unknown:
             raise InvalidInput(
-                f"edit: step {number}, {given['op']}, knows no {', '.join(unknown)}; allowed are {', '.join(allowed)}"
+                f"edit: step {number}, {given['op']}, has no option {', '.join(unknown)}; must be one of {', '.join(allowed)}"
             )
         plain = dict(given)
         if plain["op"] == "randomise":
