@@ -189,7 +189,7 @@ fn stitching() {
     };
     let source = Source::new(&image(side, 0), grid, 3, elements, classes).unwrap();
     let region = Region::new(grid, [0; 2]).unwrap();
-    // The weights are typical of the Python defaults.
+    // Enable healing, and all costs that depend on elements.
     let options = stitcher::Options {
         patch: 32.0,
         overlap: 0.4,
