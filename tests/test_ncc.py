@@ -46,7 +46,7 @@ def test_same_bytes_for_any_number_of_threads():
     ("template", "message"),
     [
         (NOISE[:5, :5, :2], "template: needs 3 channels as the image, got 2"),
-        (np.ones((32, 3, 3)), "template: \\[32, 3\\] is larger than the image"),
+        (np.ones((32, 3, 3)), "template: .*\\[32, 3\\]"),
         (np.full((3, 3, 3), np.nan), "template: 27 of 27 values are NaN"),
     ],
 )

@@ -59,7 +59,7 @@ def test_restricted_candidates_give_exact_costs():
     found = index.best_among(patch, weight, candidates=candidates, count=9, separation=0)
     expected = sorted(Match(all_costs[e][r, c], e, r, c) for e, r, c in candidates)
     assert found == expected
-    with pytest.raises(InvalidInput, match=r"\(0, 19, 0\) leaves no room"):
+    with pytest.raises(InvalidInput, match=r"\(0, 19, 0\)"):
         index.best_among(patch, candidates=[(0, 19, 0)])
 
 
@@ -90,7 +90,7 @@ def test_the_same_for_any_number_of_threads():
             "allowed: needs a list of 1",
         ),
         (lambda: PatchIndex(np.zeros((9, 9)), max_patch=0), "max_patch"),
-        (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((10, 3))), "larger than"),
+        (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((10, 3))), r"patch: .*\(10, 3\)"),
         (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((3, 3, 2))), "patch: needs shape"),
         (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((0, 3))), "patch: needs shape"),
         (lambda: PatchIndex(np.zeros((9, 9))).best([["a"]]), "real numbers"),

@@ -307,17 +307,17 @@ def test_no_overlap_and_no_b_only_pixel():
         ({"mask_a": True}, "mask_a: needs shape"),
         (
             {"core_a": np.ones((4, 4), bool), "core_b": np.ones((4, 4), bool)},
-            "core_a, core_b: both hold",
+            "core_a, core_b: ",
         ),
-        ({"core_a": np.ones((4, 4), bool), "mask_a": np.zeros((4, 4), bool)}, "core_a: holds"),
-        ({"penalty": np.full((4, 4), -1.0)}, "penalty: -1"),
-        ({"penalty": np.full((4, 4), np.nan)}, "penalty: NaN"),
-        ({"penalty": np.full((4, 4), 3e38)}, "penalty: too large"),
+        ({"core_a": np.ones((4, 4), bool), "mask_a": np.zeros((4, 4), bool)}, "core_a: .*image"),
+        ({"penalty": np.full((4, 4), -1.0)}, "penalty: .*-1"),
+        ({"penalty": np.full((4, 4), np.nan)}, "penalty: .*NaN"),
+        ({"penalty": np.full((4, 4), 3e38)}, "penalty: .*infinite"),
         ({"penalty": ["much"]}, "penalty: needs real numbers"),
         ({"cost": "l2"}, "cost: must be one of gradient, paper"),
         ({"wrap": "yes"}, "wrap: needs"),
         ({"old": seam.OldSeams([], [], [])}, r"old\.kept: needs 2 arrays"),
-        ({"old": seam.OldSeams(*[[np.full((4, 4), -1.0)] * 2] * 3)}, "old: -1"),
+        ({"old": seam.OldSeams(*[[np.full((4, 4), -1.0)] * 2] * 3)}, "old: .*-1"),
     ],
 )
 def test_bad_input_to_cut(change, message):
@@ -330,7 +330,7 @@ def test_bad_input_to_cut(change, message):
 @pytest.mark.parametrize(
     ("a", "options", "message"),
     [
-        (np.zeros((4, 1)), {}, "fewer than two pixels along axis 1"),
+        (np.zeros((4, 1)), {}, "pixels along axis 1"),
         (np.zeros((4, 4)), {"axis": 2}, "axis: needs an integer from 0 to 1"),
         (np.zeros((4, 4)), {"penalty": np.ones((3, 4))}, "penalty: needs shape"),
         (np.full((4, 4), np.inf), {}, "NaN or infinite"),
@@ -358,7 +358,7 @@ def test_many_strips_are_cut_as_each_by_itself():
     [
         (seam.Strip(np.zeros((4, 4)), np.zeros((4, 4)), 1), "strips: a: needs shape"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 3, 1)), 1), "strips: b: needs shape"),
-        (seam.Strip(np.zeros((4, 4, 1)), np.full((4, 4, 1), np.nan), 1), "not finite"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.full((4, 4, 1), np.nan), 1), "a, b: .*finite"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 2), "axis: needs an integer from 0 to 1"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 0, np.ones((3, 4))), "penalty: needs shape"),
     ],
@@ -373,7 +373,7 @@ def test_bad_input_to_strips(strip, message):
     [
         (np.zeros((3, 2)), 1.0, "unary: needs shape"),
         (np.zeros((3, 3, 2)), [1.0], "pairwise: needs a number or 2 entries"),
-        (np.zeros((3, 3, 2)), -1.0, "pairwise: -1"),
+        (np.zeros((3, 3, 2)), -1.0, "pairwise: .*-1"),
         (np.zeros((3, 3, 2)), [np.zeros((2, 3)), 1.0], "pairwise: needs shape"),
         (np.full((3, 3, 2), np.inf), 1.0, "unary: "),
         (np.full((3, 3, 2), np.nan), 1.0, "unary: "),

@@ -33,7 +33,7 @@ pub(super) fn gather<'py>(
     }
     try_types!(u8, u16, f32, f64, i8, i16, i32, u32);
     Err(PyTypeError::new_err(
-        "exemplars: all must be arrays of one of the types u8, u16, f32, f64, i8, i16, i32, u32",
+        "exemplars: must all have the same dtype: uint8, uint16, float32, float64, int8, int16, int32 or uint32",
     ))
 }
 
@@ -48,7 +48,7 @@ fn typed<'py, T: Element + numpy::Element>(
     match wrap.len() {
         2 => axes::<T, 2>(py, arrays, wrap, which, coordinates, interpolation),
         3 => axes::<T, 3>(py, arrays, wrap, which, coordinates, interpolation),
-        n => Err(Error::value("wrap", format!("two or three axes, got {n}")).into()),
+        n => Err(Error::value("wrap", format!("must have two or three axes, got {n}")).into()),
     }
 }
 
@@ -65,7 +65,7 @@ fn axes<'py, T: Element + numpy::Element, const D: usize>(
         "linear" => Interpolation::Linear,
         "cubic" => Interpolation::Cubic,
         other => {
-            let message = format!("one of nearest, linear, cubic; got {other:?}");
+            let message = format!("must be one of nearest, linear, cubic; got {other:?}");
             return Err(Error::value("interpolation", message).into());
         }
     };
@@ -102,7 +102,7 @@ fn exemplar<'a, T: Element + numpy::Element, const D: usize>(
     if shape.len() != D + 1 {
         return Err(Error::value(
             "exemplars",
-            format!("{} axes and channels, got shape {shape:?}", D),
+            format!("must have {} axes and channels, got shape {shape:?}", D),
         ));
     }
     Exemplar::new(

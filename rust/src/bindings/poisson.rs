@@ -80,7 +80,7 @@ fn edge(name: &str) -> PyResult<Edge> {
         "periodic" => Ok(Edge::Wrap),
         "free" => Ok(Edge::Free),
         other => {
-            let message = format!("one of dirichlet, periodic, free; got {other:?}");
+            let message = format!("must be one of dirichlet, periodic, free; got {other:?}");
             Err(Error::value("boundary", message).into())
         }
     }

@@ -20,7 +20,7 @@ fn cost(name: &str) -> Result<Cost> {
         "gradient" => Ok(Cost::Gradient),
         other => Err(Error::value(
             "cost",
-            format!("paper or gradient; got {other:?}"),
+            format!("must be one of paper, gradient; got {other:?}"),
         )),
     }
 }
@@ -39,7 +39,7 @@ fn slices<'a, const D: usize>(
         .map(|a| a.as_slice())
         .collect::<std::result::Result<Vec<_>, _>>()?;
     all.try_into().map_err(|all: Vec<_>| {
-        Error::value("axes", format!("{D} arrays, got {}", all.len())).into()
+        Error::value("axes", format!("must have {D} arrays, got {}", all.len())).into()
     })
 }
 
@@ -74,7 +74,7 @@ pub(super) fn seam_cut<'py>(
     match wrap.len() {
         2 => call.run::<2>(py, &wrap),
         3 => call.run::<3>(py, &wrap),
-        n => Err(Error::value("wrap", format!("two or three axes, got {n}")).into()),
+        n => Err(Error::value("wrap", format!("must have two or three axes, got {n}")).into()),
     }
 }
 
@@ -125,7 +125,7 @@ impl<'py> Call<'py> {
 }
 
 fn grid<const D: usize>(shape: &[usize], wrap: &[bool]) -> Result<Grid<D>> {
-    let axes = |n: usize| Error::value("shape", format!("{D} axes, got {n}"));
+    let axes = |n: usize| Error::value("shape", format!("must have {D} axes, got {n}"));
     Grid::new(
         shape.try_into().map_err(|_| axes(shape.len()))?,
         wrap.try_into().map_err(|_| axes(wrap.len()))?,
@@ -188,7 +188,7 @@ pub(super) fn seam_labels<'py>(
     match wrap.len() {
         2 => axes::<2>(py, &unary, &forward, &backward, &wrap),
         3 => axes::<3>(py, &unary, &forward, &backward, &wrap),
-        n => Err(Error::value("wrap", format!("two or three axes, got {n}")).into()),
+        n => Err(Error::value("wrap", format!("must have two or three axes, got {n}")).into()),
     }
 }
 

@@ -30,7 +30,11 @@ pub(super) fn smooth<'py>(
                 "nearest" => Edge::Nearest,
                 "wrap" => Edge::Wrap,
                 "constant" => Edge::Zero,
-                _ => return Err(PyValueError::new_err(format!("no edge is {edge:?}"))),
+                _ => {
+                    return Err(PyValueError::new_err(format!(
+                        "edge: must be one of reflect, nearest, wrap, constant; got {edge:?}"
+                    )));
+                }
             };
             Ok(Axis { weights, edge })
         })

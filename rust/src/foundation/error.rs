@@ -16,7 +16,7 @@ pub enum Error {
         message: String,
     },
     /// Two arrays have different shapes but must agree.
-    #[error("{argument}: expected shape {expected:?}, got {got:?}")]
+    #[error("{argument}: must have shape {expected:?}, got {got:?}")]
     Shape {
         /// Name of the argument.
         argument: &'static str,

@@ -20,13 +20,13 @@ impl<const D: usize> Grid<D> {
             if n == 0 {
                 return Err(Error::value(
                     "shape",
-                    format!("{shape:?} has an empty axis"),
+                    format!("must be at least 1 along each axis, got {shape:?}"),
                 ));
             }
             points = points.checked_mul(n).ok_or_else(|| {
                 Error::value(
                     "shape",
-                    format!("{shape:?} has more points than can be counted"),
+                    format!("must have a number of points that fits 64 bits, got {shape:?}"),
                 )
             })?;
         }
@@ -173,7 +173,7 @@ impl<const D: usize> Region<D> {
                 return Err(Error::value(
                     "origin",
                     format!(
-                        "{origin:?} with {:?} points reaches beyond 2^30 from zero",
+                        "must keep all points within 2^30 of zero, got {origin:?} with shape {:?}",
                         grid.shape()
                     ),
                 ));

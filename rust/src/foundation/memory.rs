@@ -29,7 +29,7 @@ fn too_little<T>(what: &str, len: usize) -> Error {
     Error::Limit {
         what: what.into(),
         needed: format!("{} bytes", len as u128 * size_of::<T>() as u128),
-        limit: "memory that there is".into(),
+        limit: "the available memory".into(),
     }
 }
 
@@ -63,7 +63,7 @@ pub(crate) fn product(what: &'static str, sizes: &[usize]) -> Result<usize> {
     let all = sizes
         .iter()
         .try_fold(1usize, |n, &size| n.checked_mul(size));
-    all.ok_or_else(|| Error::value(what, format!("{sizes:?} is more than can be counted")))
+    all.ok_or_else(|| Error::value(what, format!("the product of {sizes:?} must fit 64 bits")))
 }
 
 #[cfg(test)]

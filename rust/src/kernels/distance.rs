@@ -43,7 +43,7 @@ pub fn outlines(
     if labels.is_empty() {
         return Err(Error::value(
             "labels",
-            format!("{shape:?} has an empty axis"),
+            format!("must have at least 1 pixel along each axis, got shape {shape:?}"),
         ));
     }
     // Check the windows, then measure each piece in a task of its own.
@@ -51,7 +51,10 @@ pub fn outlines(
     if let Some(piece) = pieces.iter().find(|p| !p.shape.iter().all(fits)) {
         return Err(Error::value(
             "windows",
-            format!("1 to {MOST} pixels a side, got {:?}", piece.shape),
+            format!(
+                "must have 1 to {MOST} pixels on each side, got {:?}",
+                piece.shape
+            ),
         ));
     }
     let pixels = |p: &Piece| p.shape[0].saturating_mul(p.shape[1]);

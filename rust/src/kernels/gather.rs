@@ -107,13 +107,13 @@ pub fn gather<T: Element, const D: usize>(
     // Check the arguments.
     let channels = exemplars
         .first()
-        .ok_or_else(|| Error::value("exemplars", "at least one is needed, got none"))?
+        .ok_or_else(|| Error::value("exemplars", "must contain at least one, got none"))?
         .channels;
     if exemplars.iter().any(|e| e.channels != channels) {
         let all: Vec<_> = exemplars.iter().map(|e| e.channels).collect();
         return Err(Error::value(
             "exemplars",
-            format!("must agree in channels, got {all:?}"),
+            format!("must have the same number of channels, got {all:?}"),
         ));
     }
     if !which.is_empty() {
@@ -124,7 +124,7 @@ pub fn gather<T: Element, const D: usize>(
         let allowed = exemplars.len();
         return Err(Error::value(
             "exemplar",
-            format!("index {bad}, but there are {allowed} exemplars"),
+            format!("must be below {allowed}, got {bad}"),
         ));
     }
     if let Some(at) = coordinates
@@ -133,7 +133,7 @@ pub fn gather<T: Element, const D: usize>(
     {
         return Err(Error::value(
             "coordinates",
-            format!("{:?} at pixel {at} is not finite", coordinates[at]),
+            format!("must be finite, got {:?} at pixel {at}", coordinates[at]),
         ));
     }
     if channels == 0 {

@@ -96,7 +96,10 @@ impl Correlation {
         if shape[0] > self.shape[0] || shape[1] > self.shape[1] {
             return Err(Error::value(
                 "template",
-                format!("{shape:?} is larger than the image, {:?}", self.shape),
+                format!(
+                    "must not be larger than the image of shape {:?}, got {shape:?}",
+                    self.shape
+                ),
             ));
         }
         finite(template, "template")?;
@@ -161,7 +164,7 @@ impl Correlation {
 
 fn finite(values: &[f32], argument: &'static str) -> Result<()> {
     match values.iter().find(|x| !x.is_finite()) {
-        Some(bad) => Err(Error::value(argument, format!("{bad} is not finite"))),
+        Some(bad) => Err(Error::value(argument, format!("must be finite, got {bad}"))),
         None => Ok(()),
     }
 }

@@ -34,7 +34,7 @@ pub fn sums(
     if points.iter().filter(inside).count() != points.len() {
         return Err(Error::value(
             "points",
-            format!("all must lie in an image of {shape:?} pixels"),
+            format!("must all be inside an image of shape {shape:?}"),
         ));
     }
     // Pixels beyond an edge are on the other side if the image wraps, else in an empty margin.

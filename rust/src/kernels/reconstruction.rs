@@ -34,7 +34,7 @@ pub fn reconstruct(
     for (argument, values) in [("seed", seed), ("mask", mask)] {
         check_shape(argument, &grid.shape(), values.len())?;
         if values.iter().any(|x| x.is_nan()) {
-            return Err(Error::value(argument, "numbers are needed, got NaN"));
+            return Err(Error::value(argument, "must not contain NaN"));
         }
     }
     if grid.len() > u32::MAX as usize {

@@ -98,7 +98,10 @@ pub fn smooth<T: Number>(
 ) -> Result<()> {
     check_shape("values", shape, values.len())?;
     if axes.len() != shape.len() {
-        let message = format!("one is needed a side, got {} for {shape:?}", axes.len());
+        let message = format!(
+            "must be one for each axis of shape {shape:?}, got {}",
+            axes.len()
+        );
         return Err(Error::value("axes", message));
     }
     let used = axes.iter().filter(|axis| !axis.weights.is_empty()).count();
@@ -289,7 +292,7 @@ mod tests {
         assert!(
             refused(&[2, 3], &two[..1])
                 .to_string()
-                .contains("one is needed")
+                .contains("must be one")
         );
         let monitor = Monitor::default();
         monitor.cancel();

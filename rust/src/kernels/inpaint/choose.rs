@@ -178,7 +178,8 @@ fn anywhere(index: &Index, shape: [usize; 2], seed: u64, step: usize) -> Result<
     // Count the allowed positions first, because a list of them could be large.
     let total = places().count() as u64;
     if total == 0 {
-        let message = format!("of {shape:?}: no exemplar has an allowed place for it");
+        let message =
+            format!("must fit at an allowed position of an exemplar, got shape {shape:?}");
         return Err(Error::value("patch", message));
     }
     let drawn = Noise::new(seed).below(total, [step as u32, 0, 0, 1]);

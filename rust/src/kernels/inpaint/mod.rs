@@ -109,10 +109,10 @@ pub fn inpaint(
     let [rows, columns] = canvas.grid.shape();
     let Options { patch, paper, .. } = *options;
     // Check the arguments.
-    memory::room("the completion", canvas.grid.len(), 32)?;
+    memory::room("the inpainting", canvas.grid.len(), 32)?;
     if canvas.channels != index.channels() {
         let message = format!(
-            "has {} channels, the exemplars have {}",
+            "must have {1} channels like the exemplars, got {0}",
             canvas.channels,
             index.channels()
         );
@@ -143,7 +143,7 @@ pub fn inpaint(
     }
     if (0..2).any(|axis| patch[axis] == 0 || patch[axis] > canvas.grid.shape()[axis]) {
         let message = format!(
-            "each side needs 1 to the canvas's {:?}, got {patch:?}",
+            "must have sides from 1 to those of the canvas, {:?}, got {patch:?}",
             canvas.grid.shape()
         );
         return Err(Error::value("patch", message));
@@ -155,7 +155,7 @@ pub fn inpaint(
             .is_none_or(|e| e.shape != [rows, columns])
     }) {
         let message = format!(
-            "{:?} is no exemplar of the shape of the canvas, {:?}",
+            "must be an exemplar of the shape {1:?} of the canvas, got {0:?}",
             options.shown,
             [rows, columns]
         );

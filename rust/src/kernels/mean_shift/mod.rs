@@ -59,15 +59,18 @@ pub fn filter(
     let grid = Grid::new([rows, columns], options.wrap)?;
     check_shape("image", &shape, image.len())?;
     if channels == 0 {
-        return Err(Error::value("image", "needs a channel"));
+        return Err(Error::value("image", "must have at least 1 channel, got 0"));
     }
     memory::room("the image and its filtered copy", image.len(), 16)?;
     if options.radius > MAX_RADIUS {
-        let message = format!("up to {MAX_RADIUS} pixels, got {}", options.radius);
+        let message = format!(
+            "must be at most {MAX_RADIUS} pixels, got {}",
+            options.radius
+        );
         return Err(Error::value("radius", message));
     }
     if !(options.range >= 0.0 && options.range <= MAX_VALUE) {
-        let message = format!("from 0 to {MAX_VALUE:e}, got {}", options.range);
+        let message = format!("must be from 0 to {MAX_VALUE:e}, got {}", options.range);
         return Err(Error::value("range", message));
     }
     if options.tolerance.is_nan() || options.tolerance < 0.0 {
@@ -75,7 +78,7 @@ pub fn filter(
         return Err(Error::value("tolerance", message));
     }
     if let Some(bad) = image.iter().find(|x| x.is_nan() || x.abs() > MAX_VALUE) {
-        let message = format!("values up to {MAX_VALUE:e} are allowed, got {bad}");
+        let message = format!("values must be within {MAX_VALUE:e} of zero, got {bad}");
         return Err(Error::value("image", message));
     }
     // Filter the rows in parallel.

@@ -48,7 +48,7 @@ impl Planes {
         let (Some(plane), Some(total)) = (plane, total) else {
             return Err(Error::value(
                 "image",
-                format!("{shape:?} is too large for a radius of {radius}"),
+                format!("must be smaller for a radius of {radius}, got shape {shape:?}"),
             ));
         };
         let mut data = memory::filled("the image with its margins", NOWHERE, total)?;

@@ -11,7 +11,9 @@ pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()>
     let [rows, columns] = exemplar.shape;
     check_shape("exemplars", &[rows, columns, channels], exemplar.data.len())?;
     if exemplar.data.is_empty() || exemplar.data.len() / channels >= LONGEST {
-        let message = format!("1 to {LONGEST} positions are allowed, got {rows} x {columns}");
+        let message = format!(
+            "must have at least 1 and fewer than {LONGEST} positions, got {rows} x {columns}"
+        );
         return Err(Error::value("exemplars", message));
     }
     // Check block by block, without branches inside a block.
@@ -20,7 +22,7 @@ pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()>
     if let Some(bad) = block.and_then(|block| block.iter().find(|x| !x.is_finite())) {
         return Err(Error::value(
             "exemplars",
-            format!("all samples must be finite, got {bad}"),
+            format!("samples must be finite, got {bad}"),
         ));
     }
     match &exemplar.allowed {
@@ -31,7 +33,7 @@ pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()>
 
 pub(super) fn check_side(max_patch: [usize; 2]) -> Result<()> {
     if max_patch.contains(&0) {
-        let message = format!("each side must be at least 1, got {max_patch:?}");
+        let message = format!("must be at least 1 on each side, got {max_patch:?}");
         return Err(Error::value("max_patch", message));
     }
     Ok(())

@@ -46,8 +46,7 @@ impl Index {
         let [rows, columns] = query.shape;
         if rows > self.max_patch[0] || columns > self.max_patch[1] {
             let message = format!(
-                "({rows}, {columns}) is larger than {:?}, the largest that fits the exemplars and that the index was \
-                 made for",
+                "must be at most {:?}, the largest patch of this index, got ({rows}, {columns})",
                 self.max_patch
             );
             return Err(Error::value("patch", message));
@@ -217,7 +216,7 @@ impl Index {
             .sum();
         if positions == 0 {
             let message = format!(
-                "({p}, {q}) is larger than every exemplar: {:?}",
+                "must fit into one of the exemplars of shapes {:?}, got ({p}, {q})",
                 self.shapes()
             );
             return Err(Error::value("patch", message));

@@ -157,7 +157,7 @@ impl Index {
     pub fn new(exemplars: Vec<Exemplar>, channels: usize, max_patch: [usize; 2]) -> Result<Self> {
         if exemplars.is_empty() || channels == 0 {
             let message = format!(
-                "needs an exemplar and a channel, got {} of {channels} channels",
+                "must contain at least one exemplar with at least one channel, got {} of {channels} channels",
                 exemplars.len()
             );
             return Err(Error::value("exemplars", message));
@@ -271,8 +271,8 @@ impl Index {
             };
             if !shape.is_some_and(fits) {
                 let message = format!(
-                    "(exemplar, row, column) = ({exemplar}, {row}, {column}) leaves no room for a patch of {:?} \
-                     in {} exemplars of {:?}",
+                    "must leave room for a patch of {:?}, got (exemplar, row, column) = \
+                     ({exemplar}, {row}, {column}) in {} exemplars of {:?}",
                     query.shape,
                     self.exemplars.len(),
                     shape.unwrap_or_default()
@@ -328,13 +328,13 @@ impl Index {
         monitor: &Monitor,
     ) -> Result<(Vec<f32>, f64)> {
         let Some(e) = self.exemplars.get(exemplar) else {
-            let message = format!("{exemplar}, but there are {}", self.exemplars.len());
+            let message = format!("must be below {}, got {exemplar}", self.exemplars.len());
             return Err(Error::value("exemplar", message));
         };
         let shape = e.shape;
         if query.shape[0] > shape[0] || query.shape[1] > shape[1] {
             let message = format!(
-                "{:?} does not fit into the exemplar of {shape:?}",
+                "must fit into the exemplar of shape {shape:?}, got {:?}",
                 query.shape
             );
             return Err(Error::value("patch", message));

@@ -49,7 +49,7 @@ impl Prepared {
         check_shape("patch", &[rows, columns, channels], query.patch.len())?;
         check_shape("weight", &query.shape, query.weight.len())?;
         if query.weight.is_empty() {
-            return Err(Error::value("patch", "has no pixels"));
+            return Err(Error::value("patch", "must have at least 1 pixel, got 0"));
         }
         if let Some(bad) = query.weight.iter().find(|w| !w.is_finite() || **w < 0.0) {
             let message = format!("must be finite and not negative, got {bad}");

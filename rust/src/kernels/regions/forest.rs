@@ -311,7 +311,7 @@ impl Forest {
 fn no_room<E>(_: E) -> Error {
     Error::Limit {
         what: "edges between regions".into(),
-        needed: "more bytes".into(),
-        limit: "memory that there is".into(),
+        needed: "more memory".into(),
+        limit: "the available memory".into(),
     }
 }

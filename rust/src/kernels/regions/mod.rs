@@ -64,7 +64,7 @@ pub fn merge(
     let grid = Grid::new([rows, columns], options.wrap)?;
     check_shape("image", &shape, image.len())?;
     if channels == 0 {
-        return Err(Error::value("image", "needs a channel"));
+        return Err(Error::value("image", "must have at least 1 channel, got 0"));
     }
     let frame = Frame::new(&grid)?;
     check(image, options)?;
@@ -96,17 +96,17 @@ const STEPS: u64 = 16;
 
 fn check(image: &[f32], options: &Options) -> Result<()> {
     if !(options.scale >= 0.0 && options.scale <= MAX_VALUE) {
-        let message = format!("from 0 to {MAX_VALUE:e}, got {}", options.scale);
+        let message = format!("must be from 0 to {MAX_VALUE:e}, got {}", options.scale);
         return Err(Error::value("scale", message));
     }
     if !(options.blur >= 0.0 && options.blur <= MAX_BLUR) {
-        let message = format!("from 0 to {MAX_BLUR} pixels, got {}", options.blur);
+        let message = format!("must be from 0 to {MAX_BLUR} pixels, got {}", options.blur);
         return Err(Error::value("blur", message));
     }
     let bad = |x: &&f32| x.is_nan() || f64::from(x.abs()) > MAX_VALUE;
     match image.iter().find(bad) {
         Some(bad) => {
-            let message = format!("values up to {MAX_VALUE:e} are allowed, got {bad}");
+            let message = format!("values must be within {MAX_VALUE:e} of zero, got {bad}");
             Err(Error::value("image", message))
         }
         None => Ok(()),
@@ -132,7 +132,7 @@ impl Frame {
         let all = shape.map(|n| n as u128 + 2).iter().product::<u128>();
         if all >= 1 << 30 {
             return Err(Error::Limit {
-                what: "a merge".into(),
+                what: "a segmentation".into(),
                 needed: format!("{} pixels", grid.len()),
                 limit: format!("{} pixels", 1 << 30),
             });

@@ -173,10 +173,7 @@ pub(super) fn check_costs(argument: &'static str, costs: &[f32]) -> Result<f32> 
         let at = costs.iter().position(|&c| !sound(c)).unwrap_or(0);
         return Err(Error::value(
             argument,
-            format!(
-                "{} at {at}; finite values of at least 0 are allowed",
-                costs[at]
-            ),
+            format!("must be finite and at least 0, got {} at {at}", costs[at]),
         ));
     }
     Ok(rest.iter().chain(&largest).copied().fold(0.0, f32::max))

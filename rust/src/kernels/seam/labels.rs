@@ -66,7 +66,7 @@ pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -
         return Err(Error::value(
             "unary",
             format!(
-                "{:?} at {:?}; finite costs are allowed, and infinity for one of the labels",
+                "must be finite, or infinite for one of the labels, got {:?} at {:?}",
                 energy.unary[at],
                 energy.grid.point(at)
             ),

@@ -100,7 +100,7 @@ impl<'a, const D: usize> Overlap<'a, D> {
                     return Err(Error::value(
                         argument,
                         format!(
-                            "holds {:?}, which its image does not cover",
+                            "must be inside the mask of its image, got {:?}",
                             self.grid.point(at)
                         ),
                     ));
@@ -112,10 +112,7 @@ impl<'a, const D: usize> Overlap<'a, D> {
         {
             return Err(Error::value(
                 "core_a, core_b",
-                format!(
-                    "both hold {:?}; a pixel can be tied to one image only",
-                    self.grid.point(at)
-                ),
+                format!("must not overlap, got {:?} in both", self.grid.point(at)),
             ));
         }
         if let Some(penalty) = self.penalty {

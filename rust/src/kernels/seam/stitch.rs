@@ -229,7 +229,7 @@ impl<const D: usize> Stitcher<D> {
                     return Err(Error::value(
                         "a, b",
                         format!(
-                            "not finite, or too far apart, at {:?} of the overlap",
+                            "must be finite and not too far apart in the overlap, which fails at {:?}",
                             overlap.grid.point(at)
                         ),
                     ));
@@ -279,7 +279,7 @@ impl<const D: usize> Stitcher<D> {
         if !(finite && largest.is_finite()) {
             return Err(Error::value(
                 "old, penalty",
-                "too large: an edge costs infinitely much",
+                "must be smaller, because the cost of an edge is infinite",
             ));
         }
         Ok(f64::from(largest))

@@ -207,7 +207,7 @@ fn refuses_contradictions() {
         a: &[f32::NAN, 0.0],
         ..plain
     };
-    assert!(refused(unknown).contains("not finite"));
+    assert!(refused(unknown).contains("must be finite"));
     // Each replacement is finite, but their sum overflows.
     let (kept, others) = ([[3e38; 2]; 2], [[1.2e38; 2]; 2]);
     let endless = Overlap {
@@ -221,7 +221,7 @@ fn refuses_contradictions() {
     };
     assert!(refused(endless).contains("old, penalty"));
     let short = Overlap { a: &[0.0], ..plain };
-    assert!(refused(short).contains("expected shape"));
+    assert!(refused(short).contains("must have shape"));
 }
 
 #[test]

@@ -67,7 +67,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     if !longest.is_finite() {
         return Err(Error::value(
             "penalty",
-            "too large: the seam costs infinitely much",
+            "must be smaller, because the cost of the seam is infinite",
         ));
     }
     let mut scale = 65536.0;
@@ -163,13 +163,16 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
     let grid = grid(pasted)?;
     let n = grid.len();
     if pasted.axis > 1 {
-        return Err(Error::value("axis", format!("0 or 1, got {}", pasted.axis)));
+        return Err(Error::value(
+            "axis",
+            format!("must be 0 or 1, got {}", pasted.axis),
+        ));
     }
     if pasted.shape[pasted.axis] < 2 {
         return Err(Error::value(
             "a, b",
             format!(
-                "shape {:?} has fewer than two pixels along axis {}",
+                "must have at least 2 pixels along axis {1}, got shape {0:?}",
                 pasted.shape, pasted.axis
             ),
         ));
@@ -197,7 +200,10 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
         let at = differences.iter().position(far).unwrap_or(0);
         return Err(Error::value(
             "a, b",
-            format!("not finite, or too far apart, at {:?}", grid.point(at)),
+            format!(
+                "must be finite and not too far apart, which fails at {:?}",
+                grid.point(at)
+            ),
         ));
     }
     let mut costs = [vec![0.0; n], vec![0.0; n]];

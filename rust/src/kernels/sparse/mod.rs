@@ -60,12 +60,10 @@ impl<'a> Checked<'a> {
         } = matrix;
         let size = starts.len().saturating_sub(1);
         if size == 0 || size > i32::MAX as usize / 2 {
-            return bad("needs at least one column, and fewer than 2^30");
+            return bad("must have at least one column and fewer than 2^30");
         }
         if rows.len() != values.len() || starts[0] != 0 || starts[size] as usize != rows.len() {
-            return bad(
-                "its columns must begin at 0 and end with the last of as many rows as values",
-            );
+            return bad("starts must begin with 0 and end with the number of rows and of values");
         }
         // Find the diagonal of each column, and check the order of its rows.
         let mut diagonal = memory::filled("the order of the matrix", 0, size)?;
@@ -86,7 +84,7 @@ impl<'a> Checked<'a> {
             if below.windows(2).any(|pair| pair[0] >= pair[1])
                 || below[below.len() - 1] as usize >= size
             {
-                return bad("rows must rise within a column and lie inside the matrix");
+                return bad("rows must increase within a column and be inside the matrix");
             }
             if !values[from + above..to].iter().all(|v| v.is_finite()) {
                 return bad("all entries must be finite");
@@ -194,7 +192,7 @@ impl Cholesky {
 }
 
 fn not_definite() -> Error {
-    Error::value("matrix", "is not positive definite")
+    Error::value("matrix", "must be positive definite")
 }
 
 #[cfg(test)]

@@ -295,7 +295,7 @@ fn bad_matrices_are_refused() {
     assert!(refused(&[0], &[], &[], 1 << 20).contains("one column"));
     assert!(refused(&[0, 1, 2], &[0, 0], &[1.0, 1.0], 1 << 20).contains("diagonal"));
     assert!(refused(&[0, 2], &[0, 5], &[1.0, 1.0], 1 << 20).contains("inside"));
-    assert!(refused(&[0, 3, 4], &[0, 1, 1, 1], &[1.0; 4], 1 << 20).contains("rise"));
+    assert!(refused(&[0, 3, 4], &[0, 1, 1, 1], &[1.0; 4], 1 << 20).contains("increase"));
     assert!(refused(&[0, 5, 1], &[0], &[1.0], 1 << 20).contains("diagonal"));
     assert!(refused(&[0, 1], &[0], &[f64::NAN], 1 << 20).contains("finite"));
     assert!(refused(&[0, 1], &[0], &[-1.0], 1 << 20).contains("positive definite"));

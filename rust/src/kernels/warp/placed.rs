@@ -62,7 +62,9 @@ impl Motion {
         let inverse = inverse.ok_or_else(|| {
             Error::value(
                 "matrix",
-                format!("a finite one that can be inverted is needed, got {matrix:?}"),
+                format!(
+                    "must be finite and invertible, with finite centre and shift, got {matrix:?}"
+                ),
             )
         })?;
         Ok(Self {

@@ -215,7 +215,7 @@ pub(super) fn bands(
 ) -> Result<(Vec<[f32; 2]>, Vec<u32>)> {
     let [rows, columns] = shape;
     if shape.iter().any(|n| !(1..=i32::MAX as usize).contains(n)) {
-        let message = format!("sides from 1 to 2^31 - 1 are allowed, got {shape:?}");
+        let message = format!("sides must be from 1 to 2^31 - 1, got {shape:?}");
         return Err(Error::value("shape", message));
     }
     let pixels = memory::product("shape", &shape)?;
@@ -259,7 +259,9 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
     if rows < 2 || columns < 2 || vertices > (u32::MAX / 2) as usize {
         return Err(Error::value(
             "target",
-            format!("needs 2 to 2^31 pixels, two or more along each axis, got {rows} x {columns}"),
+            format!(
+                "must have at least 2 pixels along each axis and fewer than 2^31, got {rows} x {columns}"
+            ),
         ));
     }
     // Compute the bounds of each row of vertices, and count flipped triangles row by row.

@@ -45,7 +45,7 @@ pub fn scattered(
         {
             return Err(Error::value(
                 argument,
-                format!("coordinates must be finite and within 10^7, got {p}"),
+                format!("coordinates must be finite and within 10^7 of zero, got {p}"),
             ));
         }
     }
@@ -53,13 +53,16 @@ pub fn scattered(
     let mut triangulation = DelaunayTriangulation::<Vertex>::new();
     for (number, &at) in source.iter().enumerate() {
         let before = triangulation.num_vertices();
-        triangulation
-            .insert(Vertex { at, number })
-            .map_err(|e| Error::value("source", format!("point {number} at {at:?}: {e}")))?;
+        triangulation.insert(Vertex { at, number }).map_err(|e| {
+            Error::value(
+                "source",
+                format!("cannot insert point {number} at {at:?}: {e}"),
+            )
+        })?;
         if triangulation.num_vertices() == before {
             return Err(Error::value(
                 "source",
-                format!("two points lie at the same place, {at:?}"),
+                format!("points must differ, got two at the same place {at:?}"),
             ));
         }
         if number % 1024 == 0 {
@@ -81,7 +84,7 @@ pub fn scattered(
         return Err(Error::value(
             "source",
             format!(
-                "needs three points that do not lie on a line, got {}",
+                "must contain three points that are not on a line, got {} points",
                 source.len()
             ),
         ));

@@ -190,7 +190,7 @@ fn conjugate_gradients(
     }
     Err(Error::value(
         "image",
-        "values and differences are too large for the solver; scale them down",
+        "values and differences are too large for the solver; scale both down",
     ))
 }
 

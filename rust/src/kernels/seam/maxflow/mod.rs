@@ -263,7 +263,7 @@ impl<const D: usize> Solver<D> {
             Some((axis, at, f, b)) => Err(Error::value(
                 "capacities",
                 format!(
-                    "{f} and {b} along axis {axis} at {:?}; each must be at least 0 and their sum at most {}",
+                    "must be at least 0 with a sum of at most {1}, got {f} and {b} along axis {axis} at {0:?}",
                     graph.grid.point(at),
                     i32::MAX
                 ),

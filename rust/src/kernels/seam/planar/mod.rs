@@ -128,7 +128,7 @@ fn check(strip: &Strip<'_>) -> Result<()> {
     if rows == 0 || columns < 2 {
         return Err(Error::value(
             "strip",
-            format!("{rows} rows and {columns} columns; at least 1 and 2 are needed"),
+            format!("must have at least 1 row and 2 columns, got {rows} and {columns}"),
         ));
     }
     let pixels = rows.saturating_mul(columns);
@@ -145,7 +145,7 @@ fn check(strip: &Strip<'_>) -> Result<()> {
     if longest >= LONGEST {
         return Err(Error::value(
             "across, along",
-            format!("a straight line sums to {longest}, less than {LONGEST} is allowed"),
+            format!("must sum to less than {LONGEST} along a straight line, got {longest}"),
         ));
     }
     Ok(())
