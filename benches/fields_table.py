@@ -57,7 +57,7 @@ def list_fields(size: int) -> dict[str, texrs.fields.Field]:
 def measure_seams(image: NDArray[np.uint8], source: texrs.SourceMap) -> float:
     """Return what seams cost a pair of neighbours, in 1000ths of the range."""
     colours = image.astype(np.float64) / 255
-    at, frames = source.coordinates.astype(np.float64), source.frames()
+    at, frames = source.coordinates.astype(np.float64), source.jacobians()
     total, pairs = 0.0, 0
     for axis in range(2):
         near, far = (tuple(slice(*s) if a == axis else slice(None) for a in range(2)) for s in ((0, -1), (1, None)))

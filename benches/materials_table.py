@@ -82,7 +82,7 @@ def check(made: Path, example: Path, source: texrs.SourceMap) -> list[str]:
         own = decode_normals(before[name].pixels, before[name].role, signed=False)
         plain = decode_normals(source.render(before[name].pixels), before[name].role, signed=False)
         made_so = decode_normals(after[name].pixels, after[name].role, signed=False)
-        frames, looked = source.frames(), source.render(own, interpolation="linear")
+        frames, looked = source.jacobians(), source.render(own, interpolation="linear")
         # Heights h(S(p)) have the slopes J^T grad h; rows go down, y goes up.
         slopes = np.einsum("...ji,...j->...i", frames, np.stack([-looked[..., 1], looked[..., 0]], -1))
         expected = np.concatenate([slopes[..., 1:], -slopes[..., :1], looked[..., 2:]], axis=-1)

@@ -163,9 +163,9 @@ def frame_field() -> Any:
     figure, panels = lay(4)
 
     def draw(panel: Any, places: Any, length: float) -> None:
-        frames = field.over((size, size)).frames(places)
+        jacobians = field.over((size, size)).jacobians(places)
         for axis, colour in ((0, ACCENT), (1, BLUE)):
-            along = frames[..., axis]
+            along = jacobians[..., axis]
             panel.quiver(
                 places[:, 1], places[:, 0], along[:, 1], along[:, 0], angles="xy", scale_units="xy", scale=1 / length,
                 color=colour, width=0.012,

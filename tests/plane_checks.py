@@ -61,7 +61,7 @@ def look(
     frames = np.linalg.inv(plane.unfold(at)) / OVER
     # What the sample does not wrap is a line that the checks do not see.
     places = np.clip((at + rng.uniform(0, SIDE, 2)) % SIDE, 0, SIDE - 1).astype(np.float32)
-    shown = SourceMap.from_coordinates(places, (SIDE, SIDE), frame=frames.astype(np.float32)).render(
+    shown = SourceMap.from_coordinates(places, (SIDE, SIDE), jacobian=frames.astype(np.float32)).render(
         texture, interpolation="linear", antialias=True
     )
     seen = shown.reshape(rows, OVER, columns, OVER, -1).mean(axis=(1, 3)) + rng.normal(0, noise, (rows, columns, 1))
@@ -82,7 +82,7 @@ def bend(
     grid = np.moveaxis(np.indices((rows * OVER, columns * OVER)), 0, -1) / OVER + (1 / OVER - 1) / 2 - middle
     rng = np.random.default_rng(seed)
     places = np.clip((flatten(grid) + rng.uniform(0, SIDE, 2)) % SIDE, 0, SIDE - 1).astype(np.float32)
-    shown = SourceMap.from_coordinates(places, (SIDE, SIDE), frame=(differ(grid) / OVER).astype(np.float32)).render(
+    shown = SourceMap.from_coordinates(places, (SIDE, SIDE), jacobian=(differ(grid) / OVER).astype(np.float32)).render(
         load(name), interpolation="linear", antialias=True
     )
     seen = shown.reshape(rows, OVER, columns, OVER, -1).mean(axis=(1, 3)) + rng.normal(0, noise, (rows, columns, 1))

@@ -12,13 +12,13 @@ from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
 
-def pasted(places, shapes, exemplar=None, label=None, frame=None):
+def pasted(places, shapes, exemplar=None, label=None, jacobian=None):
     size = places.shape[:2]
     return SourceMap(
         np.asarray(places, np.float32),
         np.zeros(size, np.uint16) if exemplar is None else exemplar.astype(np.uint16),
         np.zeros(size, np.uint32) if label is None else label.astype(np.uint32),
-        frame,
+        jacobian,
         shapes,
     )
 
@@ -52,7 +52,7 @@ def twin(source, image, wrap, screening):
     height, width = source.shape
     values = view(source, image)
     joined = [source.continues(a, wrap=wrap[a]) for a in range(2)]
-    frames = source.frames()
+    frames = source.jacobians()
     fixed = np.zeros(source.shape, bool)
     for axis in range(2):
         if not wrap[axis]:
@@ -106,7 +106,7 @@ def test_against_the_written_out_problem(wrap, screening):
     places = np.concatenate([whole[:10, :6], mirrored[:10, 5:11]], axis=1)
     label = np.repeat([0, 1], 6)[np.newaxis].repeat(10, 0)
     frame = np.stack([np.eye(2), np.diag([-1, 1])]).astype(np.float32)
-    source = pasted(places, ((12, 14),), label=label, frame=frame)
+    source = pasted(places, ((12, 14),), label=label, jacobian=frame)
     healed = blend(source, image, wrap=wrap, screening=screening, outlines=False)
     expected = np.clip(twin(source, image, wrap, screening), image.min(), image.max())
     np.testing.assert_allclose(healed, expected, atol=2e-5)
@@ -249,7 +249,7 @@ def test_normals_of_a_turned_copy_meet_where_the_surface_does():
     mirrored[:, 8:, 1] = 23 - places[:, 8:, 1]
     label = (np.arange(16) >= 8)[np.newaxis].repeat(16, 0)
     frame = np.stack([np.eye(2), np.diag([1, -1])]).astype(np.float32)
-    source = pasted(mirrored, ((16, 16),), label=label, frame=frame)
+    source = pasted(mirrored, ((16, 16),), label=label, jacobian=frame)
     healed = blend(source, normals, wrap=(True, False), map_type="normal", screening=0.05)
     across = np.diff(healed[8, :, 0])
     assert np.abs(across).max() < 0.35

@@ -93,7 +93,7 @@ def look_up(source: SourceMap, picture: Array, role: Role) -> Array:
             vectors = np.concatenate([vectors, z], axis=-1)
         side = 1 if role.down else -1
         x, y = vectors[..., 0], side * vectors[..., 1]
-        frames = source.frames().astype(float)
+        frames = source.jacobians().astype(float)
         # The slope of a surface that is seen through the map, by the chain rule.
         turned = np.stack(
             [
@@ -118,7 +118,7 @@ def test_a_stack_of_each_convention_comes_back_in_register(key: str, tmp_path: P
     roles = {f"{CONVENTIONS[key].start}Stone02_1K{file.end}": file.role for file in CONVENTIONS[key].files}
     assert {each.file: each.role for each in material.values()} == roles
     result = texrs.design(material, 64, seed=1, deformation=TURNED, screening=None)
-    frames = result.source.frames()
+    frames = result.source.jacobians()
     assert (np.degrees(np.arctan2(frames[..., 1, 0], frames[..., 0, 0])) > 20).mean() > 0.1
     assert result.material is not None
     for how in ({}, {"convention": key}):

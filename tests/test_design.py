@@ -260,7 +260,7 @@ SCRIPT = """
 import hashlib, os, sys, texrs
 def digest():
     made = texrs.design(texrs.samples.pebbles((96, 96)).image, (100, 120), seed=4, copies=2)
-    parts = (made.image, made.source.coordinates, made.source.label, made.source.frame)
+    parts = (made.image, made.source.coordinates, made.source.label, made.source.jacobian)
     return hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest()
 print(digest(), flush=True)
 if "fork" in sys.argv:

@@ -56,7 +56,7 @@ def test_still_elements_are_copied_as_they_are(chosen):
     still = chosen["keep"]
     assert still.report["holes"] == [0.0] * len(still.report["holes"])
     assert all(not entry.get("operations") for log in still.report["operations"] for entry in log)
-    frames = np.abs(still.source.frames())
+    frames = np.abs(still.source.jacobians())
     np.testing.assert_array_equal(frames, np.broadcast_to(np.eye(2), frames.shape))
     # Each mirror image serves once.
     shown = [tuple(log[0]["mirror"]) for log in still.report["operations"]]

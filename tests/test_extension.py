@@ -34,7 +34,7 @@ def test_it_is_the_same_plane() -> None:
     assert steep <= 12
     assert aside <= 25
     # Things are as large in what was added as they were beside it.
-    scales = np.abs(np.linalg.det(LARGER.source.frames()[:160, 250:310]))
+    scales = np.abs(np.linalg.det(LARGER.source.jacobians()[:160, 250:310]))
     assert 0.6 < np.median(scales) < 1.7
 
 
@@ -84,7 +84,7 @@ def test_a_doubtful_plane_is_not_followed() -> None:
     with pytest.warns(UserWarning, match="not followed"):
         made = texrs.extend(look_twice(), bottom=16, seed=1)
     assert made.report["planes"] == [{"plane": None, "found": False}]
-    assert np.abs(np.abs(np.linalg.det(made.source.frames())) - 1).max() < 1e-6
+    assert np.abs(np.abs(np.linalg.det(made.source.jacobians())) - 1).max() < 1e-6
 
 
 def test_again_and_otherwise() -> None:

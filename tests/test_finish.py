@@ -93,7 +93,7 @@ def test_another_finish_may_be_asked_for() -> None:
     assert (plain == source.render(PEBBLES)).all()
     assert (plain != texrs.apply(source, PEBBLES)).any()
     # Put together by hand a map says nothing, and is looked up.
-    bare = SourceMap(source.coordinates, source.exemplar, source.label, source.frame, source.shapes)
+    bare = SourceMap(source.coordinates, source.exemplar, source.label, source.jacobian, source.shapes)
     assert (texrs.apply(bare, PEBBLES) == plain).all()
 
 

@@ -119,7 +119,7 @@ def test_patches_do_not_mirror_or_repeat_what_is_beside_them():
     hole = disc((160, 160), radius=0.22)
     result = texrs.inpaint(image, hole)
     row, column = places(result)
-    turned = (result.source.frames() != np.eye(2)).any(axis=(2, 3))
+    turned = (result.source.jacobians() != np.eye(2)).any(axis=(2, 3))
     r, c = np.indices(row.shape)
     near = np.hypot(row - r, column - c) < 10
     assert (near & turned & hole).sum() < 0.02 * hole.sum()
@@ -183,10 +183,10 @@ def test_every_map_in_register():
 
 def test_mirrored_patches_turn_normals():
     result = texrs.inpaint(PEBBLES, HOLE)
-    turned = (result.source.frames() != np.eye(2)).any(axis=(2, 3))
+    turned = (result.source.jacobians() != np.eye(2)).any(axis=(2, 3))
     assert turned.any()
     plain = texrs.inpaint(PEBBLES, HOLE, allow_mirror=False).source
-    assert (plain.frames() == np.eye(2)).all()
+    assert (plain.jacobians() == np.eye(2)).all()
     # Along a patch coordinates run as its frame says.
     joined = result.source.continues(1)[:, :-1]
     same = result.source.label[:, 1:] == result.source.label[:, :-1]
@@ -435,7 +435,7 @@ def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
     for picture, mirrored in ((noise, True), (lit, False)):
         result = texrs.inpaint(picture, hole)
         assert result.report["allow_mirror"] is mirrored
-        frames = result.source.frames()
+        frames = result.source.jacobians()
         assert mirrored or (np.diagonal(frames, axis1=-2, axis2=-1) == 1).all()
     assert len(choose_mirrors([noise], np.ones((96, 96), bool), None)) == 4
 

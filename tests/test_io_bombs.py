@@ -113,7 +113,7 @@ def bombs():
                 "exemplar": ((4, 4), "u2"),
                 "label": ((4, 4), "u4"),
                 "shapes": ((1, 2), "i8"),
-                "frame": (huge, "f4"),
+                "jacobian": (huge, "f4"),
                 "finish": (huge, "u1"),
                 "finish/known/0": (huge, "?"),
             }

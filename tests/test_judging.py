@@ -128,7 +128,7 @@ def test_copies_that_are_mirrored_are_not_alike():
     frames = np.array([np.eye(2), np.diag([1.0, -1.0])], np.float32)
     copied = SourceMap.from_coordinates(grid.copy(), (160, 160), label=label)
     grid[:, 160:, 1] = 159 - grid[:, 160:, 1]
-    mirrored = SourceMap.from_coordinates(grid, (160, 160), label=label, frame=frames)
+    mirrored = SourceMap.from_coordinates(grid, (160, 160), label=label, jacobian=frames)
     assert judge(image, copied).repetition > 0.4
     assert judge(image, mirrored).repetition == 0
 
@@ -148,7 +148,9 @@ def test_frames_are_heeded_where_a_picture_is_mirrored():
     image = picture("leaves_and_flowers")
     grid = np.indices((160, 160)).transpose(1, 2, 0).astype(np.float32)
     grid[..., 1] = 159 - grid[..., 1]
-    mirrored = SourceMap.from_coordinates(grid, (160, 160), frame=np.diag([1.0, -1.0]).astype(np.float32)[np.newaxis])
+    mirrored = SourceMap.from_coordinates(
+        grid, (160, 160), jacobian=np.diag([1.0, -1.0]).astype(np.float32)[np.newaxis]
+    )
     assert judge(image, mirrored).score == 0
 
 

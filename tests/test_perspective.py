@@ -26,7 +26,7 @@ def test_the_map_is_the_picture(floor):
     assert result.image.dtype == floor.image.dtype
     np.testing.assert_array_equal(result.source.render(floor.image, antialias=True), result.image)
     # What is not shrunk is the look-up and nothing else.
-    whole = np.abs(np.linalg.det(result.source.frames())) <= 1
+    whole = np.abs(np.linalg.det(result.source.jacobians())) <= 1
     assert 0.2 < whole.mean() < 1
     np.testing.assert_array_equal(view(result.source, floor.image)[whole], result.image[whole])
     assert result.stages["target"].shape == (64, 80)

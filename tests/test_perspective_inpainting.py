@@ -89,7 +89,7 @@ def test_a_second_picture_gives_elements_of_the_size_that_belongs_there(floor, m
     assert (result.source.exemplar == hole).all()
     bare = np.where(hole[..., np.newaxis], 0, image).astype(np.uint8)
     np.testing.assert_array_equal(view(result.source, [bare, other]), result.image)
-    frame = result.source.frame_array()
+    frame = result.source.jacobian_array()
     size = np.ones(image.shape[:2]) if frame is None else 1 / frame[result.source.label][..., 0, 0]
     shown = result.source.render([scale, theirs], interpolation="linear") * size
     wrong = np.abs(np.log(shown / scale))[hole]
@@ -104,7 +104,7 @@ def test_a_source_from_the_front_is_resized(floor):
     hole = hole_in(image.shape[:2], (20, 140, 45, 115))
     flat, _ = checks.floor((160, 160), seed=3, span=(1, 1))
     result = fill(image, hole, method="optimise", exemplar=flat, scale_map=scale)
-    size = 1 / result.source.frame_array()[result.source.label][..., 0, 0]
+    size = 1 / result.source.jacobian_array()[result.source.label][..., 0, 0]
     assert np.corrcoef(np.log(size[hole]), np.log(scale[hole]))[0, 1] > 0.8
 
 

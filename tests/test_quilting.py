@@ -67,8 +67,8 @@ def test_every_pixel_is_one_of_the_exemplar(pebbles: np.ndarray) -> None:
     assert source.shape == (200, 240)
     assert source.shapes == (pebbles.shape[:2],)
     assert (source.coordinates == np.rint(source.coordinates)).all()
-    assert source.frame is not None
-    hands = np.linalg.det(source.frames())
+    assert source.jacobian is not None
+    hands = np.linalg.det(source.jacobians())
     assert set(np.unique(hands)) <= {-1.0, 1.0}
     # Where a pixel and the next one are of one piece, the step between them is that of its frame.
     step = np.diff(source.coordinates[..., 1], axis=1)
@@ -85,7 +85,7 @@ def test_no_mirror_image_lies_beside_its_original(pebbles: np.ndarray) -> None:
     met = edges = 0
     for seed in range(3):
         source = made([picture(pebbles), picture(pebbles, mirrored=True)], seed=seed)
-        hands = np.linalg.det(source.frames()) > 0
+        hands = np.linalg.det(source.jacobians()) > 0
         for axis in range(2):
             turned = hands != np.roll(hands, -1, axis)
             apart = np.abs(source.coordinates - np.roll(source.coordinates, -1, axis)).max(axis=-1)

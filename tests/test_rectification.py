@@ -54,7 +54,7 @@ def test_pixels_are_the_photograph_s() -> None:
     )
     # And frames are those of the plane: what is a pixel down in the texture lies there in the photograph.
     down = np.diff(result.source.coordinates, axis=0)
-    np.testing.assert_allclose(down, result.source.frames()[:-1, :, :, 0], atol=0.05)
+    np.testing.assert_allclose(down, result.source.jacobians()[:-1, :, :, 0], atol=0.05)
 
 
 def test_normals_turn_with_the_plane() -> None:

@@ -36,7 +36,7 @@ def test_same_seed_same_bytes(name: str) -> None:
     size = (32, 40, 36) if name in SOLID else (56, 72)
     draw = inspect.unwrap(getattr(samples, name))
     one, two, other = (draw(size=size, seed=s) for s in (7, 7, 8))
-    for field in ("image", "centres", "labels", "mask", "scale_map", "frames"):
+    for field in ("image", "centres", "labels", "mask", "scale_map", "jacobians"):
         a, b = getattr(one, field), getattr(two, field)
         assert (a is None) == (b is None)
         assert a is None or a.tobytes() == b.tobytes(), field
@@ -70,9 +70,9 @@ def test_shapes_and_types(name: str) -> None:
     if sample.scale_map is not None:
         assert sample.scale_map.dtype == np.float32
         assert sample.scale_map.shape == shape
-    if sample.frames is not None:
-        assert sample.frames.dtype == np.float32
-        assert sample.frames.shape == (*shape, axes, axes)
+    if sample.jacobians is not None:
+        assert sample.jacobians.dtype == np.float32
+        assert sample.jacobians.shape == (*shape, axes, axes)
     # A picture, not a cartoon: it uses the range, and neither end much.
     assert 40 < sample.image.mean() < 190
     assert sample.image.std() > 12
@@ -167,13 +167,13 @@ def test_a_threshold_does_not_find_the_elements(name: str) -> None:
 def test_scale_map_is_what_the_frames_say(name: str) -> None:
     sample = default(name)
     assert sample.scale_map is not None
-    assert sample.frames is not None
+    assert sample.jacobians is not None
     assert abs(float(np.log(sample.scale_map).mean())) < 1e-5
     assert sample.scale_map.max() / sample.scale_map.min() > 2.5
-    from_frames = np.linalg.det(sample.frames.astype(np.float64)) ** -0.5
+    from_frames = np.linalg.det(sample.jacobians.astype(np.float64)) ** -0.5
     np.testing.assert_allclose(sample.scale_map, from_frames, rtol=1e-5)
     # A Jacobian's columns are the derivatives of one map: their mixed derivatives agree.
-    mixed = [np.gradient(sample.frames[..., 1 - k], axis=k) for k in (0, 1)]
+    mixed = [np.gradient(sample.jacobians[..., 1 - k], axis=k) for k in (0, 1)]
     np.testing.assert_allclose(mixed[0][2:-2, 2:-2], mixed[1][2:-2, 2:-2], atol=2e-4)
 
 
@@ -233,7 +233,7 @@ def test_labels_go_on_across_the_border(name: str) -> None:
 def test_stripes_repeat_every_nine_voxels() -> None:
     sample = samples.stripes((90, 48, 48), seed=2)
     assert sample.mask is not None
-    assert sample.frames is not None
+    assert sample.jacobians is not None
     dark = sample.mask.astype(float)
     dark = dark - dark.mean()
     power = (np.abs(np.fft.rfft(dark, axis=0)) ** 2).mean((1, 2))
@@ -241,16 +241,16 @@ def test_stripes_repeat_every_nine_voxels() -> None:
     assert abs(90 / ((spread * np.arange(7, 14)).sum() / spread.sum()) - 9.0) < 0.5
     # Layers are counted along each line: their number is what the frame integrates to.
     layers = (np.diff(sample.mask.astype(int), axis=0) > 0).sum(0)
-    turns = sample.frames[..., 0, 0].astype(float).sum(0) / 9
+    turns = sample.jacobians[..., 0, 0].astype(float).sum(0) / 9
     assert np.abs(layers - turns).max() <= 1.1
     lit = sample.image.mean(-1)
     assert lit[~sample.mask].mean() - lit[sample.mask].mean() > 25
 
 
 def test_stripes_normals_turn_gently() -> None:
-    frames = default("stripes").frames
-    assert frames is not None
-    normal = frames[..., 0, :].astype(float)
+    jacobians = default("stripes").jacobians
+    assert jacobians is not None
+    normal = jacobians[..., 0, :].astype(float)
     length = np.linalg.norm(normal, axis=-1)
     assert 0.5 < length.min() < length.max() < 1.6
     tilt = np.degrees(np.arccos(normal[..., 0] / length))

@@ -151,7 +151,7 @@ def test_elements_on_a_plane_are_whole():
     source = result.source
     steps = np.diff(source.coordinates, axis=0)[:, :-1]
     same = source.label[:-1, :-1] == source.label[1:, :-1]
-    away = np.linalg.norm(steps - source.frames()[:-1, :-1, :, 0], axis=-1)[same]
+    away = np.linalg.norm(steps - source.jacobians()[:-1, :-1, :, 0], axis=-1)[same]
     assert np.median(away) < 0.1
 
 
@@ -159,7 +159,7 @@ def test_maps_of_widths_and_of_areas_ask_for_the_same(disc_floor):
     image, scale = disc_floor
     ramp = np.geomspace(0.7, 1.3, 96, dtype=np.float32)[:, np.newaxis].repeat(96, axis=1)
     wide, large = (texrs.perspective(image, scale**p, 96, target=ramp**p, seed=1) for p in (1, 1.5))
-    sizes = [np.log(np.abs(np.linalg.det(made.source.frames()))) / 2 for made in (wide, large)]
+    sizes = [np.log(np.abs(np.linalg.det(made.source.jacobians()))) / 2 for made in (wide, large)]
     shown = [s - 1.5 * np.log(made.source.render(scale)) for s, made in zip(sizes, (wide, large), strict=True)]
     assert np.median(np.abs(shown[0] - shown[1])) < 0.02
     assert max(made.report["scale_error"] for made in (wide, large)) < 0.05
@@ -175,7 +175,7 @@ def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):
     at = np.rint(result.source.coordinates[hole]).astype(int)
     assert not hole[at[:, 0], at[:, 1]].any()
     # Seen in depth, what is copied is turned and sized; copies of squares are neither.
-    assert np.abs(result.source.frames()[hole] - np.eye(2)).max() > 0.05
+    assert np.abs(result.source.jacobians()[hole] - np.eye(2)).max() > 0.05
     with texrs.threads(1):
         alone = texrs.inpaint(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
     assert alone.image.tobytes() == result.image.tobytes()
@@ -184,7 +184,7 @@ def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):
 def test_what_is_shrunk_is_smoothed_first():
     lines = np.tile(np.uint8([0, 250]), (64, 32))
     at = np.stack(np.meshgrid(np.arange(16.0) * 4, np.arange(16.0) * 4, indexing="ij"), -1).astype(np.float32)
-    shrunk = SourceMap.from_coordinates(at, lines.shape, frame=np.float32([np.eye(2) * 4]))
+    shrunk = SourceMap.from_coordinates(at, lines.shape, jacobian=np.float32([np.eye(2) * 4]))
     assert shrunk.render(lines).std() == 0
     assert abs(shrunk.render(lines, antialias=True)[:, 2:-2].astype(int) - 125).max() <= 8
     assert (shrunk.render(lines, antialias=True, interpolation="nearest") == shrunk.render(lines)).all()

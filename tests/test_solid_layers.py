@@ -154,7 +154,7 @@ def test_the_map_has_the_frames_of_its_patches() -> None:
     field = fields.circular(centre=(0, 0), axes=2)
     found = texrs.PlaneTexture(exemplar(2), field=field, seed=1).window((40, -50), (60, 70))
     assert found.source.label is not None
-    frames = found.source.frames()
+    frames = found.source.jacobians()
     # Those of rigid patches: few, and about as the field.
     assert 1 < len(np.unique(frames.reshape(-1, 4), axis=0)) <= found.source.label.max() + 1
     assert np.abs(frames - field.lattice((60, 70), origin=(40, -50))).mean() < 0.5

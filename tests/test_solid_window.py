@@ -231,11 +231,11 @@ def test_the_source_map_knows_the_field_where_the_window_lies() -> None:
     field = fields.circular(centre=(0, 0), axes=2)
     here = field.lattice((8, 9), origin=(40, -50))
     exact = texrs.PlaneTexture(PLANE, field=field, quality="fast").window((40, -50), (8, 9))
-    assert np.array_equal(exact.source.frames(), here)
+    assert np.array_equal(exact.source.jacobians(), here)
     # Those of patches are those of the field in their middles.
     found = texrs.PlaneTexture(PLANE, field=field).window((40, -50), (8, 9))
-    assert np.abs(found.source.frames() - here).max() < 0.6
-    assert np.allclose(np.linalg.det(found.source.frames()), 1, atol=2e-3)
+    assert np.abs(found.source.jacobians() - here).max() < 0.6
+    assert np.allclose(np.linalg.det(found.source.jacobians()), 1, atol=2e-3)
     assert found.report["origin"] == [40, -50]
 
 

@@ -33,7 +33,7 @@ def test_composition_of_turns_is_the_turn_by_the_sum():
     both = a.compose(b)
     inner = np.s_[10:23, 10:23]
     np.testing.assert_allclose(both.coordinates[inner], turned((33, 33), 60).coordinates[inner], atol=1e-4)
-    np.testing.assert_allclose(both.frames()[0, 0], turned((33, 33), 60).frames()[0, 0], atol=1e-6)
+    np.testing.assert_allclose(both.jacobians()[0, 0], turned((33, 33), 60).jacobians()[0, 0], atol=1e-6)
 
 
 def test_composition_through_several_pictures():
@@ -46,9 +46,11 @@ def test_composition_through_several_pictures():
     two_steps = outer.render([a.render(image), b.render(image)])
     composed = outer.compose([a, b])
     np.testing.assert_array_equal(composed.render(image, interpolation="nearest"), two_steps)
-    np.testing.assert_array_equal(composed.frames()[which == 1], b.frames()[0, 0][None].repeat((which == 1).sum(), 0))
-    dense = SourceMap(b.coordinates, b.exemplar, b.label, b.frames().copy(), b.shapes)
-    np.testing.assert_allclose(outer.compose([a, dense]).frames(), composed.frames())
+    np.testing.assert_array_equal(
+        composed.jacobians()[which == 1], b.jacobians()[0, 0][None].repeat((which == 1).sum(), 0)
+    )
+    dense = SourceMap(b.coordinates, b.exemplar, b.label, b.jacobians().copy(), b.shapes)
+    np.testing.assert_allclose(outer.compose([a, dense]).jacobians(), composed.jacobians())
 
 
 def test_reuse_counts_pieces():
@@ -92,7 +94,7 @@ def test_saved_and_loaded_it_is_the_same(tmp_path):
         for name in ("coordinates", "exemplar", "label"):
             np.testing.assert_array_equal(getattr(again, name), getattr(source, name))
         assert again.shapes == source.shapes
-        assert (again.frame is None) == (source.frame is None)
+        assert (again.jacobian is None) == (source.jacobian is None)
         assert [p.name for p in tmp_path.iterdir()].count(path.name) == 1
 
 
@@ -100,7 +102,7 @@ ARRAYS = {
     "coordinates": np.zeros((4, 4, 2), np.float32),
     "exemplar": np.zeros((4, 4), np.uint16),
     "label": np.zeros((4, 4), np.uint32),
-    "frame": None,
+    "jacobian": None,
     "shapes": ((4, 4),),
 }
 
@@ -119,7 +121,7 @@ ARRAYS = {
         *((name, array[..., 0]) for name, array in ARRAYS.items() if isinstance(array, np.ndarray)),
         *((name, array[..., np.newaxis]) for name, array in ARRAYS.items() if isinstance(array, np.ndarray)),
         ("exemplar", np.ones((4, 4), np.uint16)),
-        *(("frame", f) for f in (1.5, [[1, 0], [0, 1]], np.eye(2), np.zeros((0, 2, 2), np.float32))),
+        *(("jacobian", f) for f in (1.5, [[1, 0], [0, 1]], np.eye(2), np.zeros((0, 2, 2), np.float32))),
     ],
 )
 def test_parts_that_make_no_map(name, value):
@@ -152,7 +154,7 @@ def test_parts_that_disagree_are_refused():
     start = SourceMap.identity((4, 4))
     with pytest.raises(InvalidInput, match="^label"):
         SourceMap(start.coordinates, start.exemplar, start.label[:3], None, start.shapes)
-    with pytest.raises(InvalidInput, match="^frame"):
+    with pytest.raises(InvalidInput, match="^jacobian"):
         SourceMap(
             start.coordinates,
             start.exemplar,

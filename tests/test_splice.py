@@ -273,7 +273,7 @@ def test_maps_in_register_come_out_in_register() -> None:
     rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
     assert (result.source.render(height) == height[rows, columns]).all()
     # Where the wall goes on as its mirror image, so do the directions on it.
-    frames = result.source.frames()
+    frames = result.source.jacobians()
     assert set(np.unique(frames)) <= {-1.0, 0.0, 1.0}
     across = np.full((*mine.mask.shape, 3), (0.6, 0.0, 0.8), np.float32)
     across[0, 0] = (-0.6, 0, 0.8)

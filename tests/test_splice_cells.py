@@ -119,7 +119,7 @@ def test_the_result_is_a_source_map(spliced: Any) -> None:
     assert texrs.splice(replace(STONES, image=deep), WALL, (176, 176), seed=1).image.dtype == np.uint16
     height = np.linspace(0, 1, STONES.image.size, dtype=np.float32).reshape(SIZE)
     assert result.source.render(height).shape == (176, 176)
-    frames = result.source.frames()
+    frames = result.source.jacobians()
     # A map that is continuous inside of its cells, and whose frames are its slopes.
     slope = np.diff(result.source.coordinates, axis=1)
     same = np.diff(result.source.label.astype(int), axis=1) == 0

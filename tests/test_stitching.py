@@ -112,7 +112,7 @@ def test_bend_overrules_what_the_exemplar_says(bend):
 def test_the_frames_of_rigid_patches_are_their_own():
     """Inside a patch places go on as its frame says, so normals are turned by what was done."""
     made = texrs.synthesize(samples.dots((96, 96)).image, 128, field=fields.circular(axes=2), seed=2)
-    frames, coordinates, labels = made.source.frames(), made.source.coordinates, made.source.label
+    frames, coordinates, labels = made.source.jacobians(), made.source.coordinates, made.source.label
     for axis in range(2):
         step = np.diff(coordinates, axis=axis)
         same = np.diff(labels, axis=axis) == 0

@@ -91,7 +91,7 @@ def test_a_box_is_left_out_where_too_little_of_it_is_seen():
     found, which = follow_boxes(twice, [[10, 5, 20, 15, 9]])
     assert found.tolist() == [[10, 5, 20, 15, 9], [50, 5, 60, 15, 9]]
     assert which.tolist() == [0, 0]
-    mirrored = texrs.SourceMap.from_coordinates(places[:, ::-1], (40, 40), frame=np.float32([[[1, 0], [0, -1]]]))
+    mirrored = texrs.SourceMap.from_coordinates(places[:, ::-1], (40, 40), jacobian=np.float32([[[1, 0], [0, -1]]]))
     assert follow_boxes(mirrored, [[10, 5, 20, 15]])[0].tolist() == [[20, 5, 30, 15]]
     assert follow_boxes(source, [])[0].shape == (0, 4)
 

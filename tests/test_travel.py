@@ -57,7 +57,7 @@ def show(thing: Any) -> list[str]:
         return [digest(found[name]) for name in sorted(found)] + [repr((thing.labels, thing.repeat))]
     made = thing.window((-9, 30, 4)[-thing.axes :], (20, 14, 11)[-thing.axes :])
     maps = [] if made.material is None else [each.pixels for each in made.material.values()]
-    return [digest(array) for array in (made.image, made.source.coordinates, made.source.frames(), *maps)]
+    return [digest(array) for array in (made.image, made.source.coordinates, made.source.jacobians(), *maps)]
 
 
 @pytest.mark.parametrize("name", THINGS)
@@ -144,7 +144,7 @@ def test_results_travel(tmp_path: Path) -> None:
     made = texrs.synthesize(WEAVE, 48, field=TURNED)
     back = pickle.loads(pickle.dumps(made))
     assert np.array_equal(back.source.render(WEAVE), made.stages["before_blending"])
-    assert np.array_equal(back.source.frames(), made.source.frames())
+    assert np.array_equal(back.source.jacobians(), made.source.jacobians())
     assert repr(back.source.finish) == repr(made.source.finish)
     elements = texrs.elements.analyse(dots)
     again = pickle.loads(pickle.dumps(elements))

@@ -335,7 +335,7 @@ def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, 
 def list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], along: int) -> list[Array]:
     """Return the gradients along an axis of the output where pixels come from, and a pixel to each side."""
     source = seam.source
-    frame = source.frame_array()
+    frame = source.jacobian_array()
     ways = np.zeros((len(at[0]), 2), np.float32)
     if frame is None:
         ways[:, along] = 1
@@ -393,7 +393,7 @@ def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
 
 def number_frames(source: SourceMap) -> NDArray[np.intp] | None:
     """Return a number for each pixel, the same for those that show the exemplar turned and scaled about alike."""
-    frame = source.frame_array()
+    frame = source.jacobian_array()
     if frame is None:
         return None
     rough = np.rint(ALIKE * frame.reshape(-1, 4)).astype(np.intp)

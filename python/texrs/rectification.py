@@ -224,7 +224,7 @@ class Sheet:
         nearest = np.rint(source.coordinates).astype(np.intp)
         inside &= solid[nearest[..., 0], nearest[..., 1]]
         # The least singular value: how few pixels of the photograph a pixel sees.
-        frames = source.frames()
+        frames = source.jacobians()
         squares, area = np.square(frames).sum(axis=(-2, -1)), cross(frames[..., 0, :], frames[..., 1, :])
         fewest = np.sqrt(np.maximum(squares - np.sqrt(np.maximum(squares**2 - 4 * area**2, 0)), 0) / 2)
         return cls(source, np.asarray(inside & (fewest >= SHARP * step)), low, step, resolution)
@@ -250,7 +250,7 @@ def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resoluti
         at, frames = plane.project(flat), plane.unfold(flat) / resolution
         inside: Bools = np.asarray(((at >= 0) & (at <= most)).all(axis=-1))
     at[~inside], frames[~inside] = 0, np.eye(2)
-    return SourceMap.from_coordinates(at.astype(np.float32), plane.shape, frame=frames.astype(np.float32)), inside
+    return SourceMap.from_coordinates(at.astype(np.float32), plane.shape, jacobian=frames.astype(np.float32)), inside
 
 
 def level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
@@ -293,7 +293,7 @@ def find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
 
 def cut(source: SourceMap, box: tuple[slice, slice]) -> SourceMap:
     """Return a rectangle of a map."""
-    return SourceMap.from_coordinates(source.coordinates[box], source.shapes[0], frame=source.frames()[box])
+    return SourceMap.from_coordinates(source.coordinates[box], source.shapes[0], jacobian=source.jacobians()[box])
 
 
 def grow(

@@ -38,9 +38,9 @@ def gradients(image: np.ndarray) -> np.ndarray:
 
 def jacobians(source: Any) -> np.ndarray:
     """Return the local frame of each pixel of a source map."""
-    if source.frame is None:
+    if source.jacobian is None:
         return np.broadcast_to(np.eye(2), (*source.label.shape, 2, 2))
-    return np.asarray(source.frame[source.label] if source.frame.ndim == 3 else source.frame, np.float64)
+    return np.asarray(source.jacobian[source.label] if source.jacobian.ndim == 3 else source.jacobian, np.float64)
 
 
 def seams(source: Any, axis: int, *, wrap: bool = False, tolerance: float = 0.25) -> np.ndarray:

@@ -77,9 +77,9 @@ def d9(
     same = [int(h) for h in expected[: len(LOGISTIC_REFERENCE)]] == list(LOGISTIC_REFERENCE)
     same &= list(sequence) == expected[: len(sequence)]
     frames = True
-    if source is not None and source.frame is not None:
-        used = np.unique(source.label) if source.frame.ndim == 3 else slice(None)
-        singular = np.linalg.svd(np.asarray(source.frame, np.float64)[used], compute_uv=False)
+    if source is not None and source.jacobian is not None:
+        used = np.unique(source.label) if source.jacobian.ndim == 3 else slice(None)
+        singular = np.linalg.svd(np.asarray(source.jacobian, np.float64)[used], compute_uv=False)
         frames = bool(
             singular.min() >= scale[1] ** -per_element - 1e-3 and singular.max() <= scale[0] ** -per_element + 1e-3
         )

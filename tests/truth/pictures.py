@@ -251,10 +251,10 @@ def source_maps() -> Parts:
         "cubic": source.render(clear(*args, seed=8)),
         "normals": source.render(normals(*args, seed=8), map_type="normal"),
         "continues": source.continues(1, wrap=True),
-        "frames": source.frames(),
+        "jacobians": source.jacobians(),
         "composed coordinates": tiled.coordinates,
         "composed label": tiled.label,
-        "composed frame": tiled.frame_array(),
+        "composed jacobian": tiled.jacobian_array(),
         "reuse": [reuse.verbatim, reuse.largest, reuse.regions],
     }
 
@@ -264,4 +264,4 @@ def warped_by_points() -> Parts:
     source = np.array([[r, c] for r in (0, 30, 63) for c in (0, 40, 79)])
     target = source + np.random.default_rng(2).integers(-9, 10, source.shape) * (source % 9 > 0)
     found = warp.from_points(source, target, (64, 80))
-    return {"coordinates": found.coordinates, "triangle": found.triangle, "frames": found.frames}
+    return {"coordinates": found.coordinates, "triangle": found.triangle, "jacobians": found.frames}

@@ -41,7 +41,7 @@ def parts_of(result: Synthesis, *, report: Sequence[str] = (), stages: Sequence[
         "coordinates": source.coordinates,
         "exemplar": source.exemplar,
         "label": source.label,
-        "frame": source.frame_array(),
+        "jacobian": source.jacobian_array(),
         **{f"stage {name}": result.stages[name] for name in stages},
         **{f"report {name}": result.report[name] for name in report},
     }

@@ -132,7 +132,7 @@ def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, .
 
 def _list_frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
     """Return the Jacobians of some pixels, (n, 2, 2)."""
-    frame = source.frame_array()
+    frame = source.jacobian_array()
     if frame is None:
         return np.broadcast_to(np.eye(2, dtype=np.float32), (len(at[0]), 2, 2))
     return frame[source.label[at]] if frame.ndim == 3 else frame[at]
@@ -145,6 +145,6 @@ def wrap_rows(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
 
 def take_rows(source: SourceMap, rows: slice | NDArray[np.intp]) -> SourceMap:
     """Take some rows of a source map."""
-    frame = source.frame_array()
+    frame = source.jacobian_array()
     frame = frame if frame is None or frame.ndim == 3 else frame[rows]
     return SourceMap(source.coordinates[rows], source.exemplar[rows], source.label[rows], frame, source.shapes)

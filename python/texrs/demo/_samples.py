@@ -22,7 +22,7 @@ def _samples(workshop: Workshop) -> str:
             sample = samples.load(name, size=(SIDE, SIDE))
         except ValueError:
             sample = samples.load(name, size=(EDGE,) * 3)
-        known = [k for k in ("labels", "mask", "scale_map", "frames") if getattr(sample, k) is not None]
+        known = [k for k in ("labels", "mask", "scale_map", "jacobians") if getattr(sample, k) is not None]
         volume = sample.image.ndim == 4
         note = ("a volume; " * volume) + (f"known: {', '.join(known)}" if known else "nothing else known")
         pictures.append(

@@ -188,7 +188,7 @@ class Atlas:
         which, at = self.locate(places)
         inverse = np.array([np.diag([1 / f for f in c.factor]) for c in self.copies], np.float32)
         frame = inverse if len(self.copies) > 1 else None
-        return SourceMap.from_coordinates(at.reshape(*shape, 2), self.shape, label=which.reshape(shape), frame=frame)
+        return SourceMap.from_coordinates(at.reshape(*shape, 2), self.shape, label=which.reshape(shape), jacobian=frame)
 
 
 def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float]) -> tuple[float, ...]:

@@ -237,7 +237,7 @@ def fill_parts(
         )
         new = far & (made.source.label > 0)
         coordinates[new] = made.source.coordinates[new]
-        frames[new] = made.source.frames()[new]
+        frames[new] = made.source.jacobians()[new]
         label[new] = made.source.label[new] + sum(counts)
         counts.append(made.count)
         belongs[new] = number

@@ -128,7 +128,7 @@ def number_cells(source: SourceMap) -> NDArray[np.int64]:
 
 def mark_hands(source: SourceMap) -> Bools:
     """Mark the pixels that show an exemplar, and not its mirror image."""
-    frame = source.frame_array()
+    frame = source.jacobian_array()
     if frame is None:
         return np.ones(source.shape, np.bool_)
     unturned = frame[..., 0, 0] * frame[..., 1, 1] > frame[..., 0, 1] * frame[..., 1, 0]

@@ -18,11 +18,11 @@ name                  what it shows                            layout     known
 `net`                 a rope net over dark water               connected  elements: the cells; the net
 `pebbles`             rounded stones on sand                   disjoint   elements
 `scales`              overlapping scales of a fish                        elements
-`tilted_bricks`       a wall seen aslant                       jointed    elements, scale, frames
-`tilted_discs`        round tiles of a floor seen aslant       disjoint   elements, scale, frames
+`tilted_bricks`       a wall seen aslant                       jointed    elements, scale, jacobians
+`tilted_discs`        round tiles of a floor seen aslant       disjoint   elements, scale, jacobians
 `weave`               a plain weave                                       elements
 `particles`           a volume: ellipsoids of three colours    disjoint   elements
-`stripes`             a volume: folded layers, 9 voxels apart             mask, frames
+`stripes`             a volume: folded layers, 9 voxels apart             mask, jacobians
 `weave_solid`         a volume: layers of woven yarn                      mask
 `wood_solid`          a volume: growth rings and fibres                   mask
 ====================  =======================================  =========  ==============================

@@ -45,7 +45,7 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     Returns
     -------
     Sample
-        With `centres`, `labels`, `mask`, `scale_map` and `frames`. A centre is where the middle of
+        With `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is where the middle of
         the disc on the plane is seen, which is near, not at, the centroid of the disc's picture.
 
     Raises
@@ -57,7 +57,7 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     --------
     >>> from texrs import samples
     >>> sample = samples.tilted_discs((96, 96))
-    >>> sample.frames.shape, bool(sample.scale_map.max() > 3 * sample.scale_map.min())
+    >>> sample.jacobians.shape, bool(sample.scale_map.max() > 3 * sample.scale_map.min())
     ((96, 96, 2, 2), True)
     """
     rng = make_generator("tilted_discs", seed)
@@ -85,7 +85,7 @@ def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     Returns
     -------
     Sample
-        With `centres`, `labels`, `mask`, `scale_map` and `frames`. A centre is where the centroid
+        With `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is where the centroid
         of the brick on the plane is seen.
 
     Raises

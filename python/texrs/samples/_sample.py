@@ -49,9 +49,9 @@ class Sample:
     scale_map : float32 array, (H, W), or None
         Local size of the texture: lengths are this many times the normal ones, as the square root
         of the ratio of areas. Its geometric mean is 1.
-    frames : float32 array, (H, W, 2, 2) or (D, H, W, 3, 3), or None
+    jacobians : float32 array, (H, W, 2, 2) or (D, H, W, 3, 3), or None
         The Jacobian J = dS/dp of the map from the picture to the undistorted texture;
-        ``frames[..., i, j]`` is dS_i / dp_j.
+        ``jacobians[..., i, j]`` is dS_i / dp_j.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class Sample:
     mask: NDArray[np.bool_] | None = None
     layout: LayoutName | None = None
     scale_map: NDArray[np.float32] | None = None
-    frames: NDArray[np.float32] | None = None
+    jacobians: NDArray[np.float32] | None = None
 
     def __repr__(self) -> str:
         """Return the name, the shape and which of the known answers are there."""

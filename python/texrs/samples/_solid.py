@@ -33,7 +33,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     Returns
     -------
     Sample
-        With `mask` and `frames`, the exact J = dS/dp.
+        With `mask` and `jacobians`, the exact J = dS/dp.
 
     Raises
     ------
@@ -43,21 +43,21 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     Examples
     --------
     >>> from texrs import samples
-    >>> samples.stripes((32, 32, 40)).frames.shape
+    >>> samples.stripes((32, 32, 40)).jacobians.shape
     (32, 32, 40, 3, 3)
     """
     rng = make_generator("stripes", seed)
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
     p = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).astype(np.float32)
-    source, frames = p.copy(), np.zeros((*shape, 3, 3), np.float32)
-    frames[:] = np.eye(3)
+    source, jacobians = p.copy(), np.zeros((*shape, 3, 3), np.float32)
+    jacobians[:] = np.eye(3)
     for _ in range(4):
         way = rng.standard_normal(3)
         wave = 2 * pi / rng.uniform(52, 90) * way / np.sqrt((way * way).sum())
         shift = rng.uniform(0.7, 1.0, 3) * np.array([1.9, 0.8, 0.8]) * rng.choice([-1, 1], 3)
         phase = transform(p, wave.astype(np.float32)[:, None])[..., 0] + np.float32(rng.uniform(0, 2 * pi))
         source += single(np.sin, phase)[..., None] * shift.astype(np.float32)
-        frames += single(np.cos, phase)[..., None, None] * np.outer(shift, wave).astype(np.float32)
+        jacobians += single(np.cos, phase)[..., None, None] * np.outer(shift, wave).astype(np.float32)
     turn = source[..., 0] / np.float32(_STRIPE) % 1
     dark = ramp(turn, -0.03, 0.05) * (1 - ramp(turn, 0.45, 0.53)) + ramp(turn, 0.97, 1.05)
     layer = np.floor(source[..., 0] / np.float32(_STRIPE)).astype(int)
@@ -67,7 +67,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     albedo *= (tint * (1 + np.float32(0.10) * grain + np.float32(0.08) * cloud))[..., None]
     hair = single(np.exp, -(((turn - 0.74) / 0.05) ** 2))
     albedo = mix(albedo, palette("8f6b4b")[0], np.float32(0.55) * hair)
-    return Sample("stripes", _quantise(albedo, rng), mask=turn < 0.5, frames=frames)
+    return Sample("stripes", _quantise(albedo, rng), mask=turn < 0.5, jacobians=jacobians)
 
 
 def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:

@@ -1,4 +1,4 @@
-"""Source maps: for each output pixel, which exemplar it comes from, where, and in which local frame.
+"""Source maps: for each output pixel, which exemplar it comes from, where, and in which local jacobian.
 
 Every pipeline of texrs makes one. The picture is only the exemplar looked up through it, so the same map serves each
 map that is in register with the exemplar: colours, normals, heights, labels, in any dtype and with any channels.
@@ -44,7 +44,7 @@ class SourceMap(Parted):
         Which exemplar.
     label : (...) uint32
         Which patch.
-    frame : None, (L, A, A) or (..., A, A) float32, or a field
+    jacobian : None, (L, A, A) or (..., A, A) float32, or a field
         The Jacobian J = dS/dp of each pixel's patch: none (the identity), a table by label, dense, or a field of
         `texrs.fields`, which is evaluated where it is needed. Its inverse says where the exemplar's axes point in the
         output.
@@ -68,8 +68,8 @@ class SourceMap(Parted):
     def __repr__(self) -> str:
         """Return its size, and those of the exemplars."""
         into = ", ".join(" x ".join(map(str, s)) for s in self.shapes[:4]) + ", ..." * (len(self.shapes) > 4)
-        frames = "" if self.frame is None else ", with frames"
-        return f"<SourceMap of {' x '.join(map(str, self.shape))} into {into}{frames}>"
+        jacobians = "" if self.jacobian is None else ", with Jacobians"
+        return f"<SourceMap of {' x '.join(map(str, self.shape))} into {into}{jacobians}>"
 
     def _repr_png_(self) -> bytes:
         """Show in a notebook where each pixel comes from, of a volume in its middle plane.
@@ -123,7 +123,7 @@ class SourceMap(Parted):
         shape: tuple[int, ...],
         *,
         label: NDArray[np.uint32] | None = None,
-        frame: NDArray[np.float32] | Frames | None = None,
+        jacobian: NDArray[np.float32] | Frames | None = None,
     ) -> SourceMap:
         """Return the map of a picture (or a volume) that was made from one exemplar.
 
@@ -135,7 +135,7 @@ class SourceMap(Parted):
             Sides of the exemplar, without channels.
         label : (...) uint32 array, optional
             The patch of each pixel; one patch by default.
-        frame : (L, A, A) or (..., A, A) float32 array, or field, optional
+        jacobian : (L, A, A) or (..., A, A) float32 array, or field, optional
             As the attribute; nothing is turned by default.
 
         Returns
@@ -166,7 +166,7 @@ class SourceMap(Parted):
         sides = coordinates.shape[:-1]
         check_memory(8 * coordinates.size, "coordinates")
         patches = np.zeros(sides, np.uint32) if label is None else label
-        return cls(coordinates, np.zeros(sides, np.uint16), patches, frame, (shape,))
+        return cls(coordinates, np.zeros(sides, np.uint16), patches, jacobian, (shape,))
 
     def finished(self, wrap: Sequence[bool], **how: Any) -> SourceMap:
         """Return the map of a picture that is finished in a way.
@@ -196,7 +196,7 @@ class SourceMap(Parted):
         """
         return replace(self, finish=Finish(as_wrap(wrap, axes=self.axes), **how))
 
-    def frames(self) -> NDArray[np.float32]:
+    def jacobians(self) -> NDArray[np.float32]:
         """Return the Jacobian J of every pixel.
 
         Returns
@@ -207,14 +207,14 @@ class SourceMap(Parted):
         Examples
         --------
         >>> from texrs import SourceMap
-        >>> SourceMap.identity((2, 3)).frames().shape
+        >>> SourceMap.identity((2, 3)).jacobians().shape
         (2, 3, 2, 2)
 
         """
-        frame = self.frame_array()
-        if frame is None:
+        jacobian = self.jacobian_array()
+        if jacobian is None:
             return np.broadcast_to(np.eye(self.axes, dtype=np.float32), (*self.shape, self.axes, self.axes))
-        return frame[self.label] if frame.ndim == 3 else frame
+        return jacobian[self.label] if jacobian.ndim == 3 else jacobian
 
     def render(
         self,
@@ -234,10 +234,10 @@ class SourceMap(Parted):
         interpolation : {"cubic", "linear", "nearest"}
             Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
         antialias : bool
-            Whether the exemplar is smoothed where the frames say that it is shrunk. Not for labels, nor with "nearest".
+            Whether the exemplar is smoothed where the Jacobians say that it is shrunk. Not for labels, nor with "nearest".
         map_type : {"colour", "normal", "vector", "slope"}
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
-            with the local frame. If z is not stored, only x and y turn, and the other channels are looked up as they are: the
+            with the local Jacobian. If z is not stored, only x and y turn, and the other channels stay as they are: the
             third channel is constant, holds other values, or is missing. "vector": directions on the surface, such as
             those of flow or of brushed metal. Channels x and y turn and keep their length, other channels do not turn. "slope":
             how much heights grow to the right and along y. In a volume all are directions in space, whose z, along the planes,
@@ -334,7 +334,7 @@ class SourceMap(Parted):
             near = np.floor(self.coordinates[band] + np.float32(0.5)).astype(np.int64)
             place[band] = inners.places(near, self.exemplar[band])
             rest[band] = self.coordinates[band] - near.astype(np.float32)
-        parts = inners.pick(place, self.label, self.frame_array(), rest if rest.any() else None)
+        parts = inners.pick(place, self.label, self.jacobian_array(), rest if rest.any() else None)
         return SourceMap(*parts, maps[0].shapes)
 
     @classmethod
@@ -488,7 +488,7 @@ class SourceMap(Parted):
         Returns
         -------
         SourceMap
-            With the frames as an array, and its finish.
+            With the Jacobians as an array, and its finish.
 
         Raises
         ------

@@ -88,8 +88,8 @@ def gather_smoothed(
 
 def find_shrinking(source: Parted) -> NDArray[np.float32]:
     """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
-    frame = source.frame_array()
-    if frame is None:
+    jacobian = source.jacobian_array()
+    if jacobian is None:
         return np.ones(source.shape, np.float32)
-    shrunk = power_single(np.abs(np.linalg.det(frame.astype(np.float64))), 1 / source.axes)
-    return np.asarray(shrunk[source.label] if frame.ndim == 3 else shrunk, np.float32)
+    shrunk = power_single(np.abs(np.linalg.det(jacobian.astype(np.float64))), 1 / source.axes)
+    return np.asarray(shrunk[source.label] if jacobian.ndim == 3 else shrunk, np.float32)

@@ -23,7 +23,7 @@ FORMAT = 1
 """Version of the file layout."""
 NAMES = ("texrs_source_map", "coordinates", "exemplar", "label", "shapes")
 LEAST = 2**26
-"""Bytes that a table of frames may have, however small the map."""
+"""Bytes that a table of Jacobians may have, however small the map."""
 
 Map = TypeVar("Map", bound=Parted)
 
@@ -39,8 +39,8 @@ def write_map(source: Parted, path: Path) -> None:
         "label": source.label,
         "shapes": np.array(source.shapes, np.int64),
     }
-    if (frame := source.frame_array()) is not None:
-        parts["frame"] = frame
+    if (jacobian := source.jacobian_array()) is not None:
+        parts["jacobian"] = jacobian
     if source.finish is not None:
         parts |= source.finish.arrays()
     with atomic(path) as temporary, open(temporary, "wb") as file:
@@ -59,7 +59,7 @@ def read_map(path: Path, make: type[Map]) -> Map:
         raise FileError(f"{path}: has another layout than {FORMAT}, which this version of texrs reads")
     try:
         shapes = tuple(tuple(int(n) for n in s) for s in parts["shapes"])
-        rest = (parts["label"], parts.get("frame"), shapes)
+        rest = (parts["label"], parts.get("jacobian", parts.get("frame")), shapes)
         made = make(parts["coordinates"], parts["exemplar"], *rest)
         if "finish" not in parts:
             return made
@@ -87,7 +87,7 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
         "exemplar": 2 * pixels,
         "label": 4 * pixels,
         "shapes": 8 * 3 * 2**16,
-        "frame": max(4 * len(shape) ** 2 * pixels, LEAST),
+        **dict.fromkeys(("jacobian", "frame"), max(4 * len(shape) ** 2 * pixels, LEAST)),
         "finish": 2**20,
         "finish/within": pixels,
         "finish/parts": 2 * pixels,

@@ -33,7 +33,7 @@ class Parted(ABC):
     coordinates: NDArray[np.float32]
     exemplar: NDArray[np.uint16]
     label: NDArray[np.uint32]
-    frame: NDArray[np.float32] | Frames | None
+    jacobian: NDArray[np.float32] | Frames | None
     shapes: tuple[tuple[int, ...], ...]
     finish: Finish | None = None
 
@@ -58,20 +58,22 @@ class Parted(ABC):
             if array.dtype != dtype or extent != shape:
                 raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
         # Whether it is a field is asked last: to look at all that a protocol names takes as long as all else here.
-        if isinstance(self.frame, np.ndarray):
-            table = self.frame.ndim == 3
-            wanted = self.frame.shape[:1] if table else shape
-            if self.frame.dtype != np.float32 or self.frame.shape != (*wanted, axes, axes):
+        if isinstance(self.jacobian, np.ndarray):
+            table = self.jacobian.ndim == 3
+            wanted = self.jacobian.shape[:1] if table else shape
+            if self.jacobian.dtype != np.float32 or self.jacobian.shape != (*wanted, axes, axes):
                 raise InvalidInput(
-                    f"frame: needs float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.frame.shape}"
+                    f"jacobian: needs float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.jacobian.shape}"
                 )
-            if table and self.label.size and int(self.label.max()) >= len(self.frame):
-                raise InvalidInput(f"frame: has {len(self.frame)} rows, but labels reach {int(self.label.max())}")
-        elif self.frame is not None:
-            if not isinstance(self.frame, Frames):
-                raise InvalidInput(f"frame: needs a NumPy array, a field or None, got {type(self.frame).__name__}")
-            if self.frame.axes != axes:
-                raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
+            if table and self.label.size and int(self.label.max()) >= len(self.jacobian):
+                raise InvalidInput(f"jacobian: has {len(self.jacobian)} rows, but labels reach {int(self.label.max())}")
+        elif self.jacobian is not None:
+            if not isinstance(self.jacobian, Frames):
+                raise InvalidInput(
+                    f"jacobian: needs a NumPy array, a field or None, got {type(self.jacobian).__name__}"
+                )
+            if self.jacobian.axes != axes:
+                raise InvalidInput(f"jacobian: the field has {self.jacobian.axes} axes, the map {axes}")
         if not isinstance(self.shapes, Sequence) or not all(_is_shape(s, axes) for s in self.shapes):
             raise InvalidInput(f"shapes: each needs {axes} sides, integers of at least 1, got {self.shapes}")
         if self.exemplar.size and int(np.asarray(self.exemplar).max()) >= len(self.shapes):
@@ -87,8 +89,8 @@ class Parted(ABC):
         """Number of axes, 2 or 3."""
         return self.label.ndim
 
-    def frame_array(self) -> NDArray[np.float32] | None:
-        """Return `frame` as an array.
+    def jacobian_array(self) -> NDArray[np.float32] | None:
+        """Return `jacobian` as an array.
 
         Returns
         -------
@@ -98,11 +100,11 @@ class Parted(ABC):
         Examples
         --------
         >>> from texrs import SourceMap
-        >>> SourceMap.identity((2, 3)).frame_array() is None
+        >>> SourceMap.identity((2, 3)).jacobian_array() is None
         True
 
         """
-        return self.frame.lattice(self.shape) if isinstance(self.frame, Frames) else self.frame
+        return self.jacobian.lattice(self.shape) if isinstance(self.jacobian, Frames) else self.jacobian
 
     @abstractmethod
     def render(self, *exemplars: Any, **options: Any) -> Array:
@@ -144,18 +146,18 @@ class Parted(ABC):
         )
         if not fits:
             raise InvalidInput(f"box: needs {self.axes} ranges within {self.shape}, got {box!r}")
-        frame = self.frame
-        if isinstance(frame, Frames):
+        jacobian = self.jacobian
+        if isinstance(jacobian, Frames):
             origin = [s.start or 0 for s in box]
-            frame = frame.lattice([s.stop - o for s, o in zip(box, origin, strict=True)], origin=origin)
-        elif frame is not None and frame.ndim > 3:
-            frame = frame[box]
+            jacobian = jacobian.lattice([s.stop - o for s, o in zip(box, origin, strict=True)], origin=origin)
+        elif jacobian is not None and jacobian.ndim > 3:
+            jacobian = jacobian[box]
         return replace(
             self,
             coordinates=self.coordinates[box],
             exemplar=self.exemplar[box],
             label=self.label[box],
-            frame=frame,
+            jacobian=jacobian,
             finish=None,
         )
 
@@ -321,10 +323,18 @@ def _read_parts(source: Parted, exemplars: Array | Sequence[Array], options: dic
     # What is wrong is said now, and not when a worker comes to it.
     first = source.part((slice(0, 1),) * source.axes).render(images, **options)
     channel = Channel.of(first, source.axes, labelled=options.get("interpolation") == "nearest")
-    frame = source.frame
-    if isinstance(frame, Frames):
-        frame = getattr(frame, "key", None) or source.frame_array()
-    said = (source.coordinates, source.exemplar, source.label, frame, source.shapes, *images, sorted(options.items()))
+    jacobian = source.jacobian
+    if isinstance(jacobian, Frames):
+        jacobian = getattr(jacobian, "key", None) or source.jacobian_array()
+    said = (
+        source.coordinates,
+        source.exemplar,
+        source.label,
+        jacobian,
+        source.shapes,
+        *images,
+        sorted(options.items()),
+    )
     return _Lookups(partial(_render_part, source, images, options), channel, said)
 
 

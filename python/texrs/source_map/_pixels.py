@@ -32,10 +32,10 @@ class Mapped(Protocol):
     def shape(self) -> tuple[int, ...]:
         """Sides of the picture."""
 
-    def frame_array(self) -> NDArray[np.float32] | None:
+    def jacobian_array(self) -> NDArray[np.float32] | None:
         """Return the Jacobians: none, by label, or dense."""
 
-    def frames(self) -> NDArray[np.float32]:
+    def jacobians(self) -> NDArray[np.float32]:
         """Return that of each pixel."""
 
 
@@ -52,7 +52,7 @@ class Pixels:
     label: NDArray[np.uint64]
     labels: int
     table: NDArray[np.float32] | None
-    """Frame of each label; none where all are the identity or some map has a frame for each pixel."""
+    """Frame of each label; none where all are the identity or some map has a Jacobian for each pixel."""
     pixels: NDArray[np.float32] | None
     """Frame of each pixel, where some map has one."""
 
@@ -63,15 +63,15 @@ class Pixels:
         counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
         offsets = np.cumsum([0, *counts]).astype(np.uint64)
         table = pixels = None
-        arrays = [m.frame_array() for m in maps]
+        arrays = [m.jacobian_array() for m in maps]
         if any(f is not None and f.ndim > 3 for f in arrays):
-            pixels = np.concatenate([m.frames().reshape(-1, axes, axes) for m in maps])
+            pixels = np.concatenate([m.jacobians().reshape(-1, axes, axes) for m in maps])
         elif any(f is not None for f in arrays):
             eye = np.eye(axes, dtype=np.float32)
             table = np.concatenate(
                 [
-                    np.broadcast_to(eye, (n, axes, axes)) if frame is None else frame[:n]
-                    for frame, n in zip(arrays, counts, strict=True)
+                    np.broadcast_to(eye, (n, axes, axes)) if jacobian is None else jacobian[:n]
+                    for jacobian, n in zip(arrays, counts, strict=True)
                 ]
             )
         return cls(
@@ -91,8 +91,8 @@ class Pixels:
         return self.label.size
 
     @property
-    def framed(self) -> bool:
-        """Whether some map has a frame for each pixel."""
+    def turned(self) -> bool:
+        """Whether some map has a Jacobian for each pixel."""
         return self.pixels is not None
 
     def places(self, point: NDArray[np.int64], which: NDArray[np.uint16]) -> NDArray[np.int64]:
@@ -104,12 +104,12 @@ class Pixels:
             place = place * side + point[..., axis]
         return place + self.first[which]
 
-    def frames(self, at: NDArray[np.integer]) -> NDArray[np.float32]:
-        """Return the frames at places in the row."""
-        return self.frames_of(self.label[at]) if self.pixels is None else self.pixels[at]
+    def jacobians(self, at: NDArray[np.integer]) -> NDArray[np.float32]:
+        """Return the Jacobians at places in the row."""
+        return self.jacobians_of(self.label[at]) if self.pixels is None else self.pixels[at]
 
-    def frames_of(self, label: NDArray[np.integer]) -> NDArray[np.float32]:
-        """Return the frames of labels."""
+    def jacobians_of(self, label: NDArray[np.integer]) -> NDArray[np.float32]:
+        """Return the Jacobians of labels."""
         axes = self.coordinates.shape[-1]
         if self.table is None:
             return np.broadcast_to(np.eye(axes, dtype=np.float32), (*label.shape, axes, axes))
@@ -119,43 +119,45 @@ class Pixels:
         self,
         place: NDArray[np.unsignedinteger],
         outer: NDArray[np.uint32],
-        frame: NDArray[np.float32] | None = None,
+        jacobian: NDArray[np.float32] | None = None,
         rest: NDArray[np.float32] | None = None,
         out: NDArray[np.uint32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.float32] | None]:
-        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner frame; ``out`` for labels may be ``outer``.
+        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner jacobian; ``out`` for labels may be ``outer``.
 
-        Returns the coordinates, exemplars, labels and frames of a source map.
+        Returns the coordinates, exemplars, labels and jacobians of a source map.
         """
         axes = place.ndim
         exemplar = np.empty(place.shape, np.uint16)
         coordinates = np.empty((*place.shape, axes), np.float32)
         label = np.empty(place.shape, np.uint32) if out is None else out
-        each = self.framed or (frame is not None and frame.ndim > 3)
-        frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
+        each = self.turned or (jacobian is not None and jacobian.ndim > 3)
+        jacobians = np.empty((*place.shape, axes, axes), np.float32) if each else None
         for band in divide_bands(place.shape):
             at = place[band]
             coordinates[band], exemplar[band] = self.coordinates[at], self.exemplar[at]
             if rest is not None:
-                coordinates[band] += turn_places(self.frames(at), rest[band])
-            if frames is not None:
-                frames[band] = self.frames(at)
-                if frame is not None:
-                    frames[band] = chain_frames(frames[band], frame[band] if frame.ndim > 3 else frame[outer[band]])
+                coordinates[band] += turn_places(self.jacobians(at), rest[band])
+            if jacobians is not None:
+                jacobians[band] = self.jacobians(at)
+                if jacobian is not None:
+                    jacobians[band] = chain_jacobians(
+                        jacobians[band], jacobian[band] if jacobian.ndim > 3 else jacobian[outer[band]]
+                    )
         keys = number_pairs(outer, self, place, label)
-        if frames is None and (frame is not None or self.table is not None):
+        if jacobians is None and (jacobian is not None or self.table is not None):
             outer_of, inner_of = np.divmod(keys, np.uint64(max(1, self.labels)))
-            frames = self.frames_of(inner_of)
-            frames = frames if frame is None else chain_frames(frames, frame[outer_of])
-        return coordinates, exemplar, label, frames
+            jacobians = self.jacobians_of(inner_of)
+            jacobians = jacobians if jacobian is None else chain_jacobians(jacobians, jacobian[outer_of])
+        return coordinates, exemplar, label, jacobians
 
 
-def turn_places(frames: NDArray[np.float32], places: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-    """Return products of matrices and vectors, in double precision for the same reason as in `chain_frames`."""
-    return np.asarray(np.einsum("...ij,...j->...i", frames, places, dtype=np.float64), np.float32)
+def turn_places(jacobians: NDArray[np.float32], places: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    """Return products of matrices and vectors, in double precision for the same reason as in `chain_jacobians`."""
+    return np.asarray(np.einsum("...ij,...j->...i", jacobians, places, dtype=np.float64), np.float32)
 
 
-def chain_frames(inner: NDArray[np.float32], outer: NDArray[np.float32]) -> NDArray[np.float32]:
+def chain_jacobians(inner: NDArray[np.float32], outer: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return products of matrices: in double precision, for BLAS differs in the last bit from processor to processor."""
     return np.asarray(np.einsum("...ij,...jk->...ik", inner, outer, dtype=np.float64), np.float32)
 

@@ -43,13 +43,13 @@ class Reuse:
 def find_continued(source: Parted, axis: int, *, wrap: bool = False) -> Bools:
     """Return where a pixel and the next one along an axis come from one piece of the exemplar."""
     joined = source.exemplar == np.roll(source.exemplar, -1, axis)
-    frame = source.frame_array()
-    # One coordinate at a time, for a dense frame of a large picture is many times its size.
+    jacobian = source.jacobian_array()
+    # One coordinate at a time, for a dense jacobian of a large picture is many times its size.
     for a in range(source.axes):
         place = source.coordinates[..., a]
         step: Any = np.float32(a == axis)
-        if frame is not None:
-            step = frame[:, a, axis][source.label] if frame.ndim == 3 else frame[..., a, axis]
+        if jacobian is not None:
+            step = jacobian[:, a, axis][source.label] if jacobian.ndim == 3 else jacobian[..., a, axis]
         joined &= np.abs(place + step - np.roll(place, -1, axis)) < 0.1
     if not wrap:
         joined[tuple(slice(None) if a != axis else -1 for a in range(source.axes))] = False

@@ -1,4 +1,4 @@
-"""Vectors that lie on a surface, turned with the frames that it is seen through."""
+"""Vectors that lie on a surface, turned with the Jacobians that it is seen through."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def stores_z(exemplars: Sequence[Array]) -> bool:
 
 
 def turn_all(source: Parted, vectors: Array, map_type: str, green: str, signed: bool, bare: bool = False) -> Array:
-    """Turn what was looked up through a map with its frames; ``signed`` and ``bare`` as for `turn_vectors`."""
+    """Turn what was looked up through a map with its Jacobians; ``signed`` and ``bare`` as for `turn_vectors`."""
     count = source.axes if bare or map_type != "normal" else 3
     what = "a normal map" if map_type == "normal" else "a map of vectors"
     if vectors.ndim != source.axes + 1 or vectors.shape[-1] < count:
@@ -66,32 +66,32 @@ def turn_all(source: Parted, vectors: Array, map_type: str, green: str, signed: 
         raise InvalidInput(f"exemplars: {what} needs shape ({sides}, {count}), got {vectors.shape}")
     if vectors.dtype == np.bool_:
         raise InvalidInput(f"exemplars: {what} cannot be bool")
-    frame = source.frame_array()
-    if frame is None:
+    jacobian = source.jacobian_array()
+    if jacobian is None:
         return vectors
     out = vectors.copy()
     # A band at a time, for what is computed of a pixel takes many times its size.
     for band in divide_bands(source.shape):
-        frames = frame[source.label[band]] if frame.ndim == 3 else frame[band]
+        jacobians = jacobian[source.label[band]] if jacobian.ndim == 3 else jacobian[band]
         how = {"down": green == "down", "signed": signed, "bare": bare}
-        out[band] = turn_vectors(vectors[band], frames.astype(np.float64), map_type, **how)
+        out[band] = turn_vectors(vectors[band], jacobians.astype(np.float64), map_type, **how)
     return out
 
 
 def turn_vectors(
-    vectors: Array, frames: NDArray[np.float64], map_type: str, *, down: bool, signed: bool, bare: bool = False
+    vectors: Array, jacobians: NDArray[np.float64], map_type: str, *, down: bool, signed: bool, bare: bool = False
 ) -> Array:
-    """Return vectors (..., C) as they are seen through frames (..., A, A), in their own dtype.
+    """Return vectors (..., C) as they are seen through jacobians (..., A, A), in their own dtype.
 
-    A surface h(S(p)) has the slope J^T grad h, so slopes turn with the transposed frame, and so do normals, which are brought
-    to unit length; of a step v of the exemplar J^-1 v is seen, whose length is kept. In a picture the z of normals stays as it
+    A surface h(S(p)) has the slope J^T grad h, so slopes turn with the transposed Jacobian, and so do normals, which get
+    unit length; of a step v of the exemplar J^-1 v is seen, whose length is kept. In a picture the z of normals stays as it
     is, in a volume it goes along the planes.
 
     Parameters
     ----------
     vectors : array
         Channels x, y and, of normals and in volumes, z.
-    frames : float64 array
+    jacobians : float64 array
         J, (row, column) or (plane, row, column).
     map_type : {"normal", "vector", "slope"}
         What they are.
@@ -102,7 +102,7 @@ def turn_vectors(
     bare : bool
         If True, only x and y of normals are stored, in a picture. Their z is computed; other channels stay as they are.
     """
-    axes = frames.shape[-1]
+    axes = jacobians.shape[-1]
     count = axes if bare or map_type != "normal" else 3
     integers = vectors.dtype.kind in "ui"
     scale, offset = find_scale(vectors.dtype, signed)
@@ -116,9 +116,9 @@ def turn_vectors(
     side = 1.0 if down else -1.0
     flat = np.stack([*((v[..., 2],) if axes == 3 else ()), v[..., 1] * side, v[..., 0]], axis=-1)
     if map_type != "vector":
-        turned = np.einsum("...ji,...j->...i", frames, flat)
+        turned = np.einsum("...ji,...j->...i", jacobians, flat)
     else:
-        turned = (_turn_step if axes == 2 else _turn_step_of_space)(frames, flat)
+        turned = (_turn_step if axes == 2 else _turn_step_of_space)(jacobians, flat)
         length = np.linalg.norm(flat, axis=-1, keepdims=True)
     rest = v[..., 2:] if axes == 2 else turned[..., :1]
     v = np.concatenate([turned[..., -1:], turned[..., -2:-1] * side, rest], axis=-1)
@@ -130,17 +130,17 @@ def turn_vectors(
     return out
 
 
-def _turn_step(frames: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turn_step(jacobians: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return J^-1 v but for the determinant of J, whose sign says which way."""
-    (a, b), (c, d) = np.moveaxis(frames, (-2, -1), (0, 1))
+    (a, b), (c, d) = np.moveaxis(jacobians, (-2, -1), (0, 1))
     turned = np.stack([d * step[..., 0] - b * step[..., 1], a * step[..., 1] - c * step[..., 0]], axis=-1)
     turned *= np.where(a * d < b * c, -1.0, 1.0)[..., np.newaxis]
     return turned
 
 
-def _turn_step_of_space(frames: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turn_step_of_space(jacobians: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the same in three axes, where the columns of the adjugate are products of the rows of J."""
-    first, second, third = np.moveaxis(frames, -2, 0)
+    first, second, third = np.moveaxis(jacobians, -2, 0)
     columns = [np.cross(second, third), np.cross(third, first), np.cross(first, second)]
     turned = sum((step[..., k : k + 1] * column for k, column in enumerate(columns)), np.zeros(step.shape))
     turned *= np.where((first * columns[0]).sum(axis=-1) < 0, -1.0, 1.0)[..., np.newaxis]

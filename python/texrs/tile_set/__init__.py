@@ -263,11 +263,11 @@ class TileSet(InParts):
         watch = stage(listen(progress), "window")
         start, sides = self._as_origin(origin), as_size(size, way=LARGER)
         source = self._source
-        frame = source.frame_array()
-        names, dense = list(self._maps), frame is not None and frame.ndim > 3
+        jacobian = source.jacobian_array()
+        names, dense = list(self._maps), jacobian is not None and jacobian.ndim > 3
         arrays: list[Array] = [source.coordinates, source.exemplar, source.label, *self._maps.values()]
-        if frame is not None and dense:
-            arrays.append(frame)
+        if jacobian is not None and dense:
+            arrays.append(jacobian)
         coordinates, exemplar, label, *found = self._read(start, sides, arrays)
         here = SourceMap(coordinates, exemplar, label, found[-1] if dense else frame, source.shapes)
         maps = dict(zip(names, found[: len(names)], strict=True))

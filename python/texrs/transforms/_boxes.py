@@ -71,7 +71,7 @@ def follow_boxes(
     count, piece = _find_pieces(source)
     # A pixel covers half of one to each side of its middle, and boxes count from the edge.
     row, column = (source.coordinates[..., axis].ravel() + 0.5 for axis in range(2))
-    area = np.abs(np.linalg.det(source.frames().astype(np.float64))).ravel()
+    area = np.abs(np.linalg.det(source.jacobians().astype(np.float64))).ravel()
     rows, columns = source.shapes[0]
     width = source.shape[1]
     found: list[NDArray[np.float64]] = []
@@ -96,7 +96,7 @@ def follow_boxes(
 
 def _find_pieces(source: SourceMap) -> tuple[int, NDArray[np.int32]]:
     """Return how many pieces of the exemplar are seen, and of which one each pixel is."""
-    frames, joined = source.frames(), []
+    frames, joined = source.jacobians(), []
     for axis in range(2):
         step = np.diff(source.coordinates, axis=axis)
         before = frames[:-1] if axis == 0 else frames[:, :-1]

@@ -186,7 +186,7 @@ class _Shown:
 
         shape, index = self.elements.shape, np.arange(self.elements.size).reshape(self.elements.shape)
         edges = []
-        frames = None if source.frame is None else source.frames()
+        frames = None if source.jacobian is None else source.jacobians()
         reach = np.ones(shape) if frames is None else np.linalg.norm(frames, axis=(-2, -1)) / len(shape) ** 0.5
         for axis in range(self.elements.ndim):
             (p, q), (i, j) = (_pair(a, axis) for a in (self.elements, index))

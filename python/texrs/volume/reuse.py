@@ -161,7 +161,7 @@ def _find_steps(source: SourceMap, field: Field | None, i: int, here: tuple[slic
         grid = np.stack(np.meshgrid(*map(np.arange, source.shape[1:]), indexing="ij"), axis=-1)[here]
         points = np.concatenate([np.full((*grid.shape[:-1], 1), i), grid], axis=-1)
         return np.asarray(field.jacobians(points)[..., along])
-    frame: Any = source.frame
+    frame: Any = source.jacobian
     if frame is None:
         return np.asarray(np.eye(source.axes, dtype=np.float32)[along])
     if frame.ndim == 3:
@@ -174,5 +174,5 @@ def _check(source: SourceMap, field: Field | None) -> Field | None:
     if not isinstance(source, SourceMap):
         raise InvalidInput(f"source: needs a source map, got {type(source).__name__}")
     check_field(field, source.axes)
-    frame: Any = source.frame
+    frame: Any = source.jacobian
     return frame if field is None and isinstance(frame, Field) else field

@@ -201,7 +201,7 @@ def scatter(
     SourceMap
 
     """
-    frames = ground.frame_array()
+    frames = ground.jacobian_array()
     table = [np.eye(2)] * (int(ground.label.max()) + 1) if frames is None else list(frames.astype(np.float64))
     size = ground.shape
     sheet = Sheet(

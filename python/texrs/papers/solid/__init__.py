@@ -364,11 +364,11 @@ def as_source(asked: Request, grown: Grown) -> SourceMap:
     """Return places as a source map: its frames are those of rigid patches, else the field's."""
     coordinates, shape = as_coordinates(grown.places, asked.region), asked.exemplar.shape
     if grown.patches is None:
-        return SourceMap.from_coordinates(coordinates, shape, frame=asked.field)
+        return SourceMap.from_coordinates(coordinates, shape, jacobian=asked.field)
     rigid = asked.field is not None and asked.field.constant is None and not grown.patches.bent
     frame = grown.patches.frames if rigid else asked.field
     labels = grown.patches.labels.reshape(asked.region.shape)
-    return SourceMap.from_coordinates(coordinates, shape, label=labels, frame=frame)
+    return SourceMap.from_coordinates(coordinates, shape, label=labels, jacobian=frame)
 
 
 def as_coordinates(places: Places, region: Region) -> Array:

@@ -395,7 +395,7 @@ class Texture(Endless):
         places, frames = self._carry_on(at.reshape(-1, self.axes), progress)
         row = (*(1,) * (self.axes - 1), len(places))
         frame = None if frames is None else frames.reshape(*row, self.axes, self.axes)
-        return SourceMap.from_coordinates(places.reshape(*row, self.axes), self._exemplar.shape, frame=frame)
+        return SourceMap.from_coordinates(places.reshape(*row, self.axes), self._exemplar.shape, jacobian=frame)
 
     def _carry_on(
         self, at: NDArray[np.float64], progress: Progress | None
@@ -428,11 +428,11 @@ class Texture(Endless):
         if isinstance(self._world, World):
             places = self._world.read(region, progress)
             coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
-            return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, frame=field)
+            return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, jacobian=field)
         places, labels, frames = self._world.look(region, progress)
         coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
         frame = frames if varies and not self._world.bent else field
-        return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, label=labels, frame=frame)
+        return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, label=labels, jacobian=frame)
 
     def _check(self, region: Region) -> None:
         beside = 0 if self._quality == "fast" else WORK

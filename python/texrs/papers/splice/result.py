@@ -46,7 +46,7 @@ def compose(
     shape = (a.mask.shape[0], a.mask.shape[1])
     size = label.shape
     frames = _make_frames(filled.mirrored)
-    source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, frame=frames)
+    source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, jacobian=frames)
     source = say_finish(source, screening)
     image = source.render(a.image, interpolation="nearest")
     if screening:
