@@ -129,8 +129,8 @@ VERBS: dict[str, Callable[[Given], Call]] = {
     "SolidTexture.window": lambda g: bind(texrs.SolidTexture(g.volume).window, (0, 0, 0), 64),
     "SolidTexture.slice": lambda g: bind(texrs.SolidTexture(g.volume).slice, (0, 0, 0), (1, 1, 0), size=96),
     "SourceMap.to_zarr": lambda g: bind(g.made.source.to_zarr, g.folder + "/map.zarr", g.picture),
-    "lazy.map": lambda g: bind(
-        texrs.lazy.map, functools.partial(texrs.synthesize, g.picture, SIDE), g.seeds, g.folder + "/many.zarr"
+    "stores.map_to_zarr": lambda g: bind(
+        texrs.stores.map_to_zarr, functools.partial(texrs.synthesize, g.picture, SIDE), g.seeds, g.folder + "/many.zarr"
     ),
     "paint": lambda g: bind(texrs.painting.paint, g.ball, texrs.SolidTexture(g.volume), scale=40, atlas=256),
     "turntable": lambda g: bind(texrs.volume.turntable, g.volume, g.folder + "/turn.gif", frames=8),

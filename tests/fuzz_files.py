@@ -117,7 +117,7 @@ def make_folders(folder: Path) -> Iterator[tuple[Path, Path, list[Reader]]]:
         texrs.PlaneTexture(sample.image).to_zarr(folder / "store.zarr", (64, 64), (32, 32))
         store = folder / "store.zarr"
         for file in sorted(p for p in store.rglob("*") if p.is_file())[:6]:
-            yield store, file, [limited(tio.read), texrs.lazy.open]
+            yield store, file, [limited(tio.read), texrs.stores.open_store]
 
 
 def limit_memory() -> None:

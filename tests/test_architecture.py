@@ -39,7 +39,7 @@ LAYERS = (
     ("tiling",),
     ("inpainting",),
     ("papers",),
-    ("database", "extension", "lazy", "painting", "rectification", "removal", "tile_set", "transforms"),
+    ("database", "extension", "stores", "painting", "rectification", "removal", "tile_set", "transforms"),
     ("_napari", "comparison", "demo"),
     ("cli",),
 )

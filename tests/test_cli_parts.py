@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import io, lazy, samples
+from texrs import io, samples, stores
 from texrs.cli import main
 from texrs.errors import InvalidInput, LimitExceeded
 
@@ -40,7 +40,7 @@ def test_a_solid_into_zarr(files: Path, workers: int | None, capsys: pytest.Capt
     assert "each worker takes up to" in said
     assert "9 chunks, of which 0 were there" in said
     wanted = texrs.SolidTexture(STRIPES, seed=3)[1:25, 7:27, -5:25]
-    assert np.array_equal(lazy.open(files / "out.zarr").compute(), wanted)
+    assert np.array_equal(stores.open_store(files / "out.zarr").compute(), wanted)
     assert main(words) == 0
     found = capsys.readouterr().err
     assert "9 chunks, of which 9 were there" in found
@@ -117,7 +117,9 @@ def test_workers_of_a_run_that_ends_end_too_and_the_store_is_gone_on_with(files:
     assert 3 <= len(there) < 81
     assert main([*words, f"{files}/a.zarr", "-q"]) == 0
     assert {p: p.stat().st_mtime_ns for p in there} == there
-    assert np.array_equal(lazy.open(files / "a.zarr").compute(), texrs.PlaneTexture(WEAVE, seed=3)[0:130, 0:130])
+    assert np.array_equal(
+        stores.open_store(files / "a.zarr").compute(), texrs.PlaneTexture(WEAVE, seed=3)[0:130, 0:130]
+    )
 
 
 def test_a_worker_that_leaves_tells_nothing_of_what_is_half_made() -> None:
@@ -164,7 +166,7 @@ def test_a_window_of_a_picture(files: Path) -> None:
     assert (
         main(["synthesize", f"{files}/weave.png", "-o", f"{files}/p.zarr", "--size", "70", "--chunks", "32", "-q"]) == 0
     )
-    assert np.array_equal(lazy.open(files / "p.zarr").compute(), texrs.PlaneTexture(WEAVE)[0:70, 0:70])
+    assert np.array_equal(stores.open_store(files / "p.zarr").compute(), texrs.PlaneTexture(WEAVE)[0:70, 0:70])
 
 
 @pytest.mark.parametrize(

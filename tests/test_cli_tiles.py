@@ -52,12 +52,12 @@ def test_windows_of_pictures_and_of_materials(here: Path, tiles: texrs.TileSet) 
 
 
 def test_windows_larger_than_memory(here: Path, tiles: texrs.TileSet) -> None:
-    lazy = pytest.importorskip("texrs.lazy")
+    stores = pytest.importorskip("texrs.stores")
     pytest.importorskip("zarr")
     words = ["--size", "90x70", "--chunks", "64", "--origin", f"5,{FAR}", *OPTIONS]
     assert main(["tiles", "dots.png", "-o", "w.zarr", *words]) == 0
     wanted = tiles[FAR : FAR + 70, 5:95]
-    assert np.array_equal(lazy.open("w.zarr").compute(), wanted)
+    assert np.array_equal(stores.open_store("w.zarr").compute(), wanted)
     assert main(["tiles", "dots.png", "-o", "w.raw", *words]) == 0
     assert np.array_equal(io.read_volume("w.nhdr")[0], wanted)
 

@@ -184,7 +184,7 @@ def test_maps_of_no_shape_are_refused(shape):
             lambda: texrs.elements.Elements.of_labels(np.zeros((32, 32)), np.eye(32, dtype=int), layout=np.eye(2)),
             "layout: ",
         ),
-        (lambda: texrs.lazy.map(len, range(2**60), "no.zarr"), "items: "),
+        (lambda: texrs.stores.map_to_zarr(len, range(2**60), "no.zarr"), "items: "),
         (lambda: texrs.materials.guess_role(3), "name: "),
     ],
 )

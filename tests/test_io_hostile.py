@@ -263,7 +263,7 @@ def test_damaged_stores_and_encodings_are_refused_in_a_sentence(tmp_path):
     whole = head.read_bytes()
     for damaged in (whole[:-20], whole.replace(b'"', b"\xff"), b"[]"):
         head.write_bytes(damaged)
-        for read in (tio.read, texrs.lazy.open):
+        for read in (tio.read, texrs.stores.open_store):
             with pytest.raises(TexrsError):
                 read(store)
     path = tmp_path / "v.tif"

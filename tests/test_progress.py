@@ -140,9 +140,9 @@ def test_items_that_are_stopped_have_not_failed(tmp_path: Path):
     pytest.importorskip("zarr")
     make = partial(texrs.synthesize, texrs.samples.dots((64, 64)).image, 64)
     with pytest.raises(Stop):
-        texrs.lazy.map(make, [{"seed": 1}, {"seed": 2}], tmp_path / "a.zarr", progress=stop)
+        texrs.stores.map_to_zarr(make, [{"seed": 1}, {"seed": 2}], tmp_path / "a.zarr", progress=stop)
     told: list[float] = []
-    texrs.lazy.map(make, [{"seed": 1}], tmp_path / "b.zarr", progress=lambda stage, share: told.append(share))
+    texrs.stores.map_to_zarr(make, [{"seed": 1}], tmp_path / "b.zarr", progress=lambda stage, share: told.append(share))
     # While it is made, and when it is.
     assert told.count(0.0) > 1
     assert told[-1] == 1.0

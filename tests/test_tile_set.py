@@ -121,7 +121,7 @@ def test_dask_and_zarr(stones: texrs.TileSet, tmp_path: Path) -> None:
     assert wanted is not None
     assert np.array_equal(lazily.compute(scheduler="threads"), wanted["height"].pixels)
     done = stones.to_zarr(tmp_path / "t.zarr", (100, 70), 64, origin=(FAR, 5))
-    assert np.array_equal(texrs.lazy.open(done.path, "labels").compute(), wanted["labels"].pixels)
+    assert np.array_equal(texrs.stores.open_store(done.path, "labels").compute(), wanted["labels"].pixels)
     assert stones.to_zarr(tmp_path / "t.zarr", (100, 70), 64, origin=(FAR, 5)).made == 0
 
 

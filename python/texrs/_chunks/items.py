@@ -63,7 +63,7 @@ def map_items(
     overwrite: bool = False,
     progress: Progress | bool | None = None,
 ) -> Stored:
-    """Compute a function for each item, and stream the results to a Zarr store (see `texrs.lazy.map`)."""
+    """Compute a function for each item, and stream the results to a Zarr store (see `texrs.stores.map_to_zarr`)."""
     begun, watch = time.monotonic(), listen(progress)
     if not callable(function):
         raise InvalidInput(f"function: needs a function, got {type(function).__name__}")

@@ -132,7 +132,7 @@ class InParts(ABC):
         ----------
         path : path_like
             A folder, which workers see too; a material's maps are a group each. Axes are (c, z, y, x) there, as OME-Zarr
-            wants it; `texrs.lazy.open` brings them back.
+            wants it; `texrs.stores.open_store` brings them back.
         shape : int, or one an axis
             Voxels along each axis.
         chunks : int, or one an axis, optional
@@ -157,7 +157,7 @@ class InParts(ABC):
 
         Returns
         -------
-        texrs.lazy.Stored
+        texrs.stores.Stored
             How many chunks there are, and were made.
 
         Raises
@@ -240,7 +240,7 @@ class InParts(ABC):
 
         Returns
         -------
-        texrs.lazy.Stored
+        texrs.stores.Stored
             How many chunks there are, and were made.
 
         Raises

@@ -53,7 +53,7 @@ class Stored:
 
     Examples
     --------
-    >>> from texrs.lazy import Stored
+    >>> from texrs.stores import Stored
     >>> Stored("large.zarr", (4096, 4096, 3), 64, 64, 12.5).made
     64
 

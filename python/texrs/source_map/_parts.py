@@ -216,7 +216,7 @@ class Parted(ABC):
     ) -> Stored:
         """Write what `render` returns to an OME-Zarr store, with its coarser levels: it is never in memory as a whole.
 
-        What a run that was stopped has left is gone on with. `texrs.lazy.open` and `texrs.io.read` read the store.
+        What a run that was stopped has left is gone on with. `texrs.stores.open_store` and `texrs.io.read` read the store.
 
         Parameters
         ----------
@@ -246,7 +246,7 @@ class Parted(ABC):
 
         Returns
         -------
-        texrs.lazy.Stored
+        texrs.stores.Stored
             How many chunks there are, and were made.
 
         Raises

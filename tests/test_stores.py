@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 import texrs
-from lazy_work import WEAVE, die, end, end_late, end_slowly, kill_once, outer, vary
-from texrs import fields, lazy, samples
-from texrs._chunks import store as stores
+from stores_work import WEAVE, die, end, end_late, end_slowly, kill_once, outer, vary
+from texrs import fields, samples, stores
+from texrs._chunks import store as zarr_store
 from texrs._chunks import workers
 from texrs._chunks.grid import Grid
 from texrs._chunks.pyramid import count_levels, halve_block
@@ -143,8 +143,8 @@ def test_source_maps_are_looked_up_into_a_store(tmp_path: Path, scheduler: int |
 def test_a_store_holds_the_windows_and_their_levels(tmp_path: Path) -> None:
     done = PLANE.to_zarr(tmp_path / "a.zarr", (90, 70), 32, origin=(-20, 5), spacing=(0.5, 0.25), unit="micrometer")
     assert (done.shape, done.chunks, done.made) == ((90, 70, 3), 9 + 4 + 1, 14)
-    assert np.array_equal(lazy.open(done.path).compute(), PLANE[-20:70, 5:75])
-    half = lazy.open(done.path, level=1).compute()
+    assert np.array_equal(stores.open_store(done.path).compute(), PLANE[-20:70, 5:75])
+    half = stores.open_store(done.path, level=1).compute()
     assert half.shape == (45, 35, 3)
     whole = PLANE[-20:70, 5:75].astype(int)
     mean = (whole[::2, ::2] + whole[1::2, ::2] + whole[::2, 1::2] + whole[1::2, 1::2] + 2) // 4
@@ -166,12 +166,12 @@ def test_materials_are_a_group_each_and_classes_are_not_mixed(tmp_path: Path) ->
     wanted = stones.window(0, 40).material
     assert wanted is not None
     for name in MATERIAL:
-        assert np.array_equal(lazy.open(done.path, name).compute(), wanted[name].pixels)
-    assert lazy.open(done.path, "labels", level=1).dtype == np.bool_
+        assert np.array_equal(stores.open_store(done.path, name).compute(), wanted[name].pixels)
+    assert stores.open_store(done.path, "labels", level=1).dtype == np.bool_
     with pytest.raises(InvalidInput, match="name: there are albedo, height, labels"):
-        lazy.open(done.path)
+        stores.open_store(done.path)
     with pytest.raises(FileError, match="has no 'gloss'"):
-        lazy.open(done.path, "gloss")
+        stores.open_store(done.path, "gloss")
 
 
 def test_chunks_that_follow_each_other_lie_together() -> None:
@@ -240,9 +240,9 @@ def test_what_is_there_is_not_made_again(tmp_path: Path, monkeypatch: pytest.Mon
 def test_several_make_one_store(tmp_path: Path) -> None:
     def make(number: int) -> tuple[int, int]:
         path = tmp_path / f"{number // 6}.zarr"
-        group = stores.open_group(path, {"of": "a"}, {}, overwrite=False)
-        inner = stores._make_group(group, "height")
-        return stores.make_array(inner, "0", (4, 4), (2, 2), np.dtype("u1")).shape
+        group = zarr_store.open_group(path, {"of": "a"}, {}, overwrite=False)
+        inner = zarr_store._make_group(group, "height")
+        return zarr_store.make_array(inner, "0", (4, 4), (2, 2), np.dtype("u1")).shape
 
     with ThreadPoolExecutor(6) as pool:
         assert set(pool.map(make, range(120))) == {(4, 4)}
@@ -270,7 +270,7 @@ def test_another_thing_is_not_written_over(tmp_path: Path) -> None:
 
 def test_a_full_disk_leaves_no_half_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     writes = 0
-    plain = stores._write
+    plain = zarr_store._write
 
     def fill(store: str, place: str, *rest: Any) -> None:
         nonlocal writes
@@ -284,10 +284,10 @@ def test_a_full_disk_leaves_no_half_chunk(tmp_path: Path, monkeypatch: pytest.Mo
                 plain(store, place, *rest)
         plain(store, place, *rest)
 
-    monkeypatch.setattr(stores, "_write", fill)
+    monkeypatch.setattr(zarr_store, "_write", fill)
     with pytest.raises(FileError, match="No space left"):
         PLANE.to_zarr(tmp_path / "a.zarr", 100, 32)
-    monkeypatch.setattr(stores, "_write", plain)
+    monkeypatch.setattr(zarr_store, "_write", plain)
     assert PLANE.to_zarr(tmp_path / "a.zarr", 100, 32).made == 21 - 2
     PLANE.to_zarr(tmp_path / "b.zarr", 100, 32)
     assert digest(tmp_path / "a.zarr") == digest(tmp_path / "b.zarr")
@@ -352,48 +352,48 @@ def test_each_item_is_computed_once(how: Any, tmp_path: Path, client: Client) ->
     log = tmp_path / "log"
     items = [(seed, log) for seed in range(12)]
     scheduler = client if how == "cluster" else how
-    done = lazy.map(vary, items, tmp_path / "v.zarr", scheduler=scheduler)
+    done = stores.map_to_zarr(vary, items, tmp_path / "v.zarr", scheduler=scheduler)
     assert (done.made, done.chunks, done.shape) == (12, 12, (12,))
     assert sorted(map(int, log.read_text().split())) == list(range(12))
-    found = lazy.open(done.path)
+    found = stores.open_store(done.path)
     assert found.chunks == ((1,) * 12, (32,), (32,), (3,))
     assert np.array_equal(found.compute(), np.stack([vary(seed).image for seed in range(12)]))
     (Path(done.path) / "image" / "c" / "5" / "0" / "0" / "0").unlink()
-    assert lazy.map(vary, items, tmp_path / "v.zarr", scheduler=scheduler).made == 1
+    assert stores.map_to_zarr(vary, items, tmp_path / "v.zarr", scheduler=scheduler).made == 1
     assert log.read_text().split().count("5") == 2
 
 
 def test_a_matrix_of_several_maps_and_one_that_fails(tmp_path: Path) -> None:
     items = [(row, column) for row in range(3) for column in range(2)]
-    with pytest.raises(lazy.Failed, match=r"items: 1 failed: 3 \(ValueError: not this one\)") as caught:
-        lazy.map(outer, items, tmp_path / "m.zarr", shape=(3, 2), scheduler=2)
+    with pytest.raises(stores.Failed, match=r"items: 1 failed: 3 \(ValueError: not this one\)") as caught:
+        stores.map_to_zarr(outer, items, tmp_path / "m.zarr", shape=(3, 2), scheduler=2)
     assert list(caught.value.reasons) == [3]
-    sums = lazy.open(tmp_path / "m.zarr", "sum").compute()[..., 0]
+    sums = stores.open_store(tmp_path / "m.zarr", "sum").compute()[..., 0]
     assert np.array_equal(sums, [[0, 1], [1, 0], [2, 3]])
-    assert lazy.open(tmp_path / "m.zarr", "rows").shape == (3, 2, 2, 3)
-    with pytest.raises(lazy.Failed, match="items: 1 failed"):
-        lazy.map(outer, items, tmp_path / "m.zarr", shape=(3, 2))
+    assert stores.open_store(tmp_path / "m.zarr", "rows").shape == (3, 2, 2, 3)
+    with pytest.raises(stores.Failed, match="items: 1 failed"):
+        stores.map_to_zarr(outer, items, tmp_path / "m.zarr", shape=(3, 2))
 
 
 def test_results_of_other_shapes_are_named(tmp_path: Path) -> None:
-    with pytest.raises(lazy.Failed, match=r"2 \(function: gave float64 of shape \(3,\)"):
-        lazy.map(np.zeros, [2, 2, 3], tmp_path / "m.zarr")
+    with pytest.raises(stores.Failed, match=r"2 \(function: gave float64 of shape \(3,\)"):
+        stores.map_to_zarr(np.zeros, [2, 2, 3], tmp_path / "m.zarr")
     with pytest.raises(FileError, match="holds something else"):
-        lazy.map(np.zeros, [2, 2], tmp_path / "m.zarr")
-    lazy.map(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)  # Sent by cloudpickle.
-    assert lazy.open(tmp_path / "l.zarr").compute().tolist() == [[1, 1], [2, 2]]
+        stores.map_to_zarr(np.zeros, [2, 2], tmp_path / "m.zarr")
+    stores.map_to_zarr(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)  # Sent by cloudpickle.
+    assert stores.open_store(tmp_path / "l.zarr").compute().tolist() == [[1, 1], [2, 2]]
 
 
 def test_what_always_ends_its_worker_is_said(tmp_path: Path) -> None:
-    with pytest.raises(lazy.WorkerLost, match="ended 3 workers"):
-        lazy.map(die, range(5), tmp_path / "d.zarr", scheduler=2)
+    with pytest.raises(stores.WorkerLost, match="ended 3 workers"):
+        stores.map_to_zarr(die, range(5), tmp_path / "d.zarr", scheduler=2)
 
 
 def test_what_ends_its_worker_stops_no_other_where_that_is_asked_for() -> None:
     """Those that wait at a worker that ends are not to blame, however often it does."""
     found = dict(workers.run(end, range(8), 1, spare=True))
     assert {n: r for n, r in found.items() if n not in (2, 5)} == {n: n * n for n in range(8) if n not in (2, 5)}
-    assert all(isinstance(found[n], lazy.WorkerLost) for n in (2, 5))
+    assert all(isinstance(found[n], stores.WorkerLost) for n in (2, 5))
     assert "task 2: ended 3 workers" in str(found[2])
 
 
@@ -421,7 +421,7 @@ def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> Non
     """One that ends its workers is found among those that it was handed out with."""
     found = dict(workers.run(end_late, range(90), client, spare=True))
     assert {n: r for n, r in found.items() if n != 44} == {n: n * n for n in range(90) if n != 44}
-    assert isinstance(found[44], lazy.WorkerLost)
+    assert isinstance(found[44], stores.WorkerLost)
 
 
 def test_a_cluster_blames_no_task_that_waits_behind_the_one_that_ends_its_worker() -> None:
@@ -432,7 +432,7 @@ def test_a_cluster_blames_no_task_that_waits_behind_the_one_that_ends_its_worker
     ):
         found = dict(workers.run(end_slowly, range(4), alone, spare=True))
     assert {n: r for n, r in found.items() if n} == {n: n * n for n in range(1, 4)}
-    assert isinstance(found[0], lazy.WorkerLost)
+    assert isinstance(found[0], stores.WorkerLost)
 
 
 @pytest.mark.parametrize("error", [AssertionError(), OSError("timed out"), ValueError("no port")])
@@ -474,14 +474,17 @@ def test_wrong_arguments(tmp_path: Path) -> None:
         (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, scheduler=1.5), "scheduler: needs None"),
         (lambda: PLANE.to_zarr(tmp_path / "y.zarr", 40, scheduler=0), "scheduler: needs an integer"),
         (lambda: PLANE.to_dask(2**41), "shape"),
-        (lambda: lazy.map(7, [1], tmp_path / "x.zarr"), "function: needs"),  # type: ignore[arg-type]
-        (lambda: lazy.map(np.zeros, [], tmp_path / "x.zarr"), "items: needs at least one"),
-        (lambda: lazy.map(np.zeros, [1, 2], tmp_path / "x.zarr", shape=(2, 2)), "shape: .* holds 4 items, got 2"),
+        (lambda: stores.map_to_zarr(7, [1], tmp_path / "x.zarr"), "function: needs"),  # type: ignore[arg-type]
+        (lambda: stores.map_to_zarr(np.zeros, [], tmp_path / "x.zarr"), "items: needs at least one"),
+        (
+            lambda: stores.map_to_zarr(np.zeros, [1, 2], tmp_path / "x.zarr", shape=(2, 2)),
+            "shape: .* holds 4 items, got 2",
+        ),
     ):
         with pytest.raises(InvalidInput, match=message):
             call()
     with pytest.raises(FileError, match="is no Zarr store"):
-        lazy.open(tmp_path / "none.zarr")
+        stores.open_store(tmp_path / "none.zarr")
 
 
 def test_the_metadata_are_json_that_others_read(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """How fast workers fill a store, what memory they take, and whether all is the same.
 
-Run ``python benches/lazy_table.py volume|items|matrix|tiles|model [--side 512] [--workers 1,2]``. Processor seconds are said
+Run ``python benches/stores_table.py volume|items|matrix|tiles|model [--side 512] [--workers 1,2]``. Processor seconds are said
 beside those of the wall, which count only where nothing else runs: their ratio is the efficiency that a quiet machine would
 show.
 """
@@ -24,7 +24,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import texrs
-from texrs import lazy, samples
+from texrs import samples, stores
 from texrs._chunks.grid import Grid
 from texrs._engine.pyramid import Region
 
@@ -69,7 +69,7 @@ def volume(given: argparse.Namespace, folder: str) -> None:
         path = f"{folder}/{workers}.zarr"
         with measure() as spent:
             texture.to_zarr(path, given.side, given.chunks, levels=given.levels, scheduler=workers, threads=1)
-        whole = lazy.open(path)
+        whole = stores.open_store(path)
         rng, same = np.random.default_rng(0), []
         for _ in range(given.windows):
             low = rng.integers(0, given.side - 40, 3)
@@ -160,12 +160,12 @@ def compute(given: argparse.Namespace, folder: str, function: functools.partial,
                     ) as cluster,
                     Client(cluster) as client,
                 ):
-                    lazy.map(work, items, path, shape=shape, key="bench", scheduler=client)
+                    stores.map_to_zarr(work, items, path, shape=shape, key="bench", scheduler=client)
             else:
-                lazy.map(
+                stores.map_to_zarr(
                     work, items[:count], path, shape=shape if count == len(items) else None, key="bench", threads=1
                 )
-        made = lazy.open(path, "image")
+        made = stores.open_store(path, "image")
         found[workers] = digest(made.reshape(-1, *made.shape[-3:])[: counts[0]].compute())
         lines = [line for each in Path(log).iterdir() for line in each.read_text().splitlines()]
         print(
@@ -211,7 +211,7 @@ def tiles(given: argparse.Namespace, folder: str) -> None:
         )
     with measure():
         made.to_zarr(f"{folder}/t.zarr", 4096, 1024, origin=(10**12, -(10**12)), levels=1, scheduler=2)
-    print(f"  by two workers {digest(lazy.open(f'{folder}/t.zarr').compute())}")
+    print(f"  by two workers {digest(stores.open_store(f'{folder}/t.zarr').compute())}")
 
 
 def main() -> None:

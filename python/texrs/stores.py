@@ -7,7 +7,7 @@ takes (`texrs.SolidTexture.estimate_memory`).
 
 Notes
 -----
-What a volume costs, by ``benches/lazy_table.py`` (``volume``, ``model``), on particles of 48^3 in chunks of 128^3: it is put
+What a volume costs, by ``benches/stores_table.py`` (``volume``, ``model``), on particles of 48^3 in chunks of 128^3: it is put
 together from boxes, here of 39^3, of about 0.06 processor seconds each, and a worker makes those twice that lie along the
 sides of what it makes. So the cost is how many boxes there are: for 1024^3 and ``cache_bytes=512 << 20`` 1.35 times as many
 as fill it by 1, 2 or 8 workers (1.49 times with half the cache), and 1.83 times by 64, which have 8 chunks each; for 512^3
@@ -39,7 +39,7 @@ from texrs._typing import Path, Progress
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path, translate_errors
 
-__all__ = ["Failed", "Stored", "WorkerLost", "map", "open"]
+__all__ = ["Failed", "Stored", "WorkerLost", "map_to_zarr", "open_store"]
 
 
 def __dir__() -> list[str]:
@@ -47,7 +47,7 @@ def __dir__() -> list[str]:
 
 
 @share_words
-def map(
+def map_to_zarr(
     function: Callable[..., Any],
     items: Sequence[Any],
     path: Path,
@@ -110,8 +110,8 @@ def map(
     >>> dots = texrs.samples.dots((64, 64)).image
     >>> vary = functools.partial(texrs.synthesize, dots, 48)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     done = texrs.lazy.map(vary, [{"seed": seed} for seed in range(4)], f"{folder}/dots.zarr")
-    ...     shape = texrs.lazy.open(f"{folder}/dots.zarr").shape
+    ...     done = texrs.stores.map_to_zarr(vary, [{"seed": seed} for seed in range(4)], f"{folder}/dots.zarr")
+    ...     shape = texrs.stores.open_store(f"{folder}/dots.zarr").shape
     >>> done.made, shape
     (4, (4, 48, 48, 3))
 
@@ -129,13 +129,13 @@ def map(
     )
 
 
-def open(path: Path, name: str | None = None, *, level: int = 0) -> Any:
+def open_store(path: Path, name: str | None = None, *, level: int = 0) -> Any:
     """Open what is stored as an array of Dask, with channels last.
 
     Parameters
     ----------
     path : path_like
-        A store that `map` or ``to_zarr`` wrote, or any OME-Zarr image.
+        A store that `map_to_zarr` or ``to_zarr`` wrote, or any OME-Zarr image.
     name : str, optional
         The map, where there are several.
     level : int
@@ -159,7 +159,7 @@ def open(path: Path, name: str | None = None, *, level: int = 0) -> Any:
     >>> plane = texrs.PlaneTexture(texrs.samples.weave((64, 64)).image)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     done = plane.to_zarr(f"{folder}/weave.zarr", 100, 64)
-    ...     texrs.lazy.open(f"{folder}/weave.zarr", level=1).shape
+    ...     texrs.stores.open_store(f"{folder}/weave.zarr", level=1).shape
     (50, 50, 3)
 
     """
