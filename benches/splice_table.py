@@ -7,7 +7,7 @@ tag, all of them (x, y). With ``--auto`` only the pictures are used. Without a f
 
 A line a texture, means over all other layouts: how it was put together, the share of targets with an element within .2 of its
 size (by the source map), how much of the wanted way was realised, the sharpness (mean gradient, over the texture's own), the
-same of the ground between separate elements alone, lines that break off (`texrs.judging`), how alike the results are on two
+same of the ground between separate elements alone, lines that break off (`texrs.metrics`), how alike the results are on two
 layouts (correlation), and the seconds of a processor. With ``--tears``, a module with `Judge(exemplar).scores(picture)`, the
 share of torn cells on its own layout and on others.
 """
@@ -26,7 +26,7 @@ from scipy.ndimage import binary_dilation
 
 import evaluators
 import texrs
-from texrs import elements, io, judging, samples
+from texrs import elements, io, metrics, samples
 from texrs.elements import Elements, Layout
 from texrs.errors import TexrsError
 from texrs.papers.splice.pictures import to_picture
@@ -140,7 +140,7 @@ def main() -> None:
             if theirs != mine:
                 made.append(result.image)
                 sharp = measure_sharpness(result.image) / measure_sharpness(a.image)
-                broken = judging.judge(a.image, result.source, result.image).broken
+                broken = metrics.evaluate(a.image, result.source, result.image).broken
                 ground = measure_ground(a, result)
                 numbers.append(
                     (measure_present(result), result.report["displacement_reached"], sharp, ground, broken, spent)

@@ -11,7 +11,7 @@ import numpy as np
 
 import texrs
 from texrs import fields, samples, scale_maps, volume
-from texrs.judging import judge
+from texrs.metrics import evaluate
 
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
@@ -242,7 +242,7 @@ def tell(figures: dict[str, Any], names: dict[str, str]) -> Measured:
 JUDGED = {
     "torn": "seams inside of elements, as a share of their outlines",
     "broken": "lines that break off at seams",
-    "fog": "detail that is missing beside seams",
+    "seam_blur": "detail that is missing beside seams",
     "repetition": "what is shown again exactly alike",
 }
 
@@ -250,17 +250,17 @@ JUDGED = {
 def design() -> tuple[Any, Measured]:
     example = samples.pebbles((128, 128)).image
     made = {PRINTED: texrs.design(example, 192, method="paper", seed=1), OURS: texrs.design(example, 192, seed=1)}
-    figures = {name: judge(example, each.source) for name, each in made.items()}
+    figures = {name: evaluate(example, each.source) for name, each in made.items()}
     return compare([("the example", example)], [(n, m.image) for n, m in made.items()]), tell(figures, JUDGED)
 
 
 def splice() -> tuple[Any, Measured]:
     a, b = (texrs.Elements.of_sample(samples.load(n, size=(160, 160))) for n in ("dots", "net"))
     made = {PRINTED: texrs.splice(a, b, method="paper", seed=1), OURS: texrs.splice(a, b, seed=1)}
-    figures = {name: judge(a.image, each.source) for name, each in made.items()}
+    figures = {name: evaluate(a.image, each.source) for name, each in made.items()}
     given = [("elements", a.image), ("layout", b.image)]
     return compare(given, [(n, m.image) for n, m in made.items()]), tell(
-        figures, {n: JUDGED[n] for n in ("torn", "fog")}
+        figures, {n: JUDGED[n] for n in ("torn", "seam_blur")}
     )
 
 
@@ -272,7 +272,7 @@ def perspective() -> tuple[Any, Measured]:
         name: texrs.perspective(floor.image, scale, target=turned, seed=3, **options)
         for name, options in ((PRINTED, {"method": "paper"}), (OURS, {}))
     }
-    figures = {name: judge(floor.image, each.source) for name, each in made.items()}
+    figures = {name: evaluate(floor.image, each.source) for name, each in made.items()}
     given = [("the example", floor.image), ("the scale asked for", scale_maps.picture(turned))]
     return compare(given, [(n, m.image) for n, m in made.items()]), tell(
         figures, {n: JUDGED[n] for n in ("torn", "broken")}

@@ -31,7 +31,7 @@ LAYERS = (
     ("exemplar",),
     ("elements",),
     ("volume", "layouts"),
-    ("synthesis", "judging"),
+    ("synthesis", "metrics"),
     ("_palettes",),
     ("_verbs",),
     ("quilting",),

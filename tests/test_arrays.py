@@ -83,7 +83,10 @@ VERBS = {
     "remove": (DISCS, lambda image: texrs.remove(image, NEAR, view=VIEW).image),
     "render": (PEBBLES, lambda image: texrs.SourceMap.identity((64, 64)).render(image)),
     "blend": (PEBBLES, lambda image: texrs.blend(texrs.SourceMap.identity((64, 64)), image, wrap=True)),
-    "judge": (PEBBLES, lambda image: texrs.judging.judge(image, texrs.SourceMap.identity((64, 64)), image=image).score),
+    "judge": (
+        PEBBLES,
+        lambda image: texrs.metrics.evaluate(image, texrs.SourceMap.identity((64, 64)), image=image).score,
+    ),
     "analyse": (PEBBLES, lambda image: texrs.elements.analyse(image).points),
     "segment": (PEBBLES, lambda image: texrs.exemplar.segment(image).elements),
     "find": (DISCS, lambda image: texrs.planes.find(image).slant),

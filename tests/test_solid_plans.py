@@ -7,7 +7,7 @@ import texrs
 from texrs import samples
 from texrs.cli import main
 from texrs.errors import InvalidInput
-from texrs.judging import judge
+from texrs.metrics import evaluate
 from texrs.papers.solid import plans
 
 
@@ -33,7 +33,7 @@ def test_seams_of_a_plain_texture_run_through_things():
     heap = texrs.Exemplar(samples.pebbles((128, 128)).image)
     torn = {
         plan: np.mean(
-            [judge(heap, texrs.synthesize(heap, 192, seed=seed, patches=plan).source).torn for seed in range(2)]
+            [evaluate(heap, texrs.synthesize(heap, 192, seed=seed, patches=plan).source).torn for seed in range(2)]
         )
         for plan in ("default", "unmasked")
     }
@@ -67,7 +67,14 @@ def test_plans_are_tried_once_an_exemplar():
     assert tried.count((1, "try")) == 0
     assert made[0].report["candidates"] == made[1].report["candidates"]
     assert set(made[0].report["candidates"]) == set(plans.PLANS)
-    assert set(made[0].report["candidates"]["default"]) == {"score", "torn", "broken", "fog", "repetition", "share"}
+    assert set(made[0].report["candidates"]["default"]) == {
+        "score",
+        "torn",
+        "broken",
+        "seam_blur",
+        "repetition",
+        "coverage",
+    }
 
 
 def test_without_elements_there_is_nothing_to_be_plain_about():

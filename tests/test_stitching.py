@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import _exemplar
 from texrs.exemplar.adjacency import classify, measure_adjacency
 from texrs.exemplar.instances import label_components
-from texrs.judging import judge
+from texrs.metrics import evaluate
 
 PARTICLES = samples.particles((64, 64, 64))
 FIELDS = {"none": None, "circular": fields.circular(), "zigzag": fields.zigzag(period=48)}
@@ -216,10 +216,10 @@ def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
     assert exemplar.instances is None
     assert exemplar.stitcher.guessed
     assert not exemplar.stitcher.separate
-    torn = [judge(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source).torn for seed in range(3)]
+    torn = [evaluate(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source).torn for seed in range(3)]
     monkeypatch.setattr(_exemplar, "guess_instances", lambda parts: None)
     # Said in another way, so that it is another exemplar, of which nothing is kept.
     unaware = texrs.Exemplar(picture, repeat=False, labels=False)
     assert not unaware.stitcher.guessed
-    before = [judge(exemplar, texrs.synthesize(unaware, 160, seed=seed).source).torn for seed in range(3)]
+    before = [evaluate(exemplar, texrs.synthesize(unaware, 160, seed=seed).source).torn for seed in range(3)]
     assert sum(torn) < 0.6 * sum(before), (torn, before)

@@ -26,7 +26,7 @@ Departures, with their reasons:
 - Holes are filled with background alone where the example has enough of it. Where it has not, what is left of an element in a
   heap whose place another one took stays. The inside of elements is never filled over: patches would tear them.
 - Where moved elements are judged clearly worse than the example as it is, they stay where they are, and variety comes from
-  patches alone: both are tried at a small size (see `texrs.judging`). In heaps of fruit, where elements can only be cut out
+  patches alone: both are tried at a small size (see `texrs.metrics`). In heaps of fruit, where elements can only be cut out
   roughly, torn outlines fall to a third.
 - Nothing is mirrored along an axis on which something tells the example from its mirror image (light from one side, leaves
   that hang), or at all where ``rotate=0`` says that it has an upper side, unless that is asked for. Nor is it turned where it

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from texrs.exemplar import ElementOptions, Exemplar
-from texrs.judging import judge
+from texrs.metrics import evaluate
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import deform_elements
@@ -106,4 +106,4 @@ def try_plan(
     )
     tiles, composite = make_composite([plan], small, TRIAL)
     image, _ = correct_colours(composite, look_up(composite, small), small)
-    return tiles, judge(exemplar, composite, image, elements=elements, wrap=True).report()
+    return tiles, evaluate(exemplar, composite, image, elements=elements, wrap=True).report()

@@ -236,7 +236,7 @@ def synthesize(
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         How patches are put together. "large": a quarter larger than the default, which tears fewer things and copies more in
         one piece. "unmasked": seams may run through elements. "auto": each is tried twice at the exemplar's size and judged
-        (`texrs.judging`), and what is clearly better than the default is taken; the report's "candidates" contains the
+        (`texrs.metrics`), and what is clearly better than the default is taken; the report's "candidates" contains the
         figures of each.
     method : {None, "paper", "paper-compensated"}
         Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of

@@ -1,7 +1,7 @@
 """How a picture is put together from patches: a few plans, each tried at a small size and judged.
 
 Larger patches tear fewer things, and copy more of the exemplar in one piece. Seams that keep out of what may be a thing are
-longer than they need be where it is none. Which matters more is seen in what comes of it (`texrs.judging`).
+longer than they need be where it is none. Which matters more is seen in what comes of it (`texrs.metrics`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from texrs._arrays import as_choice
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.growth import Start, from_patches
-from texrs.judging import Judgement, judge
+from texrs.metrics import Quality as TextureQuality
+from texrs.metrics import evaluate
 from texrs.papers.solid.settings import CANDIDATES, Quality
 from texrs.source_map import SourceMap
 
@@ -95,13 +96,13 @@ def choose_plan(
     names = [name for name in PLANS if stitcher.separate or stitcher.guessed or not PLANS[name].plain]
     tried = exemplar.remember(
         ("synthesis trials", quality),
-        lambda: {name: average([judge(exemplar, make(PLANS[name], seed)) for seed in TRIALS]) for name in names},
+        lambda: {name: average([evaluate(exemplar, make(PLANS[name], seed)) for seed in TRIALS]) for name in names},
     )
     best = min(names, key=lambda name: tried[name]["score"])
     return (best if tried[best]["score"] < CLEARLY * tried["default"]["score"] else "default"), tried
 
 
-def average(judgements: Sequence[Judgement]) -> Mapping[str, float]:
+def average(judgements: Sequence[TextureQuality]) -> Mapping[str, float]:
     """Return the mean of each figure."""
     reports = [j.report() for j in judgements]
     return {name: round(float(np.mean([r[name] for r in reports])), 4) for name in reports[0]}

@@ -1,6 +1,6 @@
 """How good a texture is, judged by where it comes from.
 
-Looked for are things that seams tear, lines that break off there, fog along seams, places that are shown again and again, and
+Looked for are things that seams tear, lines that break off there, blur along seams, places that are shown again and again, and
 what of the exemplar is never shown.
 
 A source map says where seams are, so only these are looked at, and an exemplar says what is usual: each figure counts what
@@ -26,7 +26,7 @@ from texrs.exemplar.shapes import mark_outlines
 from texrs.kernels.gather import gather
 from texrs.source_map import SourceMap
 
-__all__ = ["Judgement", "judge"]
+__all__ = ["Quality", "evaluate"]
 
 
 def __dir__() -> list[str]:
@@ -41,20 +41,20 @@ EDGE, TURNED = 85, 0.6
 """Percentile of the exemplar's gradients beyond which one is of a line, and the share of it that must be missing for a line to
 break off."""
 BAND = 3
-"""Pixels on both sides of a seam in which fog is looked for."""
+"""Pixels on both sides of a seam in which blur is looked for."""
 CELL = 8
 """Use is counted in cells of so many pixels a side."""
 GROUND = 0.1
 """What ground counts for, where there are elements."""
 ALIKE = 4
 """Frames are alike that are the same to so many steps a unit."""
-TORN, BROKEN, FOG, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.1, 0.1
+TORN, BROKEN, BLUR, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.1, 0.1
 """What the figures count for in the score."""
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
-    """What is wrong with a texture: 0 is the best of each figure but ``share``.
+class Quality:
+    """What is wrong with a texture: 0 is the best of each figure but ``coverage``.
 
     Attributes
     ----------
@@ -63,18 +63,18 @@ class Judgement:
         is seen that the exemplar does not have, a quarter counts.
     broken : float
         Lines that break off at seams, as a share of the same lines, beyond what is usual in the exemplar.
-    fog : float
+    seam_blur : float
         Detail that is missing beside seams, as a share of what the exemplar has there; 0 to 1.
     repetition : float
         How often what is shown is shown again exactly alike, those places that stand out counting for more, over what
         pieces drawn blindly would give: 0 for nothing twice, 1 as if so drawn, a quarter if they were mirrored, too.
-    share : float
+    coverage : float
         Share of the exemplar that is shown, 0 to 1, as far as there is room for it.
 
     Examples
     --------
-    >>> from texrs.judging import Judgement
-    >>> bad, good = Judgement(0.2, 0.1, 0.0, 0.5, 0.9), Judgement(0.0, 0.0, 0.0, 0.1, 0.9)
+    >>> from texrs.metrics import Quality
+    >>> bad, good = Quality(0.2, 0.1, 0.0, 0.5, 0.9), Quality(0.0, 0.0, 0.0, 0.1, 0.9)
     >>> good.score < bad.score
     True
 
@@ -82,15 +82,15 @@ class Judgement:
 
     torn: float
     broken: float
-    fog: float
+    seam_blur: float
     repetition: float
-    share: float
+    coverage: float
 
     @property
     def score(self) -> float:
         """All in one figure: the less, the better."""
-        flaws = TORN * self.torn + BROKEN * self.broken + FOG * self.fog
-        return flaws + REPETITION * self.repetition + UNUSED * (1 - self.share)
+        flaws = TORN * self.torn + BROKEN * self.broken + BLUR * self.seam_blur
+        return flaws + REPETITION * self.repetition + UNUSED * (1 - self.coverage)
 
     def report(self) -> dict[str, float]:
         """Return the figures and the score as JSON types.
@@ -102,22 +102,22 @@ class Judgement:
 
         Examples
         --------
-        >>> from texrs.judging import Judgement
-        >>> sorted(Judgement(0.2, 0.1, 0.0, 0.5, 0.9).report())
-        ['broken', 'fog', 'repetition', 'score', 'share', 'torn']
+        >>> from texrs.metrics import Quality
+        >>> sorted(Quality(0.2, 0.1, 0.0, 0.5, 0.9).report())
+        ['broken', 'coverage', 'repetition', 'score', 'seam_blur', 'torn']
 
         """
         return {name: round(value, 4) for name, value in {"score": self.score, **asdict(self)}.items()}
 
 
-def judge(
+def evaluate(
     exemplar: Array | Exemplar,
     source: SourceMap,
     image: Array | None = None,
     *,
     elements: ElementOptions = ElementOptions(),
     wrap: bool | tuple[bool, bool] = False,
-) -> Judgement:
+) -> Quality:
     """Judge a texture that was made from one exemplar.
 
     Parameters
@@ -127,7 +127,7 @@ def judge(
     source : SourceMap
         Where each pixel comes from, shape (h, w).
     image : (h, w) or (h, w, C) array, optional
-        The texture, if its colours were corrected; fog is looked for in it.
+        The texture, if its colours were corrected; blur is looked for in it.
     elements : ElementOptions
         How the elements of the exemplar are found.
     wrap : bool or (rows, columns)
@@ -135,7 +135,7 @@ def judge(
 
     Returns
     -------
-    Judgement
+    Quality
 
     Raises
     ------
@@ -145,12 +145,12 @@ def judge(
     Examples
     --------
     >>> import texrs
-    >>> from texrs.judging import judge
+    >>> from texrs.metrics import evaluate
     >>> pebbles = texrs.samples.pebbles((96, 96)).image
-    >>> judge(pebbles, texrs.SourceMap.identity((96, 96))).score
+    >>> evaluate(pebbles, texrs.SourceMap.identity((96, 96))).score
     0.0
     >>> made = texrs.synthesize(pebbles, 96)
-    >>> judge(pebbles, made.source).score > 0
+    >>> evaluate(pebbles, made.source).score > 0
     True
 
     """
@@ -162,15 +162,17 @@ def judge(
     cyclic = as_wrap(wrap)
     traits = known.remember(("traits", elements.key), lambda: measure_traits(known, elements))
     seams = [find_seam(source, axis, cyclic[axis]) for axis in range(2)]
-    fog = 0.0
+    seam_blur = 0.0
     if image is not None:
         pixels = guidance(as_image(image, "image"))
         if pixels.shape[:2] != source.shape:
             raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
-        fog = measure_fog(traits, source, seams, pixels)
-    repetition, share = measure_use(traits, source)
+        seam_blur = measure_blur(traits, source, seams, pixels)
+    repetition, coverage = measure_use(traits, source)
     area = source.shape[0] * source.shape[1]
-    return Judgement(measure_tears(traits, seams, area), measure_breaks(traits, seams, area), fog, repetition, share)
+    return Quality(
+        measure_tears(traits, seams, area), measure_breaks(traits, seams, area), seam_blur, repetition, coverage
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -349,7 +351,7 @@ def list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], al
     return found
 
 
-def measure_fog(traits: Traits, source: SourceMap, seams: list[Seam], image: Floats) -> float:
+def measure_blur(traits: Traits, source: SourceMap, seams: list[Seam], image: Floats) -> float:
     """Return the share of the detail that is missing beside seams, where the image should show what its sources do."""
     from scipy.ndimage import binary_dilation, laplace
 
@@ -362,7 +364,7 @@ def measure_fog(traits: Traits, source: SourceMap, seams: list[Seam], image: Flo
     band = binary_dilation(near, iterations=BAND - 1) & ~near
     if not band.any():
         return 0.0
-    # What is scaled or turned is softer, but not in fog: the source itself says what there should be.
+    # What is scaled or turned is softer, but not in seam_blur: the source itself says what there should be.
     wanted, shown = (
         np.abs(np.stack([laplace(seen[..., c]) for c in range(seen.shape[-1])], axis=-1)[band]).mean()
         for seen in (gather(traits.colours, source.coordinates, interpolation="cubic"), image)
@@ -387,8 +389,8 @@ def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
     shape = traits.colours.shape
     drawn = cell.size / (shape[0] * shape[1])
     repetition = float(again.sum() / (cell.size / CELL**2) / drawn)
-    share = min(1.0, float((area > CELL).mean()) / min(1.0, drawn))
-    return repetition, share
+    coverage = min(1.0, float((area > CELL).mean()) / min(1.0, drawn))
+    return repetition, coverage
 
 
 def number_frames(source: SourceMap) -> NDArray[np.intp] | None:

@@ -9,8 +9,8 @@ from scipy import ndimage
 import texrs
 from texrs import SourceMap, samples
 from texrs.errors import InvalidInput
-from texrs.judging import judge
 from texrs.kernels.gather import gather
+from texrs.metrics import evaluate
 
 GENERATED = ("pebbles", "beans", "leaves_and_flowers", "dots")
 PHOTOGRAPHS = {
@@ -53,22 +53,22 @@ def scramble(shape, seed, side=32):
 @pytest.mark.parametrize("name", NAMES)
 def test_real_pieces_are_ranked_over_results(name):
     image = picture(name)
-    real = judge(image, SourceMap.identity(image.shape[:2]))
+    real = evaluate(image, SourceMap.identity(image.shape[:2]))
     assert real.score == 0
-    assert real.share == 1
+    assert real.coverage == 1
     rows, columns = (np.arange(20, 140, dtype=np.float32) for _ in range(2))
     crop = SourceMap.from_coordinates(np.stack(np.meshgrid(rows, columns, indexing="ij"), -1), image.shape[:2])
     for made in (texrs.design(image, 160), texrs.synthesize(image, 160)):
-        result = judge(image, made.source, made.image)
-        assert result.score > judge(image, crop).score, result
+        result = evaluate(image, made.source, made.image)
+        assert result.score > evaluate(image, crop).score, result
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_results_are_ranked_over_blocks_from_anywhere(name):
     image = picture(name)
-    result = judge(image, texrs.synthesize(image, image.shape[:2]).source)
+    result = evaluate(image, texrs.synthesize(image, image.shape[:2]).source)
     for seed in range(2):
-        blocks = judge(image, scramble(image.shape[:2], seed))
+        blocks = evaluate(image, scramble(image.shape[:2], seed))
         assert result.broken < blocks.broken, (result, blocks)
         assert result.torn + result.broken < blocks.torn + blocks.broken, (result, blocks)
 
@@ -87,7 +87,7 @@ def test_things_laid_whole_are_ranked_over_torn_ones(name, seed):
         mask = np.roll(sample.labels == thing, shift, (0, 1))
         half = (box[1].stop - box[1].start) // 2
         whole, torn = paste(whole, mask, -shift), paste(torn, mask, -shift + (0, half))
-    a, b = judge(sample.image, whole), judge(sample.image, torn)
+    a, b = evaluate(sample.image, whole), evaluate(sample.image, torn)
     assert a.broken < b.broken, (a, b)
     assert a.torn + a.broken < b.torn + b.broken, (a, b)
 
@@ -104,21 +104,21 @@ def test_crisp_seams_are_ranked_over_fogged_ones(name):
     near = ndimage.binary_dilation(at_seam, iterations=4)
     near = near if crisp.ndim == 2 else near[..., np.newaxis]
     fogged = np.rint(np.where(near, soft, crisp)).astype(np.uint8)
-    clear, dim = judge(image, made.source, made.image), judge(image, made.source, fogged)
-    assert clear.fog < 0.1, clear
-    assert dim.fog > clear.fog + 0.2, dim
-    assert replace(dim, fog=clear.fog) == clear
+    clear, dim = evaluate(image, made.source, made.image), evaluate(image, made.source, fogged)
+    assert clear.seam_blur < 0.1, clear
+    assert dim.seam_blur > clear.seam_blur + 0.2, dim
+    assert replace(dim, seam_blur=clear.seam_blur) == clear
 
 
 def test_one_place_shown_again_and_again_is_told_from_a_whole_exemplar_shown_again():
     image = picture("pebbles")
     many = np.indices((320, 320)).transpose(1, 2, 0).astype(np.float32)
-    whole = judge(image, SourceMap.from_coordinates(many % 160, (160, 160)))
-    piece = judge(image, SourceMap.from_coordinates(many % 40, (160, 160)))
-    assert judge(image, SourceMap.identity((160, 160))).repetition == 0
+    whole = evaluate(image, SourceMap.from_coordinates(many % 160, (160, 160)))
+    piece = evaluate(image, SourceMap.from_coordinates(many % 40, (160, 160)))
+    assert evaluate(image, SourceMap.identity((160, 160))).repetition == 0
     assert 0.6 < whole.repetition < 1
     assert piece.repetition > 5
-    assert (whole.share, piece.share) == (1, 1 / 16)
+    assert (whole.coverage, piece.coverage) == (1, 1 / 16)
 
 
 def test_copies_that_are_mirrored_are_not_alike():
@@ -129,8 +129,8 @@ def test_copies_that_are_mirrored_are_not_alike():
     copied = SourceMap.from_coordinates(grid.copy(), (160, 160), label=label)
     grid[:, 160:, 1] = 159 - grid[:, 160:, 1]
     mirrored = SourceMap.from_coordinates(grid, (160, 160), label=label, jacobian=frames)
-    assert judge(image, copied).repetition > 0.4
-    assert judge(image, mirrored).repetition == 0
+    assert evaluate(image, copied).repetition > 0.4
+    assert evaluate(image, mirrored).repetition == 0
 
 
 def test_what_stands_out_counts_for_more():
@@ -138,7 +138,7 @@ def test_what_stands_out_counts_for_more():
     image[64:96, 64:96] = 1
     seen = np.indices((160, 160)).transpose(1, 2, 0).astype(np.float32)
     dull, bright = (
-        judge(image, paste(SourceMap.identity((160, 160)), (seen < 32).all(axis=-1), shift)) for shift in (96, 64)
+        evaluate(image, paste(SourceMap.identity((160, 160)), (seen < 32).all(axis=-1), shift)) for shift in (96, 64)
     )
     assert bright.repetition > 2 * dull.repetition
 
@@ -151,22 +151,22 @@ def test_frames_are_heeded_where_a_picture_is_mirrored():
     mirrored = SourceMap.from_coordinates(
         grid, (160, 160), jacobian=np.diag([1.0, -1.0]).astype(np.float32)[np.newaxis]
     )
-    assert judge(image, mirrored).score == 0
+    assert evaluate(image, mirrored).score == 0
 
 
 def test_cyclic_axes_are_looked_at_around_the_end():
     image = picture("pebbles")
     whole = SourceMap.identity((160, 160))
-    assert judge(image, whole, wrap=(False, False)).broken == 0
-    assert judge(image, whole, wrap=True).broken > 0
+    assert evaluate(image, whole, wrap=(False, False)).broken == 0
+    assert evaluate(image, whole, wrap=True).broken > 0
 
 
 def test_arguments_are_checked():
     image = picture("dots")
     with pytest.raises(InvalidInput, match="source"):
-        judge(image, SourceMap.identity((100, 100)))
+        evaluate(image, SourceMap.identity((100, 100)))
     with pytest.raises(InvalidInput, match="image"):
-        judge(image, SourceMap.identity((160, 160)), image[:80])
+        evaluate(image, SourceMap.identity((160, 160)), image[:80])
 
 
 def test_nothing_looked_up_keeps_its_channels():
