@@ -111,9 +111,9 @@ VERBS: dict[str, Callable[[Given], Call]] = {
     "extend": lambda g: bind(texrs.extend, g.floor, right=96, bottom=96),
     "rectify": lambda g: bind(texrs.rectify, g.floor),
     "remove": lambda g: bind(texrs.remove, g.floor, g.hole),
-    "blend": lambda g: bind(texrs.blend, g.made.source, g.picture, wrap=False),
-    "apply": lambda g: bind(texrs.apply, g.made.source, g.picture),
-    "Material.apply": lambda g: bind(g.material.apply, g.made.source),
+    "blend": lambda g: bind(texrs.blend, g.made.source_map, g.picture, wrap=False),
+    "apply": lambda g: bind(texrs.apply, g.made.source_map, g.picture),
+    "Material.apply": lambda g: bind(g.material.apply, g.made.source_map),
     "analyse": lambda g: bind(texrs.elements.analyse, g.picture),
     "segment": lambda g: bind(texrs.Exemplar(g.picture).segment),
     "similarity": lambda g: lambda watch: texrs.Exemplar(g.picture).similarity(-1, progress=in_one_stage(watch)),
@@ -128,7 +128,7 @@ VERBS: dict[str, Callable[[Given], Call]] = {
     "PlaneTexture.to_file": lambda g: bind(texrs.PlaneTexture(g.picture).to_file, g.folder + "/plane.tif", SIZE),
     "SolidTexture.window": lambda g: bind(texrs.SolidTexture(g.volume).window, (0, 0, 0), 64),
     "SolidTexture.slice": lambda g: bind(texrs.SolidTexture(g.volume).slice, (0, 0, 0), (1, 1, 0), size=96),
-    "SourceMap.to_zarr": lambda g: bind(g.made.source.to_zarr, g.folder + "/map.zarr", g.picture),
+    "SourceMap.to_zarr": lambda g: bind(g.made.source_map.to_zarr, g.folder + "/map.zarr", g.picture),
     "stores.map_to_zarr": lambda g: bind(
         texrs.stores.map_to_zarr, functools.partial(texrs.synthesize, g.picture, SIDE), g.seeds, g.folder + "/many.zarr"
     ),

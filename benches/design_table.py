@@ -89,16 +89,16 @@ def measure(
     for r in results:
         before = r.stages["before_blending"]
         found["D1"].append(checks.d1(image, r, size))
-        found["D2"].append(checks.d2(image, r.image, r.source))
-        found["D2b"].append(checks.d2b(image, before, r.image, r.source))
+        found["D2"].append(checks.d2(image, r.image, r.source_map))
+        found["D2b"].append(checks.d2b(image, before, r.image, r.source_map))
         found["D3"].append(checks.d3(r.image))
         found["D3b"].append(checks.d3b(r.image))
         found["D4"].append(checks.d4(image, r.image))
-        found["D6"].append(checks.d6(image, before, r.image, r.source))
+        found["D6"].append(checks.d6(image, before, r.image, r.source_map))
         found["D7"].append(checks.d7(image, r.image))
-        found["D8"].append(checks.d8(image, r.image, r.source, labels, r.report))
-        found["D12"].append(checks.d12(r.source))
-        found["D13"].append(checks.d13(r.source))
+        found["D8"].append(checks.d8(image, r.image, r.source_map, labels, r.report))
+        found["D12"].append(checks.d12(r.source_map))
+        found["D13"].append(checks.d13(r.source_map))
     records = {name: worst(records) for name, records in found.items()}
     records["D5"] = checks.d5(image, [r.image for r in results], results[0].report)
     return records, results, float(np.median(seconds))

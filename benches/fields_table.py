@@ -105,7 +105,7 @@ def main() -> None:
             for quality in ("fast", "preserve"):
                 began = time.process_time()
                 made = texrs.synthesize(image, asked.size, field=field, seed=asked.seed, quality=quality)
-                found[quality] = measure_seams(image, made.source), made.image, time.process_time() - began
+                found[quality] = measure_seams(image, made.source_map), made.image, time.process_time() - began
             (before, old, slow), (after, new, spent) = found["fast"], found["preserve"]
             share = measure_shares(image, new)
             ratios.append(after / max(before, 1e-9))

@@ -97,20 +97,20 @@ def main() -> None:
                 began = time.process_time()
                 made = texrs.solid(known, asked.size, field=field, seed=seed)
                 spent = time.process_time() - began
-                found = volume.integrity(known, made.source)
+                found = volume.integrity(known, made.source_map)
                 if found is None:
                     print(f"| {name} | {title} | {seed} | no separate elements |")
                     continue
                 shares = "-"
                 if kind is not None:
-                    shown = made.source.render(kind.astype(np.uint8), interpolation="nearest")
+                    shown = made.source_map.render(kind.astype(np.uint8), interpolation="nearest")
                     counts = [np.bincount(k.ravel().astype(int), minlength=6)[1:] / k.size for k in (kind, shown)]
                     ratio = counts[1] / counts[0]
                     shares = f"{ratio.min():.2f} to {ratio.max():.2f}"
                 print(
                     f"| {name} | {title} | {seed} | {found.contacts[1]:.2f} ({found.contacts[0]:.2f}) | {found.largest[1]:.3f} "
                     f"| {found.torn:.3f} | {found.mixed[1]:.3f} ({found.mixed[0]:.3f}) "
-                    f"| {found.density[1] / found.density[0]:.2f} | {shares} | {measure_copies(made.source):.2f} "
+                    f"| {found.density[1] / found.density[0]:.2f} | {shares} | {measure_copies(made.source_map):.2f} "
                     f"| {spent:.1f} |",
                     flush=True,
                 )

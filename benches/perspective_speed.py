@@ -43,7 +43,7 @@ def main() -> None:
             made = texrs.perspective(image, scale, side, seed=seed)
             wall.append(time.perf_counter() - start[0])
             cpu.append(time.process_time() - start[1])
-            source = made.source
+            source = made.source_map
             parts = (source.coordinates, source.exemplar, source.label, *made.stages.values())
             given = sum(part.nbytes for part in parts)
             del made, source, parts  # The next one is not to be counted with it.

@@ -81,7 +81,7 @@ def measure_ground(a: Elements, result: texrs.Synthesis) -> float:
         return float(np.hypot(*np.gradient(grey))[~binary_dilation(elements, iterations=CLEAR)].mean())
 
     own = steep(a.image, a.mask) if a.layout == Layout.DISJOINT else 0.0
-    return steep(result.image, result.source.label > 0) / own if own else np.nan
+    return steep(result.image, result.source_map.label > 0) / own if own else np.nan
 
 
 def measure_likeness(images: list[np.ndarray]) -> float:
@@ -95,7 +95,7 @@ def measure_present(result: texrs.Synthesis) -> float:
     report = result.report
     if "present" in report:
         return float(report["present"])
-    size = np.array(result.source.shape)
+    size = np.array(result.source_map.shape)
     inner = [m for m in report["matches"] if all(0 <= v <= n - 1 for v, n in zip(m["target"], size, strict=True))]
     return float(np.mean([m["found"] is not None for m in inner])) if inner else 1.0
 
@@ -140,7 +140,7 @@ def main() -> None:
             if theirs != mine:
                 made.append(result.image)
                 sharp = measure_sharpness(result.image) / measure_sharpness(a.image)
-                broken = metrics.evaluate(a.image, result.source, result.image).broken
+                broken = metrics.evaluate(a.image, result.source_map, result.image).broken
                 ground = measure_ground(a, result)
                 numbers.append(
                     (measure_present(result), result.report["displacement_reached"], sharp, ground, broken, spent)

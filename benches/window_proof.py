@@ -65,7 +65,7 @@ def ask(task: Task) -> tuple[list[tuple[int, bytes, bytes]], float]:
         for number, k in enumerate(rng.permutation(len(windows)).tolist()):
             least = max(j for j, every in enumerate(SELDOM) if number % every == every - 1)
             seen = kept[least].window(*windows[k])
-            found.append((k, seen.image.tobytes(), seen.source.coordinates.tobytes()))
+            found.append((k, seen.image.tobytes(), seen.source_map.coordinates.tobytes()))
     return found, time.process_time()
 
 
@@ -86,7 +86,7 @@ def prove(axes: int, field: str, windows: Sequence[Window], seed: int) -> tuple[
     """Ask all workers, print a line for each, and return how many windows there were and how many bytes differed."""
     began, half = time.perf_counter(), SIDE[axes] // 2
     whole = make_texture(axes, field, KEPT[0]).window((-half,) * axes, (SIDE[axes],) * axes)
-    image, coordinates = np.asarray(whole.image), np.asarray(whole.source.coordinates)
+    image, coordinates = np.asarray(whole.image), np.asarray(whole.source_map.coordinates)
     print(f"| {axes}-D | {field} | the whole | | | | {time.perf_counter() - began:.1f} |", flush=True)
     asked, differing = 0, 0
     for method in ("fork", "spawn"):

@@ -52,7 +52,7 @@ def colour_places(coordinates: Any, shape: tuple[int, ...]) -> Any:
 def source_map() -> Any:
     sample = samples.dots((112, 112))
     made = texrs.design(sample.image, (112, 160), seed=6)
-    source = made.source
+    source = made.source_map
     figure, panels = lay(4)
     show(panels[0], sample.image, "the example")
     show(panels[1], made.image, "the result: three of its pixels")
@@ -250,14 +250,14 @@ JUDGED = {
 def design() -> tuple[Any, Measured]:
     example = samples.pebbles((128, 128)).image
     made = {PRINTED: texrs.design(example, 192, method="paper", seed=1), OURS: texrs.design(example, 192, seed=1)}
-    figures = {name: evaluate(example, each.source) for name, each in made.items()}
+    figures = {name: evaluate(example, each.source_map) for name, each in made.items()}
     return compare([("the example", example)], [(n, m.image) for n, m in made.items()]), tell(figures, JUDGED)
 
 
 def splice() -> tuple[Any, Measured]:
     a, b = (texrs.Elements.of_sample(samples.load(n, size=(160, 160))) for n in ("dots", "net"))
     made = {PRINTED: texrs.splice(a, b, method="paper", seed=1), OURS: texrs.splice(a, b, seed=1)}
-    figures = {name: evaluate(a.image, each.source) for name, each in made.items()}
+    figures = {name: evaluate(a.image, each.source_map) for name, each in made.items()}
     given = [("elements", a.image), ("layout", b.image)]
     return compare(given, [(n, m.image) for n, m in made.items()]), tell(
         figures, {n: JUDGED[n] for n in ("torn", "seam_blur")}
@@ -272,7 +272,7 @@ def perspective() -> tuple[Any, Measured]:
         name: texrs.perspective(floor.image, scale, target=turned, seed=3, **options)
         for name, options in ((PRINTED, {"method": "paper"}), (OURS, {}))
     }
-    figures = {name: evaluate(floor.image, each.source) for name, each in made.items()}
+    figures = {name: evaluate(floor.image, each.source_map) for name, each in made.items()}
     given = [("the example", floor.image), ("the scale asked for", scale_maps.picture(turned))]
     return compare(given, [(n, m.image) for n, m in made.items()]), tell(
         figures, {n: JUDGED[n] for n in ("torn", "broken")}
@@ -286,7 +286,7 @@ def solid() -> tuple[Any, Measured]:
         name: texrs.solid(stone, 64, field=around, seed=1, **options)
         for name, options in ((PRINTED, {"method": "paper"}), (OURS, {}))
     }
-    figures = {name: volume.integrity(stone, each.source) for name, each in made.items()}
+    figures = {name: volume.integrity(stone, each.source_map) for name, each in made.items()}
     names = {"torn": "share of the voxels in elements that are torn", "crumbs": "crumbs of elements, in 100 000 voxels"}
     shown = [(n, volume.cube(m.image, 320)) for n, m in made.items()]
     return compare([("the example", volume.cube(stone, 240))], shown), tell(figures, names)

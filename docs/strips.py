@@ -277,7 +277,7 @@ def source_map() -> Iterator[Strip]:
     patches = (np.indices((176, 176)) // 44 * [[[4]], [[1]]]).sum(axis=0).astype(np.uint32)
     squares = texrs.SourceMap.from_coordinates(places.astype(np.float32), (144, 144), label=patches)
     field = {"large": "scale_ramp:start=5,stop=5", "small": "scale_ramp:start=0.3,stop=0.3"}
-    grown = {name: texrs.synthesize(weave, 144, field=words, seed=2).source for name, words in field.items()}
+    grown = {name: texrs.synthesize(weave, 144, field=words, seed=2).source_map for name, words in field.items()}
 
     def blend(screening: float | str) -> Picture:
         return (

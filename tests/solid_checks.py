@@ -83,7 +83,7 @@ def s2(exemplar: np.ndarray, made: Synthesis, still: Synthesis | None = None, sc
     Looked up at the nearest samples, for a look-up between them smooths; but what is enlarged would get steps.
     """
     how: Interpolation = "nearest" if scale == 1 else "linear"
-    several = [exemplar, *(m.source.render(exemplar, interpolation=how) for m in (made, still) if m is not None)]
+    several = [exemplar, *(m.source_map.render(exemplar, interpolation=how) for m in (made, still) if m is not None)]
     window = min(64, *(n for i in several for n in i.shape[:3]))
     found = [volume.frequency(volume.lightness(i), window=window, whole=True) for i in several]
     ratio = found[1] / found[0]
@@ -108,7 +108,7 @@ def s3b(mask: np.ndarray, made: Synthesis, *, turned: bool = False) -> Found:
 
     They are counted in boxes of the exemplar's size, in whose borders as many are cut.
     """
-    there = made.source.render(mask.astype(np.uint8), interpolation="nearest") > 0
+    there = made.source_map.render(mask.astype(np.uint8), interpolation="nearest") > 0
     before = volume.particles(mask)
     found = []
     for corner in np.ndindex(2, 2, 2):
@@ -131,8 +131,8 @@ def s5(made: Synthesis, least: float = 0.65) -> Found:
 
     Of small volumes a few cells of the start are a large share: four may go on in one piece.
     """
-    reuse = volume.cell_reuse(made.source)
-    four = 4 * CELL**3 / made.source.label.size
+    reuse = volume.cell_reuse(made.source_map)
+    four = 4 * CELL**3 / made.source_map.label.size
     return Found(
         {
             "coherent": (reuse.coherent, least, 1),

@@ -82,7 +82,7 @@ def component(mask: NDArray[np.bool_], at: Points, h: int, w: int) -> NDArray[np
 
 def shapes(a: Elements, result: Synthesis) -> tuple[float, float]:
     """S4: overlap of the foreground of an element before and after, 5th percentile and median."""
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = a.mask[rows, columns]
     overlaps = []
     for target, source, _, (h, w) in windows(a, result, 1.0):
@@ -102,14 +102,14 @@ def copied(a: Elements, result: Synthesis) -> tuple[float, float | None]:
     known = {c.tobytes() for c in flat}
     out = colours(result.image).reshape(-1, flat.shape[1])
     share = float(np.mean([c.tobytes() in known for c in out[:: max(1, len(out) // 20000)]]))
-    number = result.source.label.astype(int)
+    number = result.source_map.label.astype(int)
     rigid = np.argwhere(number > 0)
     if not len(rigid):
         return share, None
     goals = np.array([m["found"] for m in result.report["matches"]])
     starts = np.array([m["point"] for m in result.report["matches"]])
     which = number[tuple(rigid.T)] - 1
-    away = (result.source.coordinates[tuple(rigid.T)] - starts[which]) - (rigid - goals[which])
+    away = (result.source_map.coordinates[tuple(rigid.T)] - starts[which]) - (rigid - goals[which])
     # Elements go by whole pixels.
     return share, float((np.abs(away) <= 1.01).all(axis=1).mean())
 
@@ -117,7 +117,7 @@ def copied(a: Elements, result: Synthesis) -> tuple[float, float | None]:
 def coherence(a: Elements, result: Synthesis, seed: int = 0) -> tuple[float, float] | None:
     """S8: RMS distance of 9 x 9 patches of ground to the texture's, p95, and over that of the texture to itself."""
     side = 9
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = a.mask[rows, columns]
     pictures = [(colours(a.image) / 255, a.mask), (colours(result.image) / 255, shown)]
     patches, corners = [], []
@@ -151,7 +151,7 @@ def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
     Colours in standard deviations of B's.
     """
     goals = np.array([m["found"] for m in result.report["matches"]])
-    number = result.source.label.astype(int)
+    number = result.source_map.label.astype(int)
     size = np.array(number.shape)
     inside = ((goals >= a.box[0] / 2) & (goals < size - a.box[1] / 2)).all(axis=1)
     centres, wanted = [], []
@@ -159,7 +159,7 @@ def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
     for k in np.flatnonzero(inside):
         pixels = np.argwhere(number == k + 1)
         if len(pixels):
-            offset = result.source.coordinates[tuple(pixels.T)] - starts[k]
+            offset = result.source_map.coordinates[tuple(pixels.T)] - starts[k]
             centres.append((pixels - offset).mean(axis=0))
             wanted.append(goals[k])
     found, goal = np.array(centres), np.array(wanted)
@@ -190,20 +190,20 @@ def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
 def doubled(a: Elements, result: Synthesis) -> float:
     """S12: the largest rigid region of the output over the largest element of the texture."""
     areas = np.bincount(label(a.mask)[0].ravel())[1:]
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
-    number = np.where(a.mask[rows, columns], result.source.label, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
+    number = np.where(a.mask[rows, columns], result.source_map.label, 0)
     return float(np.bincount(number.ravel())[1:].max() / areas.max())
 
 
 def share(a: Elements, result: Synthesis) -> float:
     """S13: the foreground's share of the output over that of as many mean elements as have targets in it."""
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = float(a.mask[rows, columns].mean())
     number, count = label(a.mask)
     areas = np.bincount(number.ravel())[1:]
     border = np.unique(np.concatenate([number[0], number[-1], number[:, 0], number[:, -1]]))
     whole = np.delete(areas, border[border > 0] - 1) if count else areas
     goals = np.array([m["found"] for m in result.report["matches"]])
-    size = np.array(result.source.shape)
+    size = np.array(result.source_map.shape)
     inside = ((goals >= 0) & (goals <= size - 1)).all(axis=1).sum()
     return shown / (inside * float(whole.mean()) / float(size.prod()))

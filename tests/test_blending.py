@@ -165,7 +165,7 @@ def test_seams_of_a_design_are_as_sharp_as_the_example():
     result = texrs.design(image, 160, seed=1, copies=2, motion="keep")
     parted = np.zeros((160, 160), bool)
     for axis in range(2):
-        crosses = ~result.source.continues(axis, wrap=True)
+        crosses = ~result.source_map.continues(axis, wrap=True)
         parted |= crosses | np.roll(crosses, 1, axis)
     band = distance_transform_edt(~parted) < 3
 
@@ -173,7 +173,7 @@ def test_seams_of_a_design_are_as_sharp_as_the_example():
         grey = picture.astype(np.float32).mean(axis=-1)
         return sum(np.abs(np.roll(grey, -1, axis) - grey) for axis in range(2)).astype(np.float32)
 
-    own = result.source.render(measure(image), interpolation="nearest")
+    own = result.source_map.render(measure(image), interpolation="nearest")
     assert 0.9 < measure(result.image)[band].mean() / own[band].mean() < 1.1
     assert np.abs(result.image.mean(axis=(0, 1)) - image.mean(axis=(0, 1))).max() < 12
 
@@ -385,7 +385,7 @@ def test_seams_disappear(designed):
     assert after["outliers"] < before["outliers"]
     assert after["mean"] <= 1.5
     assert after["outliers"] <= 0.03
-    assert measure_visibility(result.source, sample, result.image, wrap=True).outliers == after["outliers"]
+    assert measure_visibility(result.source_map, sample, result.image, wrap=True).outliers == after["outliers"]
 
 
 def test_away_from_seams_differences_stay(designed):
@@ -394,9 +394,9 @@ def test_away_from_seams_differences_stay(designed):
 
     _, result = designed
     before, after = (i.astype(float) for i in (result.stages["before_blending"], result.image))
-    near = np.zeros(result.source.shape, bool)
+    near = np.zeros(result.source_map.shape, bool)
     for axis in range(2):
-        at, beyond = _seams.list_seams(result.source, axis, True)
+        at, beyond = _seams.list_seams(result.source_map, axis, True)
         near[at] = near[beyond] = True
     far = distance_transform_edt(~near) > 3
     errors = np.concatenate(

@@ -43,7 +43,7 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
         copies=2,
     )
     assert (iio.imread("out.png") == expected.image).all()
-    assert (SourceMap.load("source.npz").coordinates == expected.source.coordinates).all()
+    assert (SourceMap.load("source.npz").coordinates == expected.source_map.coordinates).all()
     written = sorted(p.name for p in Path("stages").iterdir())
     assert written[0] == "01-segmentation.png"
     assert written[-1] == "report.json"

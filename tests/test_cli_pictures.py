@@ -55,7 +55,7 @@ def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, argume
     assert main(["tile", "in.png", "-o", "out.png", *arguments.split(), *more]) == 0
     expected = texrs.tile(COLOURS, **options)
     assert (iio.imread("out.png") == expected.image).all()
-    assert (SourceMap.load("s.npz").coordinates == expected.source.coordinates).all()
+    assert (SourceMap.load("s.npz").coordinates == expected.source_map.coordinates).all()
     assert sorted(p.name for p in Path("stages").iterdir()) == [
         "01-shifted.png",
         "02-source-regions.png",
@@ -80,7 +80,7 @@ def test_inpaint_writes_what_the_function_makes(here: Path, capsys: Capture) -> 
         COLOURS, HOLE, patch_size=10, boundary_width=2, allow_mirror=False, wrap=(False, True), seed=4
     )
     assert (iio.imread("out.png") == expected.image).all()
-    assert (SourceMap.load("s.npz").label == expected.source.label).all()
+    assert (SourceMap.load("s.npz").label == expected.source_map.label).all()
     assert (iio.imread("stages/01-known.png")[HOLE] == COLOURS[~HOLE].min()).all()
     out, err = capsys.readouterr()
     assert out == ""

@@ -118,14 +118,14 @@ def test_a_stack_of_each_convention_comes_back_in_register(key: str, tmp_path: P
     roles = {f"{CONVENTIONS[key].start}Stone02_1K{file.end}": file.role for file in CONVENTIONS[key].files}
     assert {each.file: each.role for each in material.values()} == roles
     result = texrs.design(material, 64, seed=1, deformation=TURNED, screening=None)
-    frames = result.source.jacobians()
+    frames = result.source_map.jacobians()
     assert (np.degrees(np.arctan2(frames[..., 1, 0], frames[..., 0, 0])) > 20).mean() > 0.1
     assert result.material is not None
     for how in ({}, {"convention": key}):
         files = result.material.save(tmp_path / f"out{len(how)}", **how)  # type: ignore[arg-type]
         assert sorted(f.stem for f in files) == sorted(pictures)
         for file in files:
-            expected = look_up(result.source, pictures[file.stem], roles[file.stem])
+            expected = look_up(result.source_map, pictures[file.stem], roles[file.stem])
             # Rounding of halves may differ in the last bit of a turned vector.
             assert np.abs(io.read(file).astype(int) - expected).max() <= (1 if roles[file.stem].normal else 0), (
                 file.stem
@@ -343,23 +343,23 @@ def test_normals_turn_by_x_and_y_and_the_rest_stays(held: str, dtype: str) -> No
     made = result.material["n"].pixels
     unit = made if dtype == "float32" else made / np.iinfo(dtype).max
     role = Role.LABPBR_NORMAL if held == "labPBR" else material["n"].role
-    fixed = look_up(result.source, picture, role) / 255 if picture.shape[-1] <= len(role.layout) else None
+    fixed = look_up(result.source_map, picture, role) / 255 if picture.shape[-1] <= len(role.layout) else None
     if fixed is not None:
         assert np.abs(unit - fixed).max() < 2.5 / 255
     for channel in range(2 if bare else 3, picture.shape[-1]):
-        plain = result.source.render(np.ascontiguousarray(stored[..., channel]))
+        plain = result.source_map.render(np.ascontiguousarray(stored[..., channel]))
         assert (made[..., channel] == plain).all()
     # The same by the functions for arrays.
-    again = texrs.apply(result.source, stored, map_type="normal", green="down")
+    again = texrs.apply(result.source_map, stored, map_type="normal", green="down")
     assert (again[..., :2] == made[..., :2]).all()
-    assert (result.source.render(stored, map_type="normal", green="down") == again).all()
+    assert (result.source_map.render(stored, map_type="normal", green="down") == again).all()
 
 
 @pytest.mark.parametrize("held", ["two channels", "B = 255", "labPBR"])
 def test_seams_of_normals_without_z_are_blended_as_those_with_z(held: str) -> None:
     full = Material({"albedo": DOTS.image, "normal_dx": encode(draw_normals(down=True))})
     bare = Material({"albedo": DOTS.image, "normal_dx": HELD[held]}, weights={"normal_dx": 0})
-    source = texrs.design(DOTS.image, 64, seed=1, deformation=TURNED).source
+    source = texrs.design(DOTS.image, 64, seed=1, deformation=TURNED).source_map
     wanted, made = full.apply(source)["normal_dx"].pixels, bare.apply(source)["normal_dx"].pixels
     assert np.abs(wanted[..., :2].astype(int) - made[..., :2]).max() <= 2
     if held == "B = 255":

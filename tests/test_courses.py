@@ -140,8 +140,8 @@ def test_upright_courses_are_laid_like_level_ones() -> None:
 def test_the_map_of_a_turned_wall_leads_back_to_it() -> None:
     wall = lay_wall((224, 224), (16, 36), turn=5.0, seed=7)
     made = texrs.design(wall, 256, seed=3, screening=None)
-    np.testing.assert_array_equal(made.source.render(wall), made.image)
-    frames = made.source.jacobians()
+    np.testing.assert_array_equal(made.source_map.render(wall), made.image)
+    frames = made.source_map.jacobians()
     # What is level in the texture climbs in the photograph.
     climbs = np.degrees(np.arctan2(frames[..., 0, 1], frames[..., 1, 1] * np.sign(frames[..., 1, 1])))
     assert np.abs(np.abs(climbs) - 5).max() < 1.5

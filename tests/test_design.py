@@ -39,10 +39,10 @@ def result(pebbles):
 def test_size_dtype_and_content(pebbles, result):
     assert result.image.shape == (160, 224, 3)
     assert result.image.dtype == np.uint8
-    assert result.source.shape == (160, 224)
+    assert result.source_map.shape == (160, 224)
     # Every colour comes from the exemplar: where coordinates are whole, exactly that sample.
-    whole = (result.source.coordinates == np.rint(result.source.coordinates)).all(axis=-1)
-    at = result.source.coordinates[whole].astype(int)
+    whole = (result.source_map.coordinates == np.rint(result.source_map.coordinates)).all(axis=-1)
+    at = result.source_map.coordinates[whole].astype(int)
     np.testing.assert_array_equal(result.stages["before_blending"][whole], pebbles[at[:, 0], at[:, 1]])
     assert whole.mean() > 0.3
 
@@ -64,13 +64,13 @@ def test_the_composite_is_what_the_source_map_shows_in_every_dtype(pebbles):
     for name, exemplar in stack.items():
         made = texrs.design(exemplar, 96, seed=2, copies=2)
         assert made.image.dtype == np.dtype(name)
-        expected = view(made.source, exemplar)
+        expected = view(made.source_map, exemplar)
         np.testing.assert_allclose(made.stages["before_blending"], expected, rtol=1e-6 * (name == "float32"))
 
 
 def test_depth_does_not_change_the_decisions(pebbles):
-    eight = texrs.design(pebbles, 96, seed=2, copies=2).source
-    sixteen = texrs.design(pebbles.astype(np.uint16) * 257, 96, seed=2, copies=2).source
+    eight = texrs.design(pebbles, 96, seed=2, copies=2).source_map
+    sixteen = texrs.design(pebbles.astype(np.uint16) * 257, 96, seed=2, copies=2).source_map
     np.testing.assert_array_equal(eight.coordinates, sixteen.coordinates)
 
 
@@ -260,7 +260,7 @@ SCRIPT = """
 import hashlib, os, sys, texrs
 def digest():
     made = texrs.design(texrs.samples.pebbles((96, 96)).image, (100, 120), seed=4, copies=2)
-    parts = (made.image, made.source.coordinates, made.source.label, made.source.jacobian)
+    parts = (made.image, made.source_map.coordinates, made.source_map.label, made.source_map.jacobian)
     return hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest()
 print(digest(), flush=True)
 if "fork" in sys.argv:

@@ -58,9 +58,9 @@ def measure(check, name, seed):
         case "d1":
             return checks.d1(example, result, SIZE)
         case "d2":
-            return checks.d2(example, result.image, result.source)
+            return checks.d2(example, result.image, result.source_map)
         case "d2b":
-            return checks.d2b(example, composite, result.image, result.source)
+            return checks.d2b(example, composite, result.image, result.source_map)
         case "d3":
             return checks.d3(result.image)
         case "d3b":
@@ -68,15 +68,15 @@ def measure(check, name, seed):
         case "d4":
             return checks.d4(example, result.image)
         case "d6":
-            return checks.d6(example, composite, result.image, result.source)
+            return checks.d6(example, composite, result.image, result.source_map)
         case "d7":
             return checks.d7(example, result.image)
         case "d12":
-            return checks.d12(result.source)
+            return checks.d12(result.source_map)
         case "d13":
-            found = checks.d13(result.source)
+            found = checks.d13(result.source_map)
             return replace(found, least=REGULAR) if name == "brick" else found
-    return checks.d8(example, result.image, result.source, truth(name), result.report)
+    return checks.d8(example, result.image, result.source_map, truth(name), result.report)
 
 
 CHECKS = ("d1", "d2", "d2b", "d3", "d3b", "d4", "d6", "d7", "d8", "d12", "d13")
@@ -105,7 +105,7 @@ def test_seams_of_brickwork_run_through_bricks_and_not_along_joints():
     for seed in SEEDS:
         result = made("brick", seed)
         assert "lattice" in result.report["reason"]
-        assert checks.d2(exemplar("brick"), result.image, result.source).mean <= 1.2
+        assert checks.d2(exemplar("brick"), result.image, result.source_map).mean <= 1.2
 
 
 def operations(result):
@@ -129,7 +129,7 @@ def test_d9_operations_obey_their_limits():
 def test_d9_the_log_and_the_frames_of_results_obey_them(name):
     result = made(name, 0)
     limits = {"rotate": result.report["rotate"], "translate": round(0.12 * min(exemplar(name).shape[:2]))}
-    found = checks.d9(operations(result), sequence=[], source=result.source, **limits)
+    found = checks.d9(operations(result), sequence=[], source=result.source_map, **limits)
     assert found.limits, found
     assert found.frames, found
 
@@ -137,10 +137,10 @@ def test_d9_the_log_and_the_frames_of_results_obey_them(name):
 def test_d10_several_exemplars():
     several = [exemplar(name) for name in ("pebbles", "dots", "grit")]
     result = texrs.design(several, (320, 320), seed=0, copies=2)
-    found = checks.d10(several, result.image, result.source)
+    found = checks.d10(several, result.image, result.source_map)
     assert found.passed, found
     composite = result.stages["before_blending"]
-    assert checks.d6(several[0], composite, result.image, result.source, several=True).passed
+    assert checks.d6(several[0], composite, result.image, result.source_map, several=True).passed
 
 
 def test_d11_threads_and_starts():
@@ -371,12 +371,12 @@ def test_d5_knows_how_much_textures_on_one_lattice_differ_at_most():
 def test_d6_fails_for_a_blur_and_for_a_drift_of_colour(pebbles, blur):
     result = made("pebbles", 0)
     composite = result.stages["before_blending"]
-    assert not checks.d6(pebbles, composite, composite, result.source).passed
-    found = checks.d6(pebbles, composite, blur, result.source)
+    assert not checks.d6(pebbles, composite, composite, result.source_map).passed
+    found = checks.d6(pebbles, composite, blur, result.source_map)
     assert found.p99 > 2
     assert not found.passed
     drift = np.clip(composite.astype(int) + 9, 0, 255).astype(np.uint8)
-    found = checks.d6(pebbles, composite, drift, result.source)
+    found = checks.d6(pebbles, composite, drift, result.source_map)
     assert found.median == 0
     assert not found.passed
 
@@ -530,7 +530,7 @@ def test_every_cheat_fails_somewhere(pebbles, blur, copy, noise, collage):
     source, repeated = copy
     mirrored = np.block([[[pebbles], [pebbles[:, ::-1]]], [[pebbles[::-1]], [pebbles[::-1, ::-1]]]])
     cheats = {
-        "blur": (made("pebbles", 0).source, blur),
+        "blur": (made("pebbles", 0).source_map, blur),
         "copy": (source, repeated),
         "mirrors": (source, np.ascontiguousarray(mirrored.reshape(*SIZE, 3))),
         "noise": (source, noise),

@@ -17,7 +17,7 @@ def three():
 
 
 def share_of(result, count):
-    return np.bincount(result.source.exemplar.ravel(), minlength=count) / result.source.exemplar.size
+    return np.bincount(result.source_map.exemplar.ravel(), minlength=count) / result.source_map.exemplar.size
 
 
 @pytest.mark.parametrize("weights", [None, [2, 1, 1], [0.7, 0.2, 0.1], [3, 0, 1]])
@@ -35,7 +35,7 @@ def test_a_map_is_obeyed_to_within_an_element(three, count):
     if count == 3:
         where[:80, :90] = 2
     result = texrs.design(three[:count], SIZE, weights=where, copies=1, wrap=False)
-    shown = result.source.exemplar
+    shown = result.source_map.exemplar
     away = np.stack([distance_transform_edt(where != which) for which in range(count)])
     away = np.take_along_axis(away, shown[np.newaxis].astype(int), axis=0)[0]
     # Pebbles are some 20 pixels large.
@@ -49,7 +49,9 @@ def test_a_map_is_obeyed_to_within_an_element(three, count):
 def test_a_map_of_weights_is_kept_place_by_place(three):
     ramp = np.linspace(0, 1, SIZE[1]) * np.ones((SIZE[0], 1))
     weights = np.stack([1 - ramp, ramp], axis=-1)
-    shown = np.stack([texrs.design(three[:2], SIZE, weights=weights, copies=1, seed=s).source.exemplar for s in (1, 2)])
+    shown = np.stack(
+        [texrs.design(three[:2], SIZE, weights=weights, copies=1, seed=s).source_map.exemplar for s in (1, 2)]
+    )
     assert shown.mean(axis=(1, 2)) == pytest.approx([0.5, 0.5], rel=0.03)
     assert shown[..., : SIZE[1] // 3].mean() < 0.3 < 0.7 < shown[..., -(SIZE[1] // 3) :].mean()
 
@@ -91,6 +93,6 @@ def test_one_exemplar_does_not_stain_another():
     flat = [np.full((64, 64, 3), value, np.uint8) for value in (40, 220)]
     result = texrs.design(flat, 96, copies=1)
     assert set(np.unique(result.image)) == {40, 220}
-    across = texrs.blend(result.source, flat, wrap=True)
+    across = texrs.blend(result.source_map, flat, wrap=True)
     assert len(np.unique(across)) > 2
-    assert (texrs.blend(result.source, flat, wrap=True, across=False) == result.image).all()
+    assert (texrs.blend(result.source_map, flat, wrap=True, across=False) == result.image).all()

@@ -156,12 +156,12 @@ def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
     times = np.linalg.solve(np.array(closing) @ lattice.vectors, size)
     assert np.abs(times - np.rint(times)).max() < 0.02
     # Shown as it is but for that; patches lie where it repeats, by a sixth of a period.
-    frames = np.abs(made.source.jacobians().reshape(-1, 2, 2)) - np.abs(np.linalg.inv(closing))
+    frames = np.abs(made.source_map.jacobians().reshape(-1, 2, 2)) - np.abs(np.linalg.inv(closing))
     assert np.abs(frames).max() < 0.01
     places = np.moveaxis(np.indices((200, 232)), 0, -1).astype(float)
-    looked = made.source.coordinates @ np.array(closing).T
-    plain = np.linalg.det(made.source.jacobians()) > 0
-    moved = (places - looked)[plain & (made.source.jacobians()[..., 0, 0] > 0)]
+    looked = made.source_map.coordinates @ np.array(closing).T
+    plain = np.linalg.det(made.source_map.jacobians()) > 0
+    moved = (places - looked)[plain & (made.source_map.jacobians()[..., 0, 0] > 0)]
     phase = np.exp(2j * np.pi * np.linalg.solve(np.array(closing) @ lattice.vectors, moved.T))
     assert (np.abs(phase.mean(axis=1)) > 0.6).all()
 
@@ -170,7 +170,7 @@ def test_a_lattice_is_not_stretched_where_nothing_goes_around():
     wall = samples.bricks((160, 160)).image
     made = texrs.design(wall, (200, 232), seed=1, copies=2, motion="keep", wrap=False)
     assert made.report["lattice_stretch"] == [None]
-    assert (np.abs(made.source.jacobians()) == np.eye(2)).all()
+    assert (np.abs(made.source_map.jacobians()) == np.eye(2)).all()
 
 
 def test_on_a_lattice_elements_move_by_its_shifts_alone():

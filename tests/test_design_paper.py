@@ -196,7 +196,7 @@ def test_completion_takes_the_best_match_of_a_centred_window():
 
 def test_the_composite_is_what_the_source_map_shows(pebbles, result):
     assert result.image.shape == (160, 192, 3)
-    np.testing.assert_array_equal(view(result.source, pebbles), result.stages["before_blending"])
+    np.testing.assert_array_equal(view(result.source_map, pebbles), result.stages["before_blending"])
 
 
 def test_unscreened_poisson_acts_and_keeps_the_border(result):
@@ -208,7 +208,7 @@ def test_unscreened_poisson_acts_and_keeps_the_border(result):
         for line in (0, -1):
             np.testing.assert_array_equal(np.take(result.image, line, axis), np.take(composite, line, axis))
     image = samples.pebbles((128, 128)).image
-    plain = texrs.blend(result.source, image, wrap=False, screening=0, outlines=False)
+    plain = texrs.blend(result.source_map, image, wrap=False, screening=0, outlines=False)
     np.testing.assert_array_equal(result.image, plain)
 
 
@@ -220,7 +220,7 @@ def test_screening_keeps_the_colours(result, pebbles):
         shift = image.astype(float) - result.stages["before_blending"]
         return np.abs(gaussian_filter(shift, (12, 12, 0))).max()
 
-    screened = texrs.blend(result.source, pebbles, wrap=False)
+    screened = texrs.blend(result.source_map, pebbles, wrap=False)
     assert drift(screened) < 0.5 * drift(result.image)
 
 

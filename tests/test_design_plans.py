@@ -33,7 +33,7 @@ def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
 
 
 def test_what_wins_small_wins_large(gravel, chosen):
-    scores = {p: evaluate(gravel, r.source, r.image, wrap=True).score for p, r in chosen.items()}
+    scores = {p: evaluate(gravel, r.source_map, r.image, wrap=True).score for p, r in chosen.items()}
     assert scores["auto"] <= min(scores.values()) / CLEARLY, scores
 
 
@@ -42,7 +42,7 @@ def test_still_elements_are_taken_where_moved_ones_are_torn():
     grass = np.ascontiguousarray(samples.photograph("grass").image[:160, :160])
     auto, move = (texrs.design(grass, 192, motion=plan) for plan in ("auto", "move"))
     assert auto.report["motion"] == ["keep"]
-    still, moved = (evaluate(grass, r.source, r.image, wrap=True) for r in (auto, move))
+    still, moved = (evaluate(grass, r.source_map, r.image, wrap=True) for r in (auto, move))
     assert still.torn < 0.8 * moved.torn, (still, moved)
     assert still.broken < 0.8 * moved.broken, (still, moved)
 
@@ -56,7 +56,7 @@ def test_still_elements_are_copied_as_they_are(chosen):
     still = chosen["keep"]
     assert still.report["holes"] == [0.0] * len(still.report["holes"])
     assert all(not entry.get("operations") for log in still.report["operations"] for entry in log)
-    frames = np.abs(still.source.jacobians())
+    frames = np.abs(still.source_map.jacobians())
     np.testing.assert_array_equal(frames, np.broadcast_to(np.eye(2), frames.shape))
     # Each mirror image serves once.
     shown = [tuple(log[0]["mirror"]) for log in still.report["operations"]]

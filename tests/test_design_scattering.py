@@ -32,7 +32,7 @@ def pebbles():
 
 
 def covered(result, which):
-    return float((result.source.exemplar == which).mean())
+    return float((result.source_map.exemplar == which).mean())
 
 
 @pytest.mark.parametrize("density", [0.05, 0.15, 0.3, 0.45])
@@ -42,12 +42,12 @@ def test_densities_are_kept(grit, pebbles, density, seed):
     [said] = result.report["density"]
     assert covered(result, 1) == pytest.approx(density, rel=0.03)
     assert (said["asked"], said["reached"]) == (density, pytest.approx(covered(result, 1), abs=1e-4))
-    assert said["things"] == np.unique(result.source.label[result.source.exemplar == 1]).size > 3
+    assert said["things"] == np.unique(result.source_map.label[result.source_map.exemplar == 1]).size > 3
 
 
 def test_things_are_whole_and_apart(grit, pebbles):
     result = texrs.design([grit, pebbles], SIZE, density=0.15, deformation=COPIED, copies=1, screening=None)
-    source = result.source
+    source = result.source_map
     whole = {e.label: int((e.distance > EDGE).sum()) for e in measure_elements(pebbles.labels) if not any(e.touches)}
     lies = source.exemplar == 1
     shown = np.where(lies, source.label, 0)
@@ -66,7 +66,7 @@ def test_a_map_says_where_how_much_lies(grit, pebbles):
     density = np.zeros(SIZE)
     density[:, 112:] = 0.3
     result = texrs.design([grit, pebbles], SIZE, density=density, copies=1, wrap=False)
-    lies = result.source.exemplar == 1
+    lies = result.source_map.exemplar == 1
     assert lies.mean() == pytest.approx(0.15, rel=0.03)
     # A thing reaches over by less than its half.
     assert lies[:, :100].mean() < 0.01
@@ -76,7 +76,7 @@ def test_a_map_says_where_how_much_lies(grit, pebbles):
 def test_a_map_may_rise_slowly(grit, flowers):
     density = 0.4 * np.linspace(0, 1, 384) * np.ones((256, 1))
     result = texrs.design([grit, flowers], (256, 384), density=density, copies=1, wrap=False)
-    lies, parts = result.source.exemplar == 1, [np.s_[:, k : k + 128] for k in (0, 128, 256)]
+    lies, parts = result.source_map.exemplar == 1, [np.s_[:, k : k + 128] for k in (0, 128, 256)]
     for part in parts:
         assert lies[part].mean() == pytest.approx(density[part].mean(), abs=0.06)
 
@@ -85,10 +85,10 @@ def test_later_exemplars_lie_above(grit, flowers, pebbles):
     result = texrs.design([grit, flowers, pebbles], SIZE, density=[0.3, 0.15], deformation=COPIED, copies=1)
     assert [covered(result, k) for k in (1, 2)] == pytest.approx([0.3, 0.15], rel=0.03)
     whole = {e.label: int((e.distance > EDGE).sum()) for e in measure_elements(pebbles.labels)}
-    top = result.source.exemplar == 2
-    for label in np.unique(result.source.label[top]):
-        mine = result.source.label == label
-        row, column = result.source.coordinates[mine].astype(int).T
+    top = result.source_map.exemplar == 2
+    for label in np.unique(result.source_map.label[top]):
+        mine = result.source_map.label == label
+        row, column = result.source_map.coordinates[mine].astype(int).T
         assert mine.sum() == whole[int(pebbles.labels[row[0], column[0]])]
 
 
@@ -107,7 +107,7 @@ def test_what_cannot_be_reached_is_said(grit, pebbles):
 
 def test_things_go_around_the_ends_of_cyclic_axes(grit, pebbles):
     result = texrs.design([grit, pebbles], 96, density=0.3, copies=1, wrap=(True, False), seed=2)
-    labels = np.where(result.source.exemplar == 1, result.source.label, 0)
+    labels = np.where(result.source_map.exemplar == 1, result.source_map.label, 0)
     around = (labels[0] == labels[-1]) & (labels[0] > 0)
     aside = (labels[:, 0] == labels[:, -1]) & (labels[:, 0] > 0)
     assert around.any()

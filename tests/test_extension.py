@@ -20,10 +20,10 @@ LARGER = texrs.extend(FLOOR, left=64, right=80, bottom=24, view=PLANE, seed=2)
 def test_nothing_known_changes() -> None:
     assert LARGER.image.shape == (184, 320, 3)
     np.testing.assert_array_equal(LARGER.image[:160, 64:240], FLOOR)
-    np.testing.assert_array_equal(LARGER.source.render(FLOOR, antialias=True), LARGER.stages["before_blending"])
-    np.testing.assert_array_equal(texrs.apply(LARGER.source, FLOOR), LARGER.image)
+    np.testing.assert_array_equal(LARGER.source_map.render(FLOOR, antialias=True), LARGER.stages["before_blending"])
+    np.testing.assert_array_equal(texrs.apply(LARGER.source_map, FLOOR), LARGER.image)
     inside = np.moveaxis(np.indices((160, 176)), 0, -1)
-    np.testing.assert_array_equal(LARGER.source.coordinates[:160, 64:240], inside)
+    np.testing.assert_array_equal(LARGER.source_map.coordinates[:160, 64:240], inside)
     assert LARGER.report["added"] == {"top": 0, "bottom": 24, "left": 64, "right": 80}
 
 
@@ -34,7 +34,7 @@ def test_it_is_the_same_plane() -> None:
     assert steep <= 12
     assert aside <= 25
     # Things are as large in what was added as they were beside it.
-    scales = np.abs(np.linalg.det(LARGER.source.jacobians()[:160, 250:310]))
+    scales = np.abs(np.linalg.det(LARGER.source_map.jacobians()[:160, 250:310]))
     assert 0.6 < np.median(scales) < 1.7
 
 
@@ -52,7 +52,7 @@ def test_a_sky_goes_on_above_the_floor_and_a_wall_behind_it() -> None:
     assert blue[line > 4].mean() < 0.02
     views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
     room = texrs.extend(picture, right=40, view=views, seed=1)
-    rows, columns = np.rint(room.source.coordinates[:, 200:]).astype(int).reshape(-1, 2).T
+    rows, columns = np.rint(room.source_map.coordinates[:, 200:]).astype(int).reshape(-1, 2).T
     assert (low[rows, columns] == (line > 0).ravel()).mean() > 0.97
 
 
@@ -61,13 +61,13 @@ def test_a_thing_at_the_border_does_not_go_on() -> None:
     ground[100:, 50:120] = False
     seen[~ground] = (210, 20, 200)
     made = texrs.extend(seen, bottom=40, view=View(plane=PLANE, ground=ground), seed=1)
-    rows, columns = np.rint(made.source.coordinates[160:]).astype(int).reshape(-1, 2).T
+    rows, columns = np.rint(made.source_map.coordinates[160:]).astype(int).reshape(-1, 2).T
     assert ground[rows, columns].all()
     # What covers all of the border does, as a wall on the left.
     wall = np.ones_like(ground)
     wall[:, :50] = False
     made = texrs.extend(seen, left=30, view=View(plane=PLANE, ground=wall), seed=1)
-    rows, columns = np.rint(made.source.coordinates[:, :30]).astype(int).reshape(-1, 2).T
+    rows, columns = np.rint(made.source_map.coordinates[:, :30]).astype(int).reshape(-1, 2).T
     assert not wall[rows, columns].any()
 
 
@@ -84,7 +84,7 @@ def test_a_doubtful_plane_is_not_followed() -> None:
     with pytest.warns(UserWarning, match="not followed"):
         made = texrs.extend(look_twice(), bottom=16, seed=1)
     assert made.report["planes"] == [{"plane": None, "found": False}]
-    assert np.abs(np.abs(np.linalg.det(made.source.jacobians())) - 1).max() < 1e-6
+    assert np.abs(np.abs(np.linalg.det(made.source_map.jacobians())) - 1).max() < 1e-6
 
 
 def test_again_and_otherwise() -> None:

@@ -59,20 +59,20 @@ def made(request: pytest.FixtureRequest) -> tuple[Synthesis, np.ndarray]:
 
 def test_applying_a_map_does_what_the_verb_did(made: tuple[Synthesis, np.ndarray]) -> None:
     result, image = made
-    again = texrs.apply(result.source, image)
+    again = texrs.apply(result.source_map, image)
     assert again.dtype == image.dtype
     assert (again == result.image).all()
 
 
 def test_a_finish_comes_back_from_a_file(made: tuple[Synthesis, np.ndarray], tmp_path: Path) -> None:
     result, image = made
-    result.source.save(tmp_path / "map.npz")
+    result.source_map.save(tmp_path / "map.npz")
     back = SourceMap.load(tmp_path / "map.npz")
     assert (texrs.apply(back, image) == result.image).all()
 
 
 def test_labels_are_never_mixed() -> None:
-    source = texrs.design(PEBBLES, 64).source
+    source = texrs.design(PEBBLES, 64).source_map
     labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
     found = texrs.apply(source, labels, map_type="label")
     assert set(np.unique(found)) <= set(np.unique(labels))
@@ -84,11 +84,11 @@ def test_labels_are_designed_as_labels() -> None:
     labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
     result = texrs.design(labels, (72, 64), seed=1)
     assert set(np.unique(result.image)) <= set(np.unique(labels))
-    assert (texrs.apply(result.source, labels) == result.image).all()
+    assert (texrs.apply(result.source_map, labels) == result.image).all()
 
 
 def test_another_finish_may_be_asked_for() -> None:
-    source = texrs.design(PEBBLES, 64).source
+    source = texrs.design(PEBBLES, 64).source_map
     plain = texrs.apply(source, PEBBLES, finish=Finish((True, True)))
     assert (plain == source.render(PEBBLES)).all()
     assert (plain != texrs.apply(source, PEBBLES)).any()
@@ -110,7 +110,7 @@ def test_another_finish_may_be_asked_for() -> None:
     ids=["no text", "other words", "another hole", "no place of light", "other parts", "another example"],
 )
 def test_a_damaged_finish_is_said(change: dict[str, np.ndarray], tmp_path: Path) -> None:
-    texrs.inpaint(PEBBLES, HOLE, screening=0.1).source.save(tmp_path / "map.npz")
+    texrs.inpaint(PEBBLES, HOLE, screening=0.1).source_map.save(tmp_path / "map.npz")
     with np.load(tmp_path / "map.npz") as file:
         parts = {**file, **change}
     np.savez(tmp_path / "map.npz", **parts)

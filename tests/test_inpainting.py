@@ -30,7 +30,7 @@ SPECKS = np.random.default_rng(0).random((96, 112)) < 0.01
 
 
 def places(result: texrs.Synthesis) -> tuple[np.ndarray, np.ndarray]:
-    at = result.source.coordinates
+    at = result.source_map.coordinates
     assert (at == np.rint(at)).all()
     return at[..., 0].astype(int), at[..., 1].astype(int)
 
@@ -67,9 +67,9 @@ def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, boundary):
     assert not hole[row, column].any()
     own = (row == np.indices(row.shape)[0]) & (column == np.indices(row.shape)[1])
     assert not own[hole].any()
-    far = texrs.inpaint(PEBBLES, hole, boundary_width=0).source.label == 0
+    far = texrs.inpaint(PEBBLES, hole, boundary_width=0).source_map.label == 0
     assert (far == ~hole).all()
-    kept = result.source.label == 0
+    kept = result.source_map.label == 0
     assert own[kept].all()
     assert (result.report["replaced_outside"] > 0) == (boundary > 0)
     np.testing.assert_array_equal(result.image, PEBBLES[row, column])
@@ -79,7 +79,7 @@ def test_the_boundary_is_not_exceeded():
     from scipy.ndimage import binary_dilation
 
     result = texrs.inpaint(PEBBLES, HOLE, boundary_width=4)
-    assert (result.source.label[~binary_dilation(HOLE, np.ones((3, 3)), 4)] == 0).all()
+    assert (result.source_map.label[~binary_dilation(HOLE, np.ones((3, 3)), 4)] == 0).all()
 
 
 def test_what_is_in_the_hole_does_not_matter():
@@ -119,7 +119,7 @@ def test_patches_do_not_mirror_or_repeat_what_is_beside_them():
     hole = disc((160, 160), radius=0.22)
     result = texrs.inpaint(image, hole)
     row, column = places(result)
-    turned = (result.source.jacobians() != np.eye(2)).any(axis=(2, 3))
+    turned = (result.source_map.jacobians() != np.eye(2)).any(axis=(2, 3))
     r, c = np.indices(row.shape)
     near = np.hypot(row - r, column - c) < 10
     assert (near & turned & hole).sum() < 0.02 * hole.sum()
@@ -143,8 +143,8 @@ def test_source_is_the_second_exemplar(dtype):
     other = np.ascontiguousarray(samples.beans((64, 80)).image.astype(dtype))
     image = PEBBLES.astype(dtype)
     result = texrs.inpaint(image, HOLE, exemplar=other)
-    assert result.source.shapes == ((96, 112), (64, 80))
-    np.testing.assert_array_equal(result.source.exemplar, HOLE.astype(np.uint16))
+    assert result.source_map.shapes == ((96, 112), (64, 80))
+    np.testing.assert_array_equal(result.source_map.exemplar, HOLE.astype(np.uint16))
     row, column = places(result)
     np.testing.assert_array_equal(result.image[HOLE], other[row[HOLE], column[HOLE]])
     np.testing.assert_array_equal(result.image[~HOLE], image[~HOLE])
@@ -153,7 +153,7 @@ def test_source_is_the_second_exemplar(dtype):
 def test_whole_image_from_a_source():
     everywhere = np.ones((40, 50), bool)
     result = texrs.inpaint(np.full((40, 50, 3), np.nan, np.float32), everywhere, exemplar=PEBBLES.astype(np.float32))
-    assert (result.source.exemplar == 1).all()
+    assert (result.source_map.exemplar == 1).all()
     assert result.image.shape == (40, 50, 3)
     seeds = [texrs.inpaint(PEBBLES, np.ones((96, 112)) > 0, exemplar=PEBBLES, seed=s).image for s in (1, 1, 2)]
     assert (seeds[0] == seeds[1]).all()
@@ -176,20 +176,20 @@ def test_every_map_in_register():
     made = [texrs.inpaint(each, HOLE) for each in stack]
     for each, result in zip(stack, made, strict=True):
         assert result.image.dtype == each.dtype
-        np.testing.assert_array_equal(view(result.source, each), result.image)
-    np.testing.assert_array_equal(made[0].source.coordinates, made[1].source.coordinates)
+        np.testing.assert_array_equal(view(result.source_map, each), result.image)
+    np.testing.assert_array_equal(made[0].source_map.coordinates, made[1].source_map.coordinates)
     np.testing.assert_array_equal(made[1].image, made[0].image.astype(np.uint16) * 257)
 
 
 def test_mirrored_patches_turn_normals():
     result = texrs.inpaint(PEBBLES, HOLE)
-    turned = (result.source.jacobians() != np.eye(2)).any(axis=(2, 3))
+    turned = (result.source_map.jacobians() != np.eye(2)).any(axis=(2, 3))
     assert turned.any()
-    plain = texrs.inpaint(PEBBLES, HOLE, allow_mirror=False).source
+    plain = texrs.inpaint(PEBBLES, HOLE, allow_mirror=False).source_map
     assert (plain.jacobians() == np.eye(2)).all()
     # Along a patch coordinates run as its frame says.
-    joined = result.source.continues(1)[:, :-1]
-    same = result.source.label[:, 1:] == result.source.label[:, :-1]
+    joined = result.source_map.continues(1)[:, :-1]
+    same = result.source_map.label[:, 1:] == result.source_map.label[:, :-1]
     assert joined[same].all()
 
 
@@ -419,7 +419,7 @@ def test_same_bytes_for_any_number_of_threads():
             made.append(texrs.inpaint(PEBBLES, HOLE, boundary_width=2, seed=9))
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
-        assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()
+        assert other.source_map.coordinates.tobytes() == made[0].source_map.coordinates.tobytes()
 
 
 def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
@@ -435,7 +435,7 @@ def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
     for picture, mirrored in ((noise, True), (lit, False)):
         result = texrs.inpaint(picture, hole)
         assert result.report["allow_mirror"] is mirrored
-        frames = result.source.jacobians()
+        frames = result.source_map.jacobians()
         assert mirrored or (np.diagonal(frames, axis1=-2, axis2=-1) == 1).all()
     assert len(choose_mirrors([noise], np.ones((96, 96), bool), None)) == 4
 

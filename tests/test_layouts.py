@@ -121,7 +121,7 @@ def test_cells_are_taken_as_they_are() -> None:
     assert len(layout.points) == 12
     assert (np.bincount(layout.labels.ravel()) == 24 * 32)[1:].all()
     made = texrs.splice(WALL, layout, 96, layout_scale=1, refine=False)
-    shown = made.source.label
+    shown = made.source_map.label
     assert len(np.unique(shown[4:20, 4:28])) == 1
     assert shown[12, 12] != shown[12, 48]
 
@@ -136,7 +136,7 @@ def test_cells_that_the_border_cuts_take_the_joints_beside_them() -> None:
     assert {m["element"] for m in made.report["matches"]} > {4}
     dark = minimum_filter(made.image, 7) < 100
     # Two sides without a joint may still meet.
-    assert dark[mark_outlines(made.source.label.astype(np.int32))].mean() > 0.92
+    assert dark[mark_outlines(made.source_map.label.astype(np.int32))].mean() > 0.92
 
 
 def test_known_elements_are_elements_of_all() -> None:

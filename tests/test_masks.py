@@ -243,9 +243,9 @@ def test_a_feathered_filling_fades_into_the_image() -> None:
     expected = np.rint(weight * composite + (1 - weight) * base)
     np.testing.assert_array_equal(made.image[wide & ~DISC], expected[wide & ~DISC])
     # Other maps fade in the same way; labels do not mix.
-    np.testing.assert_array_equal(texrs.apply(made.source, base), made.image)
+    np.testing.assert_array_equal(texrs.apply(made.source_map, base), made.image)
     labels = (COLUMNS // 8).astype(np.uint8)
-    assert np.isin(texrs.apply(made.source, labels, map_type="label"), labels).all()
+    assert np.isin(texrs.apply(made.source_map, labels, map_type="label"), labels).all()
 
 
 def test_feather_asks_for_colours_between_those_of_a_palette() -> None:
@@ -253,13 +253,13 @@ def test_feather_asks_for_colours_between_those_of_a_palette() -> None:
     assert "palette" in texrs.inpaint(checks, WHITE).report
     faded = texrs.inpaint(checks, Mask(WHITE, feather=6))
     assert "palette" not in faded.report
-    assert faded.source.finish is not None
-    assert faded.source.finish.fade is not None
+    assert faded.source_map.finish is not None
+    assert faded.source_map.finish.fade is not None
 
 
 def test_feathered_normals_keep_their_length_and_the_map_its_fade(tmp_path: Path) -> None:
     made = texrs.inpaint(BRICKS, Mask(WHITE, feather=8))
-    made.source.save(tmp_path / "map.npz")
+    made.source_map.save(tmp_path / "map.npz")
     again = texrs.SourceMap.load(tmp_path / "map.npz")
     np.testing.assert_array_equal(texrs.apply(again, BRICKS), made.image)
     slope = np.dstack([*np.gradient(gaussian_filter(BRICKS[..., 0].astype(float), 2)), np.full(SIZE, 4.0)])
@@ -281,7 +281,7 @@ def test_remove_grows_and_feathers() -> None:
     )
     inner = widen(marked > 0, 2)
     assert made.report["filled"] == widen(inner, 3).mean()
-    np.testing.assert_array_equal(texrs.apply(made.source, floor), made.image)
+    np.testing.assert_array_equal(texrs.apply(made.source_map, floor), made.image)
     assert (made.image[~widen(inner, 3)] == floor[~widen(inner, 3)]).all()
 
 

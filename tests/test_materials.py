@@ -67,7 +67,7 @@ def test_every_verb_gives_every_map_back(verb: str) -> None:
     assert list(made) == list(material)
     for name, each in made.items():
         assert each.pixels.dtype == material[name].pixels.dtype, name
-        assert each.pixels.shape[:2] == result.source.shape, name
+        assert each.pixels.shape[:2] == result.source_map.shape, name
         assert each.channels == material[name].channels, name
         assert (each.role, each.space) == (material[name].role, material[name].space), name
     assert result.image is made["albedo"].pixels
@@ -79,11 +79,11 @@ def test_maps_stay_in_register_exactly() -> None:
     result = texrs.design(STONES, (72, 64), screening=None)
     assert result.material is not None
     place, labels = result.material["place"].pixels, result.material["labels"].pixels
-    whole = (result.source.coordinates == np.rint(result.source.coordinates)).all(axis=-1)
+    whole = (result.source_map.coordinates == np.rint(result.source_map.coordinates)).all(axis=-1)
     assert whole.any()
-    assert (place[whole] == result.source.coordinates[whole]).all()
+    assert (place[whole] == result.source_map.coordinates[whole]).all()
     # Labels are never mixed: each is the one of the nearest pixel.
-    row, column = np.floor(result.source.coordinates + np.float32(0.5)).astype(int).reshape(-1, 2).T
+    row, column = np.floor(result.source_map.coordinates + np.float32(0.5)).astype(int).reshape(-1, 2).T
     row, column = np.clip(row, 0, 63), np.clip(column, 0, 79)
     assert (labels.ravel() == STONES["labels"].pixels[row, column]).all()
 
@@ -132,7 +132,7 @@ def test_several_materials_are_mixed() -> None:
     other = make(seed=5)
     result = texrs.design([STONES, other], 96, weights=[0.5, 0.5])
     assert result.material is not None
-    assert len(result.source.shapes) == 2
+    assert len(result.source_map.shapes) == 2
     assert result.material["normal"].pixels.shape == (96, 96, 3)
     filled = texrs.inpaint(STONES, HOLE, exemplar=other).material
     assert filled is not None

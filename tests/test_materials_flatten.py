@@ -76,7 +76,7 @@ def test_a_tile_is_in_even_light() -> None:
     as_it_is, even = texrs.tile(lit, size=(ROWS, COLUMNS)), texrs.tile(lit, size=(ROWS, COLUMNS), flatten_lighting=True)
     assert vary(as_it_is.image) > 4 * vary(even.image)
     assert even.report["flatten_lighting"] is True
-    source = even.source
+    source = even.source_map
     assert source.finish is not None
     assert (texrs.apply(source, lit) == even.image).all()
     assert (
@@ -85,8 +85,8 @@ def test_a_tile_is_in_even_light() -> None:
     ).all()
     stones = texrs.tile(Material({"albedo": lit, "height": lit[..., 0]}), flatten_lighting=True)
     assert stones.material is not None
-    assert (stones.material["albedo"].pixels == texrs.apply(stones.source, lit)).all()
-    assert (stones.material["height"].pixels == stones.source.render(lit[..., 0])).all()
+    assert (stones.material["albedo"].pixels == texrs.apply(stones.source_map, lit)).all()
+    assert (stones.material["height"].pixels == stones.source_map.render(lit[..., 0])).all()
 
 
 def test_borders_that_meet_still_do() -> None:

@@ -59,14 +59,14 @@ def test_real_pieces_are_ranked_over_results(name):
     rows, columns = (np.arange(20, 140, dtype=np.float32) for _ in range(2))
     crop = SourceMap.from_coordinates(np.stack(np.meshgrid(rows, columns, indexing="ij"), -1), image.shape[:2])
     for made in (texrs.design(image, 160), texrs.synthesize(image, 160)):
-        result = evaluate(image, made.source, made.image)
+        result = evaluate(image, made.source_map, made.image)
         assert result.score > evaluate(image, crop).score, result
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_results_are_ranked_over_blocks_from_anywhere(name):
     image = picture(name)
-    result = evaluate(image, texrs.synthesize(image, image.shape[:2]).source)
+    result = evaluate(image, texrs.synthesize(image, image.shape[:2]).source_map)
     for seed in range(2):
         blocks = evaluate(image, scramble(image.shape[:2], seed))
         assert result.broken < blocks.broken, (result, blocks)
@@ -100,11 +100,11 @@ def test_crisp_seams_are_ranked_over_fogged_ones(name):
     soft = ndimage.gaussian_filter(crisp, (2, 2) + (0,) * (crisp.ndim - 2))
     at_seam = np.zeros((160, 160), bool)
     for axis in range(2):
-        at_seam |= ~made.source.continues(axis)
+        at_seam |= ~made.source_map.continues(axis)
     near = ndimage.binary_dilation(at_seam, iterations=4)
     near = near if crisp.ndim == 2 else near[..., np.newaxis]
     fogged = np.rint(np.where(near, soft, crisp)).astype(np.uint8)
-    clear, dim = evaluate(image, made.source, made.image), evaluate(image, made.source, fogged)
+    clear, dim = evaluate(image, made.source_map, made.image), evaluate(image, made.source_map, fogged)
     assert clear.seam_blur < 0.1, clear
     assert dim.seam_blur > clear.seam_blur + 0.2, dim
     assert replace(dim, seam_blur=clear.seam_blur) == clear

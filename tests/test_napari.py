@@ -106,11 +106,11 @@ def test_plain_arrays(manager: Any, tmp_path: Path) -> None:
 
 def test_source_maps_and_elements(manager: Any, tmp_path: Path) -> None:
     made = texrs.tile(WEAVE)
-    made.source.save(tmp_path / "map.npz")
+    made.source_map.save(tmp_path / "map.npz")
     (places, options, kind), (patches, _, second) = open_files(manager, tmp_path / "map.npz")
     assert (kind, options["rgb"], second) == ("image", True, "labels")
-    assert places.shape == (*made.source.shape, 3)
-    assert len(np.unique(patches)) == len(np.unique(made.source.label))
+    assert places.shape == (*made.source_map.shape, 3)
+    assert len(np.unique(patches)) == len(np.unique(made.source_map.label))
     entry = elements.Elements.of_sample(samples.bricks((96, 96)))
     entry.save(tmp_path / "entry.npz")
     (image, _, _), (labels, _, kind), (points, _, last) = open_files(manager, tmp_path / "entry.npz")

@@ -62,7 +62,7 @@ def test_no_verb_makes_a_colour(verb):
     assert made.report["palette"] == len(find_colours(ART))
     assert any("colours, looked up to the nearest pixel and never corrected" in line for line in made.report["assumed"])
     if "several" not in verb and "another" not in verb:
-        np.testing.assert_array_equal(texrs.apply(made.source, ART), made.image)
+        np.testing.assert_array_equal(texrs.apply(made.source_map, ART), made.image)
 
 
 @pytest.mark.parametrize("side", [16, 64])

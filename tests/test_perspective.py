@@ -24,11 +24,11 @@ def test_the_map_is_the_picture(floor):
     result = grow(floor, (64, 80), seed=3)
     assert result.image.shape == (64, 80, 3)
     assert result.image.dtype == floor.image.dtype
-    np.testing.assert_array_equal(result.source.render(floor.image, antialias=True), result.image)
+    np.testing.assert_array_equal(result.source_map.render(floor.image, antialias=True), result.image)
     # What is not shrunk is the look-up and nothing else.
-    whole = np.abs(np.linalg.det(result.source.jacobians())) <= 1
+    whole = np.abs(np.linalg.det(result.source_map.jacobians())) <= 1
     assert 0.2 < whole.mean() < 1
-    np.testing.assert_array_equal(view(result.source, floor.image)[whole], result.image[whole])
+    np.testing.assert_array_equal(view(result.source_map, floor.image)[whole], result.image[whole])
     assert result.stages["target"].shape == (64, 80)
     assert result.report["scale_error"] <= 0.08
 
@@ -37,10 +37,10 @@ def test_maps_in_register_follow_in_any_dtype(floor):
     result = grow(floor, seed=1)
     red = floor.image[..., 0]
     for twin in (red.astype(np.uint16) * 257, red.astype(np.float32) / 255):
-        shown = result.source.render(twin, interpolation="nearest").astype(float) / twin.max() * red.max()
-        np.testing.assert_allclose(shown, view(result.source, red, "nearest"), atol=1e-3)
+        shown = result.source_map.render(twin, interpolation="nearest").astype(float) / twin.max() * red.max()
+        np.testing.assert_allclose(shown, view(result.source_map, red, "nearest"), atol=1e-3)
     whole = grow(floor, seed=1, augment_scales=False)
-    assert (whole.source.coordinates == np.rint(whole.source.coordinates)).all()
+    assert (whole.source_map.coordinates == np.rint(whole.source_map.coordinates)).all()
 
 
 def test_what_comes_in_comes_out():
@@ -52,7 +52,7 @@ def test_what_comes_in_comes_out():
     assert found.image.shape == (48, 48)
     finer = texrs.perspective(deep, floor.scale_map, 48, seed=2)
     assert finer.image.dtype == np.uint16
-    np.testing.assert_array_equal(finer.source.coordinates, found.source.coordinates)
+    np.testing.assert_array_equal(finer.source_map.coordinates, found.source_map.coordinates)
     assert texrs.perspective(stack, floor.scale_map, 48).image.shape == (48, 48, 5)
     assert texrs.perspective(grey / 255, floor.scale_map, 48).image.dtype == np.float64
 
@@ -63,12 +63,14 @@ def test_same_bytes_for_any_number_of_threads(floor, count):
         one = grow(floor, 96, seed=5)
     with texrs.threads(count):
         many = grow(floor, 96, seed=5)
-    np.testing.assert_array_equal(one.source.coordinates, many.source.coordinates)
+    np.testing.assert_array_equal(one.source_map.coordinates, many.source_map.coordinates)
     assert one.image.tobytes() == many.image.tobytes()
 
 
 def test_seeds_differ(floor):
-    assert (grow(floor, seed=1).source.coordinates != grow(floor, seed=2).source.coordinates).any(axis=-1).mean() > 0.5
+    assert (grow(floor, seed=1).source_map.coordinates != grow(floor, seed=2).source_map.coordinates).any(
+        axis=-1
+    ).mean() > 0.5
 
 
 def test_an_output_that_repeats(floor):

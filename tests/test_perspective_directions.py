@@ -44,7 +44,7 @@ def test_what_is_copied_is_turned_counter_clockwise(lines, angle):
     assert np.median(apart(measure_directions(made.image)[INNER], angle)) < 5
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     np.testing.assert_allclose(
-        made.source.jacobians(), np.broadcast_to([[c, s], [-s, c]], (SIDE, SIDE, 2, 2)), atol=1e-3
+        made.source_map.jacobians(), np.broadcast_to([[c, s], [-s, c]], (SIDE, SIDE, 2, 2)), atol=1e-3
     )
 
 
@@ -63,18 +63,18 @@ def test_a_field_turns_as_it_does_elsewhere(lines):
     made = texrs.perspective(lines, "front", SIDE, direction="circular", seed=1)
     field = fields.parse("circular", 2, (SIDE, SIDE))
     wanted = field.lattice((SIDE, SIDE))
-    np.testing.assert_allclose(made.source.jacobians(), wanted, atol=1e-3)
+    np.testing.assert_allclose(made.source_map.jacobians(), wanted, atol=1e-3)
     again = texrs.perspective(lines, "front", SIDE, direction=field, seed=1)
     np.testing.assert_array_equal(again.image, made.image)
     # Of frames that make larger only how they turn counts.
     ramp = texrs.perspective(lines, "front", SIDE, direction=fields.scale_ramp(1, 2, length=SIDE, axes=2), seed=1)
-    np.testing.assert_allclose(ramp.source.jacobians(), np.broadcast_to(np.eye(2), (SIDE, SIDE, 2, 2)), atol=1e-3)
+    np.testing.assert_allclose(ramp.source_map.jacobians(), np.broadcast_to(np.eye(2), (SIDE, SIDE, 2, 2)), atol=1e-3)
 
 
 def test_sizes_are_followed_at_the_same_time(lines):
     target = np.linspace(0.7, 1.4, SIDE, dtype=np.float32)[:, np.newaxis].repeat(SIDE, axis=1)
     made = texrs.perspective(lines, "front", target=target, direction=60.0, seed=1)
-    np.testing.assert_allclose(np.linalg.det(made.source.jacobians()), 1 / target**2, rtol=0.01)
+    np.testing.assert_allclose(np.linalg.det(made.source_map.jacobians()), 1 / target**2, rtol=0.01)
     np.testing.assert_allclose(made.stages["target"], target, rtol=1e-5)
     assert np.median(apart(measure_directions(made.image)[INNER], 60)) < 6
 
@@ -82,8 +82,8 @@ def test_sizes_are_followed_at_the_same_time(lines):
 def test_on_a_plane_it_turns_there():
     floor = samples.tilted_discs((128, 128)).image
     own, other = Plane((128, 128), 50, 90, 37), Plane((SIDE, SIDE), 40, 90, 40)
-    straight = texrs.perspective(floor, own, target=other, direction=0.0, seed=1).source
-    turned = texrs.perspective(floor, own, target=other, direction=30.0, seed=1).source
+    straight = texrs.perspective(floor, own, target=other, direction=0.0, seed=1).source_map
+    turned = texrs.perspective(floor, own, target=other, direction=30.0, seed=1).source_map
     flat = {}
     for name, source in (("straight", straight), ("turned", turned)):
         at, frames = source.coordinates.astype(float), source.jacobians().astype(float)
@@ -105,7 +105,7 @@ def test_copies_are_turned_too():
     made = texrs.perspective(image, scale, 64, direction=90.0, seed=1)
     assert made.report["sheet"]["kind"] == "copies"
     assert made.report["scale_error"] < 0.1
-    frames = made.source.jacobians()
+    frames = made.source_map.jacobians()
     np.testing.assert_allclose(frames[..., 0, 0], 0, atol=1e-3)
     assert (frames[..., 0, 1] > 0).all()
     assert (frames[..., 1, 0] < 0).all()

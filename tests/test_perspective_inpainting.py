@@ -37,7 +37,7 @@ def test_holes_are_filled_from_outside_them_without_a_seam(floor, method):
     assert result.report["scaled"]
     assert 0.5 <= checks.seam(result.image, hole) / checks.seam(image, hole) <= 1.6
     # Nothing is taken from the hole.
-    at = np.rint(result.source.coordinates[hole]).astype(int)
+    at = np.rint(result.source_map.coordinates[hole]).astype(int)
     assert not hole[at[:, 0], at[:, 1]].any()
 
 
@@ -67,7 +67,7 @@ def test_holes_anywhere(floor, boxes, scaled):
     result = fill(image, hole, method="optimise", scale_map=scale if scaled else None)
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
     bare = np.where(hole[..., None], 0, image).astype(np.uint8)
-    np.testing.assert_array_equal(view(result.source, bare), result.image)
+    np.testing.assert_array_equal(view(result.source_map, bare), result.image)
 
 
 @pytest.mark.parametrize("method", ["patch", "optimise"])
@@ -86,15 +86,15 @@ def test_a_second_picture_gives_elements_of_the_size_that_belongs_there(floor, m
     other, theirs = (np.ascontiguousarray(a[::-1]) for a in checks.floor((170, 190), seed=3))
     result = fill(image, hole, method=method, exemplar=other, scale_map=scale, exemplar_scale_map=theirs)
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
-    assert (result.source.exemplar == hole).all()
+    assert (result.source_map.exemplar == hole).all()
     bare = np.where(hole[..., np.newaxis], 0, image).astype(np.uint8)
-    np.testing.assert_array_equal(view(result.source, [bare, other]), result.image)
-    frame = result.source.jacobian_array()
-    size = np.ones(image.shape[:2]) if frame is None else 1 / frame[result.source.label][..., 0, 0]
-    shown = result.source.render([scale, theirs], interpolation="linear") * size
+    np.testing.assert_array_equal(view(result.source_map, [bare, other]), result.image)
+    frame = result.source_map.jacobian_array()
+    size = np.ones(image.shape[:2]) if frame is None else 1 / frame[result.source_map.label][..., 0, 0]
+    shown = result.source_map.render([scale, theirs], interpolation="linear") * size
     wrong = np.abs(np.log(shown / scale))[hole]
     plain = fill(image, hole, method=method, exemplar=other)
-    without = np.abs(np.log(plain.source.render([scale, theirs], interpolation="linear") / scale))[hole]
+    without = np.abs(np.log(plain.source_map.render([scale, theirs], interpolation="linear") / scale))[hole]
     assert np.median(wrong) < 0.12
     assert np.median(wrong) < 0.7 * np.median(without)
 
@@ -104,7 +104,7 @@ def test_a_source_from_the_front_is_resized(floor):
     hole = hole_in(image.shape[:2], (20, 140, 45, 115))
     flat, _ = checks.floor((160, 160), seed=3, span=(1, 1))
     result = fill(image, hole, method="optimise", exemplar=flat, scale_map=scale)
-    size = 1 / result.source.jacobian_array()[result.source.label][..., 0, 0]
+    size = 1 / result.source_map.jacobian_array()[result.source_map.label][..., 0, 0]
     assert np.corrcoef(np.log(size[hole]), np.log(scale[hole]))[0, 1] > 0.8
 
 
@@ -115,7 +115,7 @@ def test_all_of_a_picture_from_another():
     result = texrs.inpaint(
         image, everything, exemplar=other, scale_map=ramp, exemplar_scale_map=theirs, method="optimise", screening=1e-4
     )
-    assert result.source.exemplar.all()
+    assert result.source_map.exemplar.all()
     assert result.image.std() > 20
 
 
@@ -142,7 +142,7 @@ def test_blending_takes_the_light_of_the_picture(method, box):
     light = fill(image, hole, method=method, exemplar=dark, screening=1e-4)
     np.testing.assert_array_equal(light.image[~hole], image[~hole])
     np.testing.assert_array_equal(light.stages["before_blending"], plain.image)
-    np.testing.assert_array_equal(light.source.coordinates, plain.source.coordinates)
+    np.testing.assert_array_equal(light.source_map.coordinates, plain.source_map.coordinates)
 
     def off(picture):
         return abs(picture[hole].mean() - image[hole].mean())
@@ -170,7 +170,7 @@ def test_optimisation_may_replace_the_boundary(floor, boundary):
     hole = hole_in(image.shape[:2], (60, 90, 60, 100))
     wide = ndimage.distance_transform_edt(~hole) <= boundary
     result = fill(image, hole, method="optimise", scale_map=scale, boundary_width=boundary)
-    np.testing.assert_array_equal(result.source.label > 0, wide)
+    np.testing.assert_array_equal(result.source_map.label > 0, wide)
     np.testing.assert_array_equal(result.image[~wide], image[~wide])
     assert (result.image != image)[wide & ~hole].any()
     assert result.report["replaced_outside"] == np.count_nonzero(wide & ~hole)

@@ -128,10 +128,10 @@ def around(weave):
 def test_frames_are_those_of_the_surface(around):
     assert around.report["surface"]
     assert around.report["sheet"]["kind"] == "front"
-    frames = around.source.jacobians()
+    frames = around.source_map.jacobians()
     np.testing.assert_allclose(frames, scale_maps.jacobians_of_normals(make_column()), atol=0.01)
     # The coordinates follow them, but for seams.
-    labels, made = around.source.label, derive(around.source.coordinates.astype(float))
+    labels, made = around.source_map.label, derive(around.source_map.coordinates.astype(float))
     inside = np.ones(labels.shape, bool)
     for axis in (0, 1):
         for by in (-1, 1):
@@ -159,8 +159,8 @@ def test_normal_maps_of_the_texture_turn_with_it(weave, around):
     slope = np.dstack(np.gradient(weave.mean(axis=-1) / 255 * 3))
     normal = np.dstack([-slope[..., 1], slope[..., 0], np.ones(slope.shape[:2])])
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    shown = around.source.render(normal.astype(np.float32), map_type="normal", interpolation="linear")
-    plain = around.source.render(normal.astype(np.float32), interpolation="linear")
+    shown = around.source_map.render(normal.astype(np.float32), map_type="normal", interpolation="linear")
+    plain = around.source_map.render(normal.astype(np.float32), interpolation="linear")
     # A bump that is pressed together is steeper: by the cosine, across the axis.
     cos = make_column()[..., 2]
     np.testing.assert_allclose(
@@ -174,7 +174,7 @@ def test_same_bytes_for_any_number_of_threads(weave, around, count):
     with texrs.threads(count):
         again = texrs.perspective(weave, "front", target=make_column(), seed=1)
     assert again.image.tobytes() == around.image.tobytes()
-    np.testing.assert_array_equal(again.source.coordinates, around.source.coordinates)
+    np.testing.assert_array_equal(again.source_map.coordinates, around.source_map.coordinates)
 
 
 def test_one_floor_laid_on_another():
@@ -186,7 +186,7 @@ def test_one_floor_laid_on_another():
     assert made.report["sheet"]["kind"] == "plane"
     assert made.report["scale_error"] < 0.05
     # From the texture of the one to that of the other: what the frames undo on the exemplar's plane is what the target asks.
-    at, frames = made.source.coordinates.astype(float), made.source.jacobians().astype(float)
+    at, frames = made.source_map.coordinates.astype(float), made.source_map.jacobians().astype(float)
     flat = Plane((128, 128), own.slant, own.tilt, own.fov)
     away = at - flat.middle
     wide = flat.width(at)[..., None, None]
@@ -212,7 +212,7 @@ def test_jacobians_and_coordinates_are_targets_too(weave):
     turned = np.array([[0.0, 1.0], [-1.0, 0.0]])
     field = np.broadcast_to(turned, (64, 64, 2, 2))
     by_field = texrs.perspective(weave, "front", target=field, seed=1)
-    np.testing.assert_allclose(by_field.source.jacobians(), field, atol=1e-3)
+    np.testing.assert_allclose(by_field.source_map.jacobians(), field, atol=1e-3)
     uv = np.moveaxis(np.indices((64, 64)), 0, -1) @ turned.T
     np.testing.assert_array_equal(texrs.perspective(weave, "front", target=uv, seed=1).image, by_field.image)
     # Of another size it is stretched.
@@ -229,10 +229,10 @@ def test_what_is_no_plane_and_has_many_sizes_is_bent_in_copies():
     made = texrs.perspective(image, scale, target=make_column(), seed=1)
     assert made.report["sheet"]["kind"] == "copies"
     assert made.report["scale_error"] < 0.15
-    whole = np.abs(np.linalg.det(made.source.jacobians()))
+    whole = np.abs(np.linalg.det(made.source_map.jacobians()))
     wanted = np.abs(np.linalg.det(scale_maps.jacobians_of_normals(make_column())))
     # Where copies have other scales than 1 the frames shrink or enlarge them, by as much as their elements are larger.
-    sizes = scale[tuple(np.rint(made.source.coordinates).astype(int).reshape(-1, 2).T)].reshape(whole.shape)
+    sizes = scale[tuple(np.rint(made.source_map.coordinates).astype(int).reshape(-1, 2).T)].reshape(whole.shape)
     assert np.median(np.abs(np.log(whole / wanted / sizes**2))) < 0.25
 
 

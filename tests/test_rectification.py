@@ -45,16 +45,16 @@ def test_scales_are_even() -> None:
 
 def test_pixels_are_the_photograph_s() -> None:
     result = texrs.rectify(FLOOR, view=PLANE)
-    np.testing.assert_array_equal(result.source.render(FLOOR, antialias=True), result.image)
+    np.testing.assert_array_equal(result.source_map.render(FLOOR, antialias=True), result.image)
     np.testing.assert_array_equal(result.stages["before_blending"], result.image)
     # A map that is in register with the photograph follows: here where its pixels are.
     places = np.moveaxis(np.indices(PLANE.shape), 0, -1).astype(np.float32)
     np.testing.assert_allclose(
-        result.source.render(places, interpolation="linear"), result.source.coordinates, atol=1e-3
+        result.source_map.render(places, interpolation="linear"), result.source_map.coordinates, atol=1e-3
     )
     # And frames are those of the plane: what is a pixel down in the texture lies there in the photograph.
-    down = np.diff(result.source.coordinates, axis=0)
-    np.testing.assert_allclose(down, result.source.jacobians()[:-1, :, :, 0], atol=0.05)
+    down = np.diff(result.source_map.coordinates, axis=0)
+    np.testing.assert_allclose(down, result.source_map.jacobians()[:-1, :, :, 0], atol=0.05)
 
 
 def test_normals_turn_with_the_plane() -> None:
@@ -62,7 +62,7 @@ def test_normals_turn_with_the_plane() -> None:
     right = np.empty((*PLANE.shape, 3), np.uint8)
     right[...] = np.rint((np.array([0.6, 0.0, 0.8]) + 1) * 127.5)
     for turn, leans in ((0, (0.6, 0.0)), (90, (0.0, 0.6)), (180, (-0.6, 0.0))):
-        source = texrs.rectify(FLOOR, view=Plane(PLANE.shape, 0, 90, turn=turn)).source
+        source = texrs.rectify(FLOOR, view=Plane(PLANE.shape, 0, 90, turn=turn)).source_map
         found = texrs.apply(source, right, map_type="normal") / 127.5 - 1
         np.testing.assert_allclose(found.reshape(-1, 3).mean(axis=0), (*leans, 0.8), atol=0.02)
         # Heights are numbers, and only move.
@@ -100,7 +100,7 @@ def test_any_size_and_cyclic() -> None:
     whole = texrs.rectify(FLOOR, view=PLANE)
     rows, columns = whole.image.shape[:2]
     middle = texrs.rectify(FLOOR, view=PLANE, size=(rows - 10, columns - 20))
-    np.testing.assert_array_equal(middle.source.coordinates, whole.source.coordinates[5:-5, 10:-10])
+    np.testing.assert_array_equal(middle.source_map.coordinates, whole.source_map.coordinates[5:-5, 10:-10])
     larger = texrs.rectify(FLOOR, view=PLANE, size=(rows + 64, columns), seed=3)
     assert larger.image.shape[:2] == (rows + 64, columns)
     assert larger.report["grown"] == "design"
@@ -130,7 +130,7 @@ def test_only_the_ground_is_used() -> None:
     ground = np.zeros(PLANE.shape, bool)
     ground[100:, 40:] = True
     result = texrs.rectify(FLOOR, view=View(plane=PLANE, ground=ground))
-    rows, columns = np.rint(result.source.coordinates).astype(int).reshape(-1, 2).T
+    rows, columns = np.rint(result.source_map.coordinates).astype(int).reshape(-1, 2).T
     assert ground[rows, columns].mean() > 0.99
 
 

@@ -90,8 +90,8 @@ def test_light_is_followed() -> None:
             np.log(picture[60:125, 150:225].reshape(65, 3, 25, 3).mean(axis=(0, 2, 3))) for picture in (made.image, lit)
         ]
         off[light] = np.abs(sides[0] - sides[1]).mean()
-        np.testing.assert_array_equal(texrs.apply(made.source, seen), made.image)
-        kept = made.source.label == 0
+        np.testing.assert_array_equal(texrs.apply(made.source_map, seen), made.image)
+        kept = made.source_map.label == 0
         np.testing.assert_array_equal(made.image[kept], seen[kept])
     assert off[True] < 0.6 * off[False]
     # In even light there is nothing to follow.
@@ -117,7 +117,7 @@ def test_what_goes_is_filled_from_the_ground_alone() -> None:
     # Sky is blue, beans are not, nor did the thing leave anything.
     filled = made.image[marked].astype(float)
     assert (filled[:, 2] < filled[:, 0] + 30).mean() > 0.99
-    rows, columns = np.rint(made.source.coordinates[marked]).astype(int).T
+    rows, columns = np.rint(made.source_map.coordinates[marked]).astype(int).T
     assert ground[rows, columns].all()
     assert not marked[rows, columns].any()
 
@@ -128,14 +128,14 @@ def test_a_shadow_that_is_left_does_not_go_on() -> None:
     shadow[100:, 92:104] = shadow[122:, 92:150] = True
     picture[shadow & ~marked] //= 4
     made = texrs.remove(picture, marked, view=View(plane=PLANE, ground=ground & ~marked & ~shadow), seed=1)
-    rows, columns = np.rint(made.source.coordinates[marked]).astype(int).T
+    rows, columns = np.rint(made.source_map.coordinates[marked]).astype(int).T
     assert not shadow[rows, columns].any()
     # Nor does the sky, but where there is sky around the hole.
     assert ground[rows, columns].all()
     aloft = np.zeros(SIZE, bool)
     aloft[20:35, 60:90] = True
     made = texrs.remove(picture, aloft, view=View(plane=PLANE, ground=ground & ~shadow), seed=1)
-    rows, columns = np.rint(made.source.coordinates[aloft]).astype(int).T
+    rows, columns = np.rint(made.source_map.coordinates[aloft]).astype(int).T
     assert not ground[rows, columns].any()
 
 
@@ -145,8 +145,8 @@ def test_each_of_several_planes_is_filled_from_its_own() -> None:
     marked[40:110, 80:110] = True
     views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
     made = texrs.remove(np.where(marked[..., np.newaxis], np.uint8(9), picture), marked, view=views, seed=1)
-    changed = made.source.label > 0
-    rows, columns = np.rint(made.source.coordinates[changed]).astype(int).T
+    changed = made.source_map.label > 0
+    rows, columns = np.rint(made.source_map.coordinates[changed]).astype(int).T
     # They meet in the line in which they meet beside it.
     assert (low[rows, columns] == low[changed]).mean() > 0.97
     assert not marked[rows, columns].any()
@@ -237,7 +237,7 @@ def test_grey_pictures_of_16_bit_and_again() -> None:
     assert one.image.shape == SIZE
     assert one.stages["before_blending"].shape == SIZE
     np.testing.assert_array_equal(one.image, two.image)
-    np.testing.assert_array_equal(one.source.render(floor), one.image)
+    np.testing.assert_array_equal(one.source_map.render(floor), one.image)
 
 
 FLOOR = look("pebbles", PLANE)
@@ -279,7 +279,7 @@ def test_patches_come_from_where_they_may() -> None:
     allowed = np.zeros(SIZE, bool)
     allowed[100:, :] = True
     made = texrs.inpaint(FLOOR, MARKED, allowed=allowed)
-    assert (made.source.coordinates[MARKED][:, 0] >= 99.5).all()
+    assert (made.source_map.coordinates[MARKED][:, 0] >= 99.5).all()
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

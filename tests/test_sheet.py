@@ -148,7 +148,7 @@ def test_elements_on_a_plane_are_whole():
     assert result.report["sheet"]["kind"] == "plane"
     assert result.report["scale_error"] < 0.05
     # The frames say how the exemplar is seen: they agree with the differences of the coordinates inside of patches.
-    source = result.source
+    source = result.source_map
     steps = np.diff(source.coordinates, axis=0)[:, :-1]
     same = source.label[:-1, :-1] == source.label[1:, :-1]
     away = np.linalg.norm(steps - source.jacobians()[:-1, :-1, :, 0], axis=-1)[same]
@@ -159,8 +159,8 @@ def test_maps_of_widths_and_of_areas_ask_for_the_same(disc_floor):
     image, scale = disc_floor
     ramp = np.geomspace(0.7, 1.3, 96, dtype=np.float32)[:, np.newaxis].repeat(96, axis=1)
     wide, large = (texrs.perspective(image, scale**p, 96, target=ramp**p, seed=1) for p in (1, 1.5))
-    sizes = [np.log(np.abs(np.linalg.det(made.source.jacobians()))) / 2 for made in (wide, large)]
-    shown = [s - 1.5 * np.log(made.source.render(scale)) for s, made in zip(sizes, (wide, large), strict=True)]
+    sizes = [np.log(np.abs(np.linalg.det(made.source_map.jacobians()))) / 2 for made in (wide, large)]
+    shown = [s - 1.5 * np.log(made.source_map.render(scale)) for s, made in zip(sizes, (wide, large), strict=True)]
     assert np.median(np.abs(shown[0] - shown[1])) < 0.02
     assert max(made.report["scale_error"] for made in (wide, large)) < 0.05
 
@@ -172,10 +172,10 @@ def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):
     bare = np.where(hole[..., np.newaxis], 0, image).astype(np.uint8)
     result = texrs.inpaint(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
-    at = np.rint(result.source.coordinates[hole]).astype(int)
+    at = np.rint(result.source_map.coordinates[hole]).astype(int)
     assert not hole[at[:, 0], at[:, 1]].any()
     # Seen in depth, what is copied is turned and sized; copies of squares are neither.
-    assert np.abs(result.source.jacobians()[hole] - np.eye(2)).max() > 0.05
+    assert np.abs(result.source_map.jacobians()[hole] - np.eye(2)).max() > 0.05
     with texrs.threads(1):
         alone = texrs.inpaint(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
     assert alone.image.tobytes() == result.image.tobytes()

@@ -18,8 +18,8 @@ VOLUME = texrs.samples.stripes((32, 36, 40)).image
 STONES = texrs.Material({"albedo": PEBBLES, "height": PEBBLES[..., 0]})
 THINGS = {
     "Synthesis": MADE,
-    "SourceMap": MADE.source,
-    "Finish": MADE.source.finish,
+    "SourceMap": MADE.source_map,
+    "Finish": MADE.source_map.finish,
     "Exemplar": texrs.Exemplar(PEBBLES),
     "Elements": texrs.elements.Elements.of_sample(DOTS),
     "layout": texrs.layouts.points([(20, 20), (40, 40), (20, 50)], 64),
@@ -75,7 +75,7 @@ def open_png(data: bytes) -> Any:
     ("thing", "shape"),
     [
         (MADE, MADE.image.shape),
-        (MADE.source, MADE.image.shape),
+        (MADE.source_map, MADE.image.shape),
         (texrs.SourceMap.identity((5, 6, 7)), (6, 7, 3)),
         (THINGS["Exemplar"], (64, 64, 3)),
         (texrs.Exemplar(VOLUME, axes=3), (36, 40, 3)),
@@ -112,7 +112,7 @@ def test_arrows_go_where_the_axes_go():
 
 
 def test_a_gallery_shows_all_that_it_holds():
-    gallery = texrs.Gallery(each for each in (MADE, PEBBLES, PEBBLES[..., 0], MADE.source))
+    gallery = texrs.Gallery(each for each in (MADE, PEBBLES, PEBBLES[..., 0], MADE.source_map))
     pictures = [open_png(b64decode(part.split('"')[0])) for part in gallery._repr_html_().split("base64,")[1:]]
     assert [p.shape[:2] for p in pictures] == [MADE.image.shape[:2], (64, 64), (64, 64), MADE.image.shape[:2]]
     assert np.array_equal(pictures[0], MADE.image)

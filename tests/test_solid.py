@@ -30,7 +30,7 @@ def result():
 
 def seen(made, exemplar):
     """Return what the exemplar looks like through the map that was made, by the slow twin."""
-    return view(made.source, exemplar, made.report["interpolation"])
+    return view(made.source_map, exemplar, made.report["interpolation"])
 
 
 def check_seen(made, exemplar):
@@ -136,18 +136,18 @@ def test_more_values_are_greys():
 
 def test_every_map_in_register_follows(result):
     coded = np.stack(np.meshgrid(*[np.arange(32, dtype=np.uint16)] * 3, indexing="ij"), axis=-1)
-    at = result.source.render(coded, interpolation="nearest")
-    np.testing.assert_array_equal(at, np.floor(result.source.coordinates + np.float32(0.5)))
-    nearest = result.source.render(STRIPES, interpolation="nearest")
+    at = result.source_map.render(coded, interpolation="nearest")
+    np.testing.assert_array_equal(at, np.floor(result.source_map.coordinates + np.float32(0.5)))
+    nearest = result.source_map.render(STRIPES, interpolation="nearest")
     np.testing.assert_array_equal(nearest, STRIPES[tuple(np.moveaxis(at, -1, 0))])
-    sixteen = result.source.render(STRIPES.astype(np.uint16) * 257, interpolation="cubic")
+    sixteen = result.source_map.render(STRIPES.astype(np.uint16) * 257, interpolation="cubic")
     assert sixteen.dtype == np.uint16
     assert np.abs(sixteen / 257 - result.image).max() <= 0.51
 
 
 def test_depth_does_not_change_the_decisions():
-    eight = texrs.solid(GREY, 24, seed=2, quality="fast").source
-    sixteen = texrs.solid(GREY.astype(np.uint16) * 257, 24, seed=2, quality="fast").source
+    eight = texrs.solid(GREY, 24, seed=2, quality="fast").source_map
+    sixteen = texrs.solid(GREY.astype(np.uint16) * 257, 24, seed=2, quality="fast").source_map
     np.testing.assert_array_equal(eight.coordinates, sixteen.coordinates)
 
 
@@ -159,9 +159,9 @@ def test_any_size(size):
     made = texrs.solid(STRIPES, size, quality="fast", wrap=(False, True, False))
     sides = (size,) * 3 if isinstance(size, int) else size
     assert made.image.shape == (*sides, 3)
-    assert made.source.coordinates.shape == (*sides, 3)
-    assert (made.source.coordinates >= 0).all()
-    assert (made.source.coordinates <= 31).all()
+    assert made.source_map.coordinates.shape == (*sides, 3)
+    assert (made.source_map.coordinates >= 0).all()
+    assert (made.source_map.coordinates <= 31).all()
 
 
 @pytest.mark.parametrize("size", [17, (1, 70), (50, 3), 1, (16, 200)])
@@ -169,8 +169,8 @@ def test_any_size(size):
 def test_any_size_of_pictures(size, wrap):
     made = texrs.synthesize(WEAVE, size, wrap=wrap)
     assert made.image.shape == (*((size, size) if isinstance(size, int) else size), 3)
-    assert (made.source.coordinates >= 0).all()
-    assert (made.source.coordinates <= 47).all()
+    assert (made.source_map.coordinates >= 0).all()
+    assert (made.source_map.coordinates <= 47).all()
 
 
 @pytest.mark.parametrize("shape", [(16, 16, 16), (16, 40, 72), (50, 19, 23)])
@@ -180,7 +180,7 @@ def test_any_exemplar(shape):
     assert made.image.shape == (30, 30, 30, 3)
     assert len(made.report["levels"]) == 1
     # A copy of all of it would not be a texture.
-    assert volume.cell_reuse(made.source).largest < 0.6
+    assert volume.cell_reuse(made.source_map).largest < 0.6
 
 
 @pytest.mark.parametrize("size", [(36, 40), (37, 41), (64, 33)])
@@ -222,8 +222,8 @@ def test_exemplars_that_repeat_are_found_by_measurement():
     across = [
         sum(
             (
-                (np.abs(np.diff(made.source.coordinates[..., a], axis=a)) > 60)
-                & (np.diff(made.source.label, axis=a) == 0)
+                (np.abs(np.diff(made.source_map.coordinates[..., a], axis=a)) > 60)
+                & (np.diff(made.source_map.label, axis=a) == 0)
             ).sum()
             for a in range(3)
         )
@@ -243,7 +243,7 @@ from texrs import fields, samples
 def digest():
     made = texrs.solid(samples.stripes((32, 32, 32)).image, (21, 32, 27), seed=5, field=fields.circular(axis="x"))
     flat = texrs.synthesize(samples.weave((48, 48)).image, (50, 41), seed=5, wrap=True)
-    return hashlib.sha256(made.source.coordinates.tobytes() + made.image.tobytes() + flat.image.tobytes()).hexdigest()
+    return hashlib.sha256(made.source_map.coordinates.tobytes() + made.image.tobytes() + flat.image.tobytes()).hexdigest()
 
 if "fork" in sys.argv:
     print(digest(), flush=True)
@@ -282,7 +282,7 @@ def test_a_forked_child_finishes_with_the_same_bytes():
 @pytest.mark.parametrize("field", [None, TURNING])
 def test_another_seed_is_another_texture(field):
     one, again, other = (
-        texrs.solid(STRIPES, 30, seed=s, field=field, quality="fast").source for s in (1, 1, 2**64 - 1)
+        texrs.solid(STRIPES, 30, seed=s, field=field, quality="fast").source_map for s in (1, 1, 2**64 - 1)
     )
     np.testing.assert_array_equal(one.coordinates, again.coordinates)
     assert (one.coordinates != other.coordinates).any(axis=-1).mean() > 0.9
@@ -304,14 +304,14 @@ def test_an_exemplar_is_as_good_as_its_array(tmp_path):
 
 
 def test_a_map_with_a_varying_field_is_kept(result, tmp_path):
-    result.source.save(tmp_path / "map.npz")
+    result.source_map.save(tmp_path / "map.npz")
     again = texrs.SourceMap.load(tmp_path / "map.npz")
     np.testing.assert_array_equal(view(again, STRIPES), result.image)
-    np.testing.assert_allclose(again.jacobians(), result.source.jacobians(), atol=1e-6)
-    whole = volume.compare(STRIPES, result.image, result.source, TURNING)
+    np.testing.assert_allclose(again.jacobians(), result.source_map.jacobians(), atol=1e-6)
+    whole = volume.compare(STRIPES, result.image, result.source_map, TURNING)
     loaded = volume.compare(STRIPES, result.image, again, TURNING)
     assert whole.text == loaded.text
-    assert volume.cell_reuse(result.source) == volume.cell_reuse(again)
+    assert volume.cell_reuse(result.source_map) == volume.cell_reuse(again)
     assert whole.reuse.coherent > 0.4
 
 
@@ -483,5 +483,5 @@ def test_bad_input_of_pictures():
 
 
 def test_places_are_exact_in_fixed_point(result):
-    steps = result.source.coordinates.astype(np.float64) * ONE
+    steps = result.source_map.coordinates.astype(np.float64) * ONE
     np.testing.assert_array_equal(steps, np.rint(steps))

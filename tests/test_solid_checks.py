@@ -156,7 +156,7 @@ def test_the_kernels_alone_grow_what_windows_do():
     made_by_kernels = grown(particles, 32)
     levels = texrs.Exemplar(particles, axes=3).analyse().levels
     places = Windows(levels, Settings(), 0).grow(Region.whole((32, 32, 32))).places
-    np.testing.assert_array_equal(made_by_kernels.source.coordinates.reshape(-1), places / np.float32(ONE))
+    np.testing.assert_array_equal(made_by_kernels.source_map.coordinates.reshape(-1), places / np.float32(ONE))
 
 
 ABLATIONS = {

@@ -51,7 +51,7 @@ def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> No
     )
     np.testing.assert_array_equal(io.read_volume("out.tif"), expected.image)
     places = SourceMap.load("map.npz")
-    np.testing.assert_array_equal(places.coordinates, expected.source.coordinates)
+    np.testing.assert_array_equal(places.coordinates, expected.source_map.coordinates)
     report = json.loads(Path("stages/report.json").read_text())
     assert report.pop("texrs")["verb"] == "solid"
     assert report == json.loads(json.dumps(expected.report))
@@ -75,7 +75,7 @@ def test_synthesize_writes_what_the_function_makes(here: Path, capsys: Capture) 
     spiral = fields.spiral(15, axes=2)
     expected = texrs.synthesize(PICTURE, (40, 56), field=spiral, seed=9, wrap=(True, False), quality="fast")
     np.testing.assert_array_equal(iio.imread("out.png"), expected.image)
-    np.testing.assert_array_equal(SourceMap.load("s.npz").coordinates, expected.source.coordinates)
+    np.testing.assert_array_equal(SourceMap.load("s.npz").coordinates, expected.source_map.coordinates)
     assert capsys.readouterr() == ("", "")
 
 

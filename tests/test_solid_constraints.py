@@ -59,7 +59,7 @@ def test_held_values_stay_and_their_surroundings_agree(boxed, quality):
     np.testing.assert_array_equal(made.image[held], values[held])
     np.testing.assert_array_equal(made.image[~held], made.stages["before_blending"][~held])
     np.testing.assert_array_equal(
-        view(made.source, STRIPES, made.report["interpolation"]), made.stages["before_blending"]
+        view(made.source_map, STRIPES, made.report["interpolation"]), made.stages["before_blending"]
     )
     assert edge(made.image, held) < 0.7 * pasted_edge(held, values, quality)
     # The texture itself goes through what is held.
@@ -73,7 +73,7 @@ def test_held_coordinates_stay_and_their_surroundings_agree(boxed):
     places[held] = np.argwhere(held) - (10, 12, 8) + 9
     given = texrs.Constraints(mask=held, coordinates=places)
     made = texrs.solid(STRIPES, held.shape, seed=3, constraints=given)
-    np.testing.assert_array_equal(made.source.coordinates[held], places[held])
+    np.testing.assert_array_equal(made.source_map.coordinates[held], places[held])
     np.testing.assert_array_equal(made.image, made.stages["before_blending"])
     np.testing.assert_array_equal(made.image[held], values[held])
     assert edge(made.image, held) < 0.7 * pasted_edge(held, values)

@@ -71,7 +71,7 @@ def test_random_windows(origin: tuple[int, ...], size: tuple[int, ...], field: s
         found = texture(2, field, cache_bytes=kept).window(origin, size)
     inside = tuple(slice(o + SIDE[2] // 2, o + SIDE[2] // 2 + n) for o, n in zip(origin, size, strict=True))
     assert np.array_equal(found.image, whole(2, field)[inside])
-    assert np.array_equal(view(found.source, PLANE), found.image)
+    assert np.array_equal(view(found.source_map, PLANE), found.image)
 
 
 @pytest.mark.parametrize("field", ["none", "circular"])
@@ -87,7 +87,7 @@ def test_random_windows_of_volumes(field: str) -> None:
             found = (texture(3, field, cache_bytes=0) if k == 2 else shared).window(origin, size.tolist())
         inside = tuple(slice(o + SIDE[3] // 2, o + SIDE[3] // 2 + int(n)) for o, n in zip(origin, size, strict=True))
         assert np.array_equal(found.image, whole(3, field)[inside])
-    assert np.array_equal(view(found.source, SOLID), found.image)
+    assert np.array_equal(view(found.source_map, SOLID), found.image)
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
@@ -134,7 +134,7 @@ def test_seams_are_no_worse_than_those_of_a_bounded_texture() -> None:
 def test_nothing_is_torn() -> None:
     known = texrs.Exemplar(samples.particles((40, 40, 40)).image, axes=3)
     made = texrs.SolidTexture(known, seed=2).window(10, 28)
-    found = volume.integrity(known, made.source)
+    found = volume.integrity(known, made.source_map)
     assert found is not None
     assert found.torn < 0.1
     assert found.contacts[1] < 0.5
@@ -153,19 +153,19 @@ def test_what_is_kept_is_bounded_and_forgotten() -> None:
 def test_the_map_has_the_frames_of_its_patches() -> None:
     field = fields.circular(centre=(0, 0), axes=2)
     found = texrs.PlaneTexture(exemplar(2), field=field, seed=1).window((40, -50), (60, 70))
-    assert found.source.label is not None
-    frames = found.source.jacobians()
+    assert found.source_map.label is not None
+    frames = found.source_map.jacobians()
     # Those of rigid patches: few, and about as the field.
-    assert 1 < len(np.unique(frames.reshape(-1, 4), axis=0)) <= found.source.label.max() + 1
+    assert 1 < len(np.unique(frames.reshape(-1, 4), axis=0)) <= found.source_map.label.max() + 1
     assert np.abs(frames - field.lattice((60, 70), origin=(40, -50))).mean() < 0.5
     assert found.report["quality"] == "preserve"
     assert found.report["origin"] == [40, -50]
 
 
 def test_another_seed_or_quality_is_another_texture() -> None:
-    first = texture(2).window(0, 60).source.coordinates
+    first = texture(2).window(0, 60).source_map.coordinates
     for options in ({"seed": 6}, {"quality": "optimise"}, {"quality": "fast"}):
-        assert not np.array_equal(texture(2, **options).window(0, 60).source.coordinates, first)
+        assert not np.array_equal(texture(2, **options).window(0, 60).source_map.coordinates, first)
     with pytest.raises(InvalidInput, match="quality"):
         texture(2, quality="best")
 

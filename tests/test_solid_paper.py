@@ -16,7 +16,7 @@ SIZE = 48
 
 def grow(exemplar, field=None, method="paper", size=SIZE, **options):
     made = texrs.solid(exemplar, size, field=field, method=method, seed=1, **options)
-    assert np.isfinite(made.source.coordinates).all()
+    assert np.isfinite(made.source_map.coordinates).all()
     return made
 
 
@@ -59,9 +59,9 @@ def test_threads_change_nothing(stripes):
     made = []
     for count in (1, 2, 7):
         with threads(count):
-            made.append(grow(stripes, field, size=(40, 33, 36)).source.coordinates)
+            made.append(grow(stripes, field, size=(40, 33, 36)).source_map.coordinates)
     assert made[0].tobytes() == made[1].tobytes() == made[2].tobytes()
-    other = texrs.solid(stripes, (40, 33, 36), field=field, method="paper", seed=2).source.coordinates
+    other = texrs.solid(stripes, (40, 33, 36), field=field, method="paper", seed=2).source_map.coordinates
     assert (other != made[0]).any(axis=-1).mean() > 0.9
 
 
@@ -115,7 +115,7 @@ def speckle(image):
 
 def test_neighbours_hardly_ever_go_on_together(of_stripes):
     """Eight diagonal neighbours make lattices that exchange nothing, and fractions of a voxel never meet."""
-    coherent = {m: volume.cell_reuse(made.source).coherent for m, made in of_stripes.items()}
+    coherent = {m: volume.cell_reuse(made.source_map).coherent for m, made in of_stripes.items()}
     assert coherent["paper"] < 0.03
     assert coherent[None] > 0.65
 
@@ -134,7 +134,7 @@ def test_turned_textures_lie_wrong_and_are_too_fine(stripes):
         made = grow(stripes, field, method)
         seen = volume.lightness(made.image)
         off[method] = np.median(volume.orientation_errors(seen, field.over(seen.shape), normal, margin=6))
-        same = made.source.render(stripes, interpolation="nearest")
+        same = made.source_map.render(stripes, interpolation="nearest")
         pair = [volume.frequency(volume.lightness(i), window=48, whole=True) for i in (same, stripes)]
         size[method] = pair[0] / pair[1]
     assert off[None] < 8 < 12 < off["paper"]
@@ -159,6 +159,6 @@ def test_rare_particles_are_lost():
     rare = {}
     for method in (None, "paper"):
         made = grow(sample.image, None, method)
-        there = made.source.render(sample.mask.astype(np.uint8), interpolation="nearest") > 0
+        there = made.source_map.render(sample.mask.astype(np.uint8), interpolation="nearest") > 0
         rare[method] = there.mean() / (sample.mask > 0).mean()
     assert rare["paper"] < 0.5 < 0.7 < rare[None]

@@ -33,7 +33,7 @@ def test_seams_of_a_plain_texture_run_through_things():
     heap = texrs.Exemplar(samples.pebbles((128, 128)).image)
     torn = {
         plan: np.mean(
-            [evaluate(heap, texrs.synthesize(heap, 192, seed=seed, patches=plan).source).torn for seed in range(2)]
+            [evaluate(heap, texrs.synthesize(heap, 192, seed=seed, patches=plan).source_map).torn for seed in range(2)]
         )
         for plan in ("default", "unmasked")
     }

@@ -95,7 +95,7 @@ def test_random_windows(origin: tuple[int, ...], size: tuple[int, ...], field: s
     found = texture(2, field, cache_bytes=kept).window(origin, size)
     inside = tuple(slice(o + 90, o + 90 + n) for o, n in zip(origin, size, strict=True))
     assert np.array_equal(found.image, whole_plane(field)[inside])
-    assert np.array_equal(view(found.source, PLANE), found.image)
+    assert np.array_equal(view(found.source_map, PLANE), found.image)
 
 
 @cache
@@ -106,7 +106,7 @@ def whole_plane(field: str) -> Array:
 def test_a_volume_is_what_its_map_shows() -> None:
     found = texture(3, "circular").window((3, -20, 9), (5, 9, 7))
     assert found.image.shape == (5, 9, 7, 3)
-    assert np.array_equal(view(found.source, SOLID), found.image)
+    assert np.array_equal(view(found.source_map, SOLID), found.image)
 
 
 @pytest.mark.parametrize(("axes", "start"), [(2, -(10**9)), (2, 10**9 - 20), (3, -(10**9))])
@@ -117,7 +117,7 @@ def test_far_from_the_origin_and_across_it(axes: int, start: int) -> None:
 
 
 def test_another_seed_is_another_texture() -> None:
-    a, b = (texture(2, seed=seed).window(0, 96).source.coordinates for seed in (1, 2))
+    a, b = (texture(2, seed=seed).window(0, 96).source_map.coordinates for seed in (1, 2))
     assert (a != b).any(axis=-1).mean() > 0.9
 
 
@@ -231,11 +231,11 @@ def test_the_source_map_knows_the_field_where_the_window_lies() -> None:
     field = fields.circular(centre=(0, 0), axes=2)
     here = field.lattice((8, 9), origin=(40, -50))
     exact = texrs.PlaneTexture(PLANE, field=field, quality="fast").window((40, -50), (8, 9))
-    assert np.array_equal(exact.source.jacobians(), here)
+    assert np.array_equal(exact.source_map.jacobians(), here)
     # Those of patches are those of the field in their middles.
     found = texrs.PlaneTexture(PLANE, field=field).window((40, -50), (8, 9))
-    assert np.abs(found.source.jacobians() - here).max() < 0.6
-    assert np.allclose(np.linalg.det(found.source.jacobians()), 1, atol=2e-3)
+    assert np.abs(found.source_map.jacobians() - here).max() < 0.6
+    assert np.allclose(np.linalg.det(found.source_map.jacobians()), 1, atol=2e-3)
     assert found.report["origin"] == [40, -50]
 
 

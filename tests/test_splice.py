@@ -64,7 +64,7 @@ def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
     # Connected figures are bent, so none of their pixels is of an element that moved whole.
     assert (matched is None) == (mine.layout != Layout.DISJOINT), "S5"
     assert matched is None or matched >= 0.99, "S5"
-    np.testing.assert_array_equal(view(result.source, mine.image), result.image, "S5")
+    np.testing.assert_array_equal(view(result.source_map, mine.image), result.image, "S5")
     if mine.layout == Layout.DISJOINT:
         assert result.report["flipped_rigid"] <= 0.002, "S6"
         assert result.report["flipped"] <= 0.12, "S6"
@@ -217,7 +217,7 @@ def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
     for result in (listed, meshed):
         moved = [m["found"] for m in result.report["matches"] if m["element"] == 12]
         assert np.allclose(moved[0], points[12], atol=1e-3)
-        rigid = np.argwhere(result.source.label == 1 + [m["element"] for m in result.report["matches"]].index(12))
+        rigid = np.argwhere(result.source_map.label == 1 + [m["element"] for m in result.report["matches"]].index(12))
         assert len(rigid) > 100
 
 
@@ -270,14 +270,14 @@ def test_maps_in_register_come_out_in_register() -> None:
     mine = ENTRIES["bricks"]
     result = texrs.splice(mine, ENTRIES["pebbles"], 128, use_cells=False, seed=1)
     height = np.linspace(0, 1, mine.mask.size, dtype=np.float32).reshape(mine.mask.shape)
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
-    assert (result.source.render(height) == height[rows, columns]).all()
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
+    assert (result.source_map.render(height) == height[rows, columns]).all()
     # Where the wall goes on as its mirror image, so do the directions on it.
-    frames = result.source.jacobians()
+    frames = result.source_map.jacobians()
     assert set(np.unique(frames)) <= {-1.0, 0.0, 1.0}
     across = np.full((*mine.mask.shape, 3), (0.6, 0.0, 0.8), np.float32)
     across[0, 0] = (-0.6, 0, 0.8)
-    turned = result.source.render(across, map_type="normal")
+    turned = result.source_map.render(across, map_type="normal")
     mirrored = frames[..., 1, 1] < 0
     usual = ~((rows == 0) & (columns == 0))
     assert (turned[mirrored & usual][:, 0] < 0).all()
@@ -414,7 +414,7 @@ def test_part_of_the_way_is_part_of_the_way() -> None:
 def test_layouts_that_shrink_leave_no_bare_margin(name: str, factor: float) -> None:
     mine = entry(name)
     result = texrs.self_splice(mine, {"op": "scale", "factor": factor}, seed=1)
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown, wide = mine.mask[rows, columns], max(mine.box) // 2
     sides = (shown[:wide], shown[-wide:], shown[:, :wide], shown[:, -wide:])
     assert min(side.mean() for side in sides) > 0.4 * mine.mask.mean()

@@ -79,10 +79,10 @@ def test_what_is_known_of_a_sample_is_put_together_from_its_cells(side: int) -> 
 def test_few_whole_cells_keep_their_size() -> None:
     entry = Elements.of_sample(samples.bricks((128, 128)))
     wide = texrs.self_splice(entry, size=(192, 208), seed=1)
-    there = wide.source.render(entry.mask, interpolation="nearest")
+    there = wide.source_map.render(entry.mask, interpolation="nearest")
     assert there.mean() == pytest.approx(entry.mask.mean(), abs=0.05)
     # As many elements for its area, whole ones and those that the border cuts.
-    share = len(np.unique(wide.source.label)) / entry.labels.max() / (192 * 208 / 128**2)
+    share = len(np.unique(wide.source_map.label)) / entry.labels.max() / (192 * 208 / 128**2)
     assert share == pytest.approx(0.85, abs=0.2)
 
 
@@ -101,12 +101,12 @@ def test_joints_are_unbroken_and_as_wide(a: str, b: str, spliced: Any) -> None:
     entry = {"stones": STONES, "wall": WALL, "net": NET}[a]
     cells, result = find_entry_cells(entry), spliced(a, b)
     assert cells is not None
-    shown = result.source.render(cells.joints, interpolation="linear")
-    seams = mark_outlines(result.source.label.astype(np.int32))
+    shown = result.source_map.render(cells.joints, interpolation="linear")
+    seams = mark_outlines(result.source_map.label.astype(np.int32))
     assert (maximum_filter(shown, 5)[seams] < 0.5).mean() <= 0.06
     share = [
         (j > 0.5).sum() / mark_outlines(x).sum()
-        for j, x in ((cells.joints, cells.labels), (shown, result.source.label))
+        for j, x in ((cells.joints, cells.labels), (shown, result.source_map.label))
     ]
     # Cuts are more jagged than outlines, and so longer.
     assert 0.7 <= share[1] / share[0] <= 1.33
@@ -114,15 +114,15 @@ def test_joints_are_unbroken_and_as_wide(a: str, b: str, spliced: Any) -> None:
 
 def test_the_result_is_a_source_map(spliced: Any) -> None:
     result = spliced("stones", "wall")
-    assert (result.source.render(STONES.image) == result.image).all()
+    assert (result.source_map.render(STONES.image) == result.image).all()
     deep = STONES.image.astype(np.uint16) * 257
     assert texrs.splice(replace(STONES, image=deep), WALL, (176, 176), seed=1).image.dtype == np.uint16
     height = np.linspace(0, 1, STONES.image.size, dtype=np.float32).reshape(SIZE)
-    assert result.source.render(height).shape == (176, 176)
-    frames = result.source.jacobians()
+    assert result.source_map.render(height).shape == (176, 176)
+    frames = result.source_map.jacobians()
     # A map that is continuous inside of its cells, and whose frames are its slopes.
-    slope = np.diff(result.source.coordinates, axis=1)
-    same = np.diff(result.source.label.astype(int), axis=1) == 0
+    slope = np.diff(result.source_map.coordinates, axis=1)
+    same = np.diff(result.source_map.label.astype(int), axis=1) == 0
     off = np.abs(slope - frames[:, :-1, :, 1]).max(axis=-1)[same]
     assert np.median(off) < 0.2
     assert (np.linalg.det(frames) > 0).mean() > 0.98, "nothing is mirrored"
@@ -130,9 +130,9 @@ def test_the_result_is_a_source_map(spliced: Any) -> None:
 
 def test_labels_are_targets(spliced: Any) -> None:
     result = spliced("stones", "dots")
-    assert result.source.label.min() >= 1
-    assert result.source.label.max() <= len(result.report["matches"])
-    m = result.report["matches"][int(result.source.label[88, 88]) - 1]
+    assert result.source_map.label.min() >= 1
+    assert result.source_map.label.max() <= len(result.report["matches"])
+    m = result.report["matches"][int(result.source_map.label[88, 88]) - 1]
     assert np.hypot(*np.subtract(m["target"], 88)) < 40
 
 

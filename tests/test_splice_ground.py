@@ -37,7 +37,7 @@ def make_discs(*, shadow: bool = False, light: float = 0.0) -> Elements:
 def find_ground(result: texrs.Synthesis) -> np.ndarray:
     from scipy.ndimage import binary_dilation
 
-    return ~binary_dilation(result.source.label > 0, iterations=6)
+    return ~binary_dilation(result.source_map.label > 0, iterations=6)
 
 
 def roughness(image: np.ndarray, where: np.ndarray) -> float:
@@ -57,7 +57,7 @@ def test_the_ground_is_as_rough_as_it_was() -> None:
 def test_ground_comes_from_ground() -> None:
     mine = make_discs()
     result = texrs.splice(mine, LAYOUT, seed=1, screening=None)
-    rows, columns = result.source.coordinates.astype(int)[result.source.label == 0].T
+    rows, columns = result.source_map.coordinates.astype(int)[result.source_map.label == 0].T
     assert not mine.mask[rows, columns].any()
     assert len(np.unique(rows * SIDE + columns)) > 0.3 * (~mine.mask).sum()
 
@@ -73,7 +73,7 @@ def test_elements_bring_their_shadows() -> None:
         if (
             2 <= row < SIDE - 2
             and 2 <= column < SIDE - 2
-            and not result.source.label[row - 2 : row + 3, column - 2 : column + 3].any()
+            and not result.source_map.label[row - 2 : row + 3, column - 2 : column + 3].any()
         ):
             seen.append(light[row - 1 : row + 2, column - 1 : column + 2].mean() < 255 * 0.35)
     assert len(seen) >= 5
@@ -86,10 +86,10 @@ def test_elements_bring_their_shadows() -> None:
 def test_elements_and_ground_are_in_one_light() -> None:
     mine = make_discs(light=0.8)
     plain, even = (texrs.splice(mine, LAYOUT, seed=1, screening=weight) for weight in (None, 0.01))
-    np.testing.assert_array_equal(plain.source.coordinates, even.source.coordinates)
+    np.testing.assert_array_equal(plain.source_map.coordinates, even.source_map.coordinates)
     # From what a disc brings along outwards to the ground: where neighbours are none in the texture.
-    apart = np.abs(np.diff(plain.source.coordinates, axis=1)).sum(axis=-1) != 1
-    apart &= (plain.source.label[:, 1:] == 0) & (plain.source.label[:, :-1] == 0)
+    apart = np.abs(np.diff(plain.source_map.coordinates, axis=1)).sum(axis=-1) != 1
+    apart &= (plain.source_map.label[:, 1:] == 0) & (plain.source_map.label[:, :-1] == 0)
     rows, columns = np.indices(apart.shape)
     steps = np.zeros(2)
     for row, column in [match["found"] for match in plain.report["matches"]]:

@@ -104,7 +104,7 @@ def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPat
     stones = Elements.of_sample(samples.load("pebbles", size=(128, 128)))
     result = texrs.splice(wall, stones, use_cells=False, seed=1)
     assert max(result.report["system"]) < 128
-    np.testing.assert_array_equal(view(result.source, wall.image), result.image)
+    np.testing.assert_array_equal(view(result.source_map, wall.image), result.image)
 
 
 @pytest.mark.parametrize("name", ["pebbles", "dots"])

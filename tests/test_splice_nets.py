@@ -87,20 +87,20 @@ def test_bending_misses_where_nets_do_not(spliced: texrs.Synthesis) -> None:
 
 
 def test_the_map_is_the_picture_and_nothing_is_mirrored(spliced: texrs.Synthesis) -> None:
-    at = spliced.source.coordinates.astype(int)
+    at = spliced.source_map.coordinates.astype(int)
     assert (NET.image[at[..., 0], at[..., 1]] == spliced.image).all()
     steps = np.diff(at, axis=1)
     # A mirrored region would run backwards.
     assert (steps == [0, 1]).all(axis=-1).mean() > 0.8
     assert (steps == [0, -1]).all(axis=-1).mean() < 0.01
-    assert int(spliced.source.label.max()) == spliced.report["targets"]
+    assert int(spliced.source_map.label.max()) == spliced.report["targets"]
 
 
 def test_labels_are_targets(spliced: texrs.Synthesis) -> None:
     for number, match in enumerate(spliced.report["matches"], 1):
         if match["found"] is not None:
             row, column = np.rint(match["found"]).astype(int)
-            assert spliced.source.label[row, column] == number
+            assert spliced.source_map.label[row, column] == number
 
 
 def test_the_same_seed_makes_the_same_picture(spliced: texrs.Synthesis) -> None:

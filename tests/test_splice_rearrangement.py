@@ -44,8 +44,8 @@ def find_middle(a: Elements) -> int:
 def count_elements(result: texrs.Synthesis, a: Elements) -> np.ndarray[Any, np.dtype[np.intp]]:
     """How many pixels of an element the result shows of each target."""
     core = split_foreground(a).core > 0
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
-    return np.bincount(result.source.label.astype(int)[core[rows, columns]], minlength=1)[1:]
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
+    return np.bincount(result.source_map.label.astype(int)[core[rows, columns]], minlength=1)[1:]
 
 
 @pytest.mark.parametrize("op", ["move", "remove"])
@@ -64,7 +64,7 @@ def test_moved_elements_keep_their_colours_above_others() -> None:
     other = int(np.argsort(np.hypot(*(BUTTONS.points - BUTTONS.points[one]).T))[1])
     step = {"op": "move", "element": one, "to": (BUTTONS.points[other] + [5, 3]).tolist()}
     result = texrs.self_splice(BUTTONS, step, seed=1)
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     core = split_foreground(BUTTONS).core[rows, columns] == one + 1
     assert core.sum() > 100
     np.testing.assert_array_equal(result.image[core], BUTTONS.image[rows, columns][core])
@@ -75,7 +75,7 @@ def test_margins_of_dense_textures_are_full(edit: dict[str, Any]) -> None:
     """Of pebbles hardly any ground is seen; the layout goes on, and is not reflected at pixels."""
     stones = Elements.of_sample(samples.load("pebbles", size=(192, 192)))
     result = texrs.self_splice(stones, edit, seed=1)
-    shown = result.source.label > 0
+    shown = result.source_map.label > 0
     sides = (shown[:16], shown[-16:], shown[:, :16], shown[:, -16:])
     assert min(side.mean() for side in sides) > 0.6 * shown[32:-32, 32:-32].mean()
 
@@ -85,7 +85,7 @@ def test_what_was_removed_leaves_ground_alone() -> None:
     one = find_middle(mine)
     result = texrs.self_splice(mine, {"op": "remove", "element": one}, seed=1)
     gone = split_foreground(mine).core == one + 1
-    rows, columns = result.source.coordinates.astype(int)[gone].T
+    rows, columns = result.source_map.coordinates.astype(int)[gone].T
     assert not mine.mask[rows, columns].any()
     # No ghost: as bright as the ground around.
     around = binary_dilation(gone, iterations=8) & ~binary_dilation(gone, iterations=3)
@@ -109,20 +109,20 @@ def test_nothing_is_cut_but_by_the_border(edit: Any) -> None:
 def test_elements_that_come_in_are_whole(edit: dict[str, Any]) -> None:
     """What the border cuts keeps its straight edge at the border: inside of the picture none is seen."""
     result = texrs.self_splice(BUTTONS, edit, seed=1)
-    parts, label = split_foreground(BUTTONS), result.source.label.astype(int)
+    parts, label = split_foreground(BUTTONS), result.source_map.label.astype(int)
     element = np.array([m["element"] for m in result.report["matches"]])
     border = np.unique(np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]]))
     inner = np.setdiff1d(np.unique(label), np.append(border, 0)) - 1
     assert len(inner) > 20
     assert parts.whole[element[inner]].all()
     # And no scrap of one lies about but at the border.
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     assert not (BUTTONS.mask[rows, columns] & (label == 0))[12:-12, 12:-12].any()
 
 
 def test_a_margin_that_opens_is_as_full_as_the_rest() -> None:
     result = texrs.self_splice(BUTTONS, {"op": "shift", "by": [24, 24]}, seed=1)
-    shown = result.source.label > 0
+    shown = result.source_map.label > 0
     assert shown[:24].mean() > 0.5 * BUTTONS.mask.mean()
     assert shown[:, :24].mean() > 0.5 * BUTTONS.mask.mean()
 
@@ -142,11 +142,11 @@ def test_light_is_left_where_it_is() -> None:
     mine = make_discs(light=0.5)
     assert survey(mine).light is not None
     result = texrs.self_splice(mine, {"op": "randomise", "amount": 0.6}, seed=3)
-    ground = ~binary_dilation(result.source.label > 0, iterations=5)
+    ground = ~binary_dilation(result.source_map.label > 0, iterations=5)
     lit = 255 * (0.4 + 0.5 * (np.arange(SIDE) / SIDE - 0.5))
     away = gaussian_filter(np.where(ground, result.image[..., 0] - lit, 0.0), 3)
     assert np.abs(away[ground]).max() < 12
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     discs = mine.mask[rows, columns]
     bright = result.image[..., 0] - 255 * 0.7 - (lit - 255 * 0.4)
     assert np.abs(np.median(bright[discs])) < 5
@@ -190,7 +190,7 @@ def test_any_picture_in_uneven_light(kind: str) -> None:
         assert result.image.min() >= image.min()
         assert result.image.max() <= image.max()
     if kind == "alpha":
-        alpha = edited.source.render(image[..., 3], interpolation="nearest")
+        alpha = edited.source_map.render(image[..., 3], interpolation="nearest")
         np.testing.assert_array_equal(edited.image[..., 3], alpha)
     still = texrs.self_splice(mine, {"op": "shift", "by": 0})
     np.testing.assert_array_equal(still.image, image)
@@ -199,7 +199,7 @@ def test_any_picture_in_uneven_light(kind: str) -> None:
 def test_without_correction_it_is_the_texture_looked_up() -> None:
     mine = make_discs(light=0.5)
     result = texrs.self_splice(mine, "randomise", seed=1, screening=None)
-    np.testing.assert_array_equal(result.image, result.source.render(mine.image, interpolation="nearest"))
+    np.testing.assert_array_equal(result.image, result.source_map.render(mine.image, interpolation="nearest"))
     assert result.report["screening"] == 0
 
 
@@ -222,7 +222,7 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
         with texrs.threads(count):
             made.append(texrs.self_splice(BUTTONS, ["randomise", {"op": "scale", "factor": 0.9}], seed=3))
     np.testing.assert_array_equal(made[0].image, made[1].image)
-    np.testing.assert_array_equal(made[0].source.label, made[1].source.label)
+    np.testing.assert_array_equal(made[0].source_map.label, made[1].source_map.label)
 
 
 @pytest.mark.parametrize("screening", [-1.0, float("inf"), "soft"])
@@ -234,7 +234,7 @@ def test_bad_weights(screening: Any) -> None:
 def test_of_a_texture_without_elements_the_ground_is_left() -> None:
     mine = make_discs()
     result = texrs.self_splice(mine, [{"op": "remove", "element": i} for i in range(len(mine.points))], seed=1)
-    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     assert not mine.mask[rows, columns].any()
     assert result.report["matches"] == []
 
@@ -265,4 +265,4 @@ def test_ground_is_as_rough_as_it_was() -> None:
         return float(steep[~binary_dilation(~ground, iterations=4)].mean())
 
     result = texrs.splice(mine, BUTTONS, (160, 160), seed=1)
-    assert measure(result.image, result.source.label == 0) > 0.93 * measure(mine.image, ~mine.mask)
+    assert measure(result.image, result.source_map.label == 0) > 0.93 * measure(mine.image, ~mine.mask)

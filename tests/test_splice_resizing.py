@@ -45,10 +45,10 @@ def test_the_layout_goes_on(name: str) -> None:
 def test_the_map_looks_into_the_texture(name: str, edit: Any) -> None:
     mine = ENTRIES[name]
     result = texrs.self_splice(mine, edit, LARGE, seed=1, screening=None)
-    assert result.source.shapes == ((128, 128),)
-    np.testing.assert_array_equal(result.source.render(mine.image), result.image)
+    assert result.source_map.shapes == ((128, 128),)
+    np.testing.assert_array_equal(result.source_map.render(mine.image), result.image)
     # What the map shows at an element's place is one: so the mask says, which took no part in the picture.
-    shown = result.source.render(mine.mask, interpolation="nearest")
+    shown = result.source_map.render(mine.mask, interpolation="nearest")
     assert shown.mean() == pytest.approx(mine.mask.mean(), abs=0.12)
 
 
@@ -64,7 +64,7 @@ def test_every_separate_element_is_shown_whole() -> None:
         if not (16 <= row < LARGE[0] - 16 and 16 <= column < LARGE[1] - 16):
             continue
         window = (slice(round(row) - 16, round(row) + 17), slice(round(column) - 16, round(column) + 17))
-        places = result.source.coordinates[window].astype(np.intp)
+        places = result.source_map.coordinates[window].astype(np.intp)
         owner = sample.labels[places[..., 0], places[..., 1]]
         number = sample.labels[tuple(np.rint(match["point"]).astype(int))]
         seen = np.unique(places[owner == number], axis=0)
@@ -84,8 +84,8 @@ def test_steps_are_done_in_the_larger_texture() -> None:
     left = np.array([match["found"] for match in result.report["matches"]])
     assert nearest_distances(points[[inner]], 1, left)[0, 0] > 0.7 * spacing(points)
     row, column = points[inner].astype(int)
-    assert plain.source.render(mine.mask, interpolation="nearest")[row, column]
-    assert not result.source.render(mine.mask, interpolation="nearest")[row, column]
+    assert plain.source_map.render(mine.mask, interpolation="nearest")[row, column]
+    assert not result.source_map.render(mine.mask, interpolation="nearest")[row, column]
     # Far from it nothing changes.
     np.testing.assert_array_equal(result.image[:20, :20], plain.image[:20, :20])
     again = texrs.self_splice(mine, result.report["edit"], LARGE, seed=1)

@@ -112,7 +112,7 @@ def test_bend_overrules_what_the_exemplar_says(bend):
 def test_the_frames_of_rigid_patches_are_their_own():
     """Inside a patch places go on as its frame says, so normals are turned by what was done."""
     made = texrs.synthesize(samples.dots((96, 96)).image, 128, field=fields.circular(axes=2), seed=2)
-    frames, coordinates, labels = made.source.jacobians(), made.source.coordinates, made.source.label
+    frames, coordinates, labels = made.source_map.jacobians(), made.source_map.coordinates, made.source_map.label
     for axis in range(2):
         step = np.diff(coordinates, axis=axis)
         same = np.diff(labels, axis=axis) == 0
@@ -127,7 +127,7 @@ def test_bent_patches_follow_the_field():
     field = fields.circular(axes=2)
     errors = {}
     for bend in (True, False):
-        source = texrs.synthesize(bricks, 160, field=field, bend_patches=bend, seed=1).source
+        source = texrs.synthesize(bricks, 160, field=field, bend_patches=bend, seed=1).source_map
         expected = field.over((160, 160)).lattice((160, 160))
         step, same = np.diff(source.coordinates, axis=1), np.diff(source.label, axis=1) == 0
         errors[bend] = np.linalg.norm(step - expected[:, :-1, :, 1], axis=-1)[same].mean()
@@ -140,7 +140,7 @@ def test_bent_patches_follow_the_field():
 @pytest.mark.parametrize("kind", FIELDS)
 def test_elements_stay_whole(kind):
     fast = texrs.solid(PARTICLES.image, 64, quality="fast", seed=1, field=FIELDS[kind])
-    stitched, corrected = (volume.integrity(PARTICLES.image, made.source) for made in (make_volume(kind, 1), fast))
+    stitched, corrected = (volume.integrity(PARTICLES.image, made.source_map) for made in (make_volume(kind, 1), fast))
     assert stitched.contacts[1] < 0.5
     assert stitched.torn < 0.12
     assert stitched.torn < 0.5 * corrected.torn
@@ -154,7 +154,7 @@ def test_elements_keep_their_share_and_number(kind):
     depth = exemplar.instances.depth
     shares, numbers = [], []
     for seed in (1, 2, 3):
-        source = make_volume(kind, seed).source
+        source = make_volume(kind, seed).source_map
         at = np.rint(source.coordinates).astype(int) % 64
         shares.append((depth[tuple(np.moveaxis(at, -1, 0))] > 0).mean() / (depth > 0).mean())
         before, after = volume.integrity(exemplar, source).density
@@ -192,7 +192,7 @@ def test_integrity_of_a_copy_and_of_a_cheat():
 
 def test_the_comparison_tells_of_torn_elements():
     made = texrs.solid(PARTICLES.image, 48, seed=3)
-    text = volume.compare(PARTICLES.image, made.image, made.source).text
+    text = volume.compare(PARTICLES.image, made.image, made.source_map).text
     assert "torn elements / all" in text
     assert "torn elements" not in volume.compare(PARTICLES.image, made.image).text
 
@@ -204,7 +204,7 @@ def test_rare_things_keep_their_share():
     def shares(image):
         return np.bincount(found.of(image).ravel(), minlength=count) / (image.size / 3)
 
-    images = [make_volume("none", s).source.render(PARTICLES.image, interpolation="nearest") for s in (1, 2)]
+    images = [make_volume("none", s).source_map.render(PARTICLES.image, interpolation="nearest") for s in (1, 2)]
     mean = np.mean([shares(image) for image in images], axis=0)
     np.testing.assert_allclose(mean / shares(PARTICLES.image), 1, atol=0.2)
 
@@ -216,10 +216,10 @@ def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
     assert exemplar.instances is None
     assert exemplar.stitcher.guessed
     assert not exemplar.stitcher.separate
-    torn = [evaluate(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source).torn for seed in range(3)]
+    torn = [evaluate(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source_map).torn for seed in range(3)]
     monkeypatch.setattr(_exemplar, "guess_instances", lambda parts: None)
     # Said in another way, so that it is another exemplar, of which nothing is kept.
     unaware = texrs.Exemplar(picture, repeat=False, labels=False)
     assert not unaware.stitcher.guessed
-    before = [evaluate(exemplar, texrs.synthesize(unaware, 160, seed=seed).source).torn for seed in range(3)]
+    before = [evaluate(exemplar, texrs.synthesize(unaware, 160, seed=seed).source_map).torn for seed in range(3)]
     assert sum(torn) < 0.6 * sum(before), (torn, before)

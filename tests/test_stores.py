@@ -106,17 +106,17 @@ def test_a_cluster_makes_the_same(client: Client) -> None:
 def test_source_maps_are_looked_up_lazily() -> None:
     made = texrs.synthesize(WEAVE, (70, 90), field=fields.circular(axes=2), seed=1)
     other = WEAVE.astype(np.float32) / 7
-    found = made.source.to_dask(other, 32)
+    found = made.source_map.to_dask(other, 32)
     assert found.shape == (70, 90, 3)
-    assert np.array_equal(found.compute(scheduler="threads"), made.source.render(other))
+    assert np.array_equal(found.compute(scheduler="threads"), made.source_map.render(other))
     normals = np.zeros((*WEAVE.shape[:2], 3), np.float32)
     normals[..., 0], normals[..., 2] = -0.6, 0.8
-    turned = made.source.to_dask(normals, (32, 64), map_type="normal", interpolation="nearest")
-    assert np.array_equal(turned.compute(), made.source.render(normals, map_type="normal", interpolation="nearest"))
+    turned = made.source_map.to_dask(normals, (32, 64), map_type="normal", interpolation="nearest")
+    assert np.array_equal(turned.compute(), made.source_map.render(normals, map_type="normal", interpolation="nearest"))
     plain = texrs.design(WEAVE, 96, seed=2)
-    assert np.array_equal(plain.source.to_dask(WEAVE, 50).compute(), plain.stages["before_blending"])
+    assert np.array_equal(plain.source_map.to_dask(WEAVE, 50).compute(), plain.stages["before_blending"])
     with pytest.raises(InvalidInput, match="exemplars: number 0 needs size"):
-        made.source.to_dask(WEAVE[:-1])
+        made.source_map.to_dask(WEAVE[:-1])
 
 
 @pytest.mark.parametrize("scheduler", [None, 2])
@@ -126,14 +126,14 @@ def test_source_maps_are_looked_up_into_a_store(tmp_path: Path, scheduler: int |
     each: list[dict[str, Any]] = [{}, {"antialias": True}, {"interpolation": "nearest"}]
     for options in each[1:2] if scheduler else each:
         store = tmp_path / f"{len(options)}{'nearest' in options.values()}.zarr"
-        done = made.source.to_zarr(store, other, 32, scheduler=scheduler, **options)
+        done = made.source_map.to_zarr(store, other, 32, scheduler=scheduler, **options)
         assert (done.shape, done.made) == ((70, 90, 3), done.chunks)
-        assert np.array_equal(texrs.io.read(store), made.source.render(other, **options))
-        assert made.source.to_zarr(store, other, 32, **options).made == 0
+        assert np.array_equal(texrs.io.read(store), made.source_map.render(other, **options))
+        assert made.source_map.to_zarr(store, other, 32, **options).made == 0
     with pytest.raises(FileError, match="holds something else"):
-        made.source.to_zarr(store, other + 1, 32)
+        made.source_map.to_zarr(store, other + 1, 32)
     solid = texrs.solid(STRIPES, 32, seed=1)
-    solid.source.to_zarr(tmp_path / "solid.zarr", STRIPES, 20, levels=1, spacing=(2, 1, 1))
+    solid.source_map.to_zarr(tmp_path / "solid.zarr", STRIPES, 20, levels=1, spacing=(2, 1, 1))
     assert np.array_equal(texrs.io.read_volume(tmp_path / "solid.zarr"), solid.image)
 
 

@@ -69,15 +69,15 @@ def test_tiles_agree_along_their_edges(tiles: texrs.TileSet) -> None:
         # Other tiles beside each other differ there more than anywhere else.
         assert apart[-1] == apart.max()
         assert found[-1] < min(1.5 * found.mean(), 0.7 * apart[-1])
-    assert tiles.source.shape == tiles.atlas.shape[:2] == (9 * side, 9 * side)
+    assert tiles.source_map.shape == tiles.atlas.shape[:2] == (9 * side, 9 * side)
 
 
 def test_the_source_map_shows_the_window(tiles: texrs.TileSet) -> None:
     made = tiles.window((FAR + 5, -77), (90, 130))
-    shown = made.source.render(DOTS).astype(int)
+    shown = made.source_map.render(DOTS).astype(int)
     # But for colours that the design blended.
     assert np.median(np.abs(shown - made.image)) <= 3
-    assert made.source.shape == (90, 130)
+    assert made.source_map.shape == (90, 130)
     assert made.report["origin"] == [FAR + 5, -77]
 
 
@@ -107,7 +107,7 @@ def test_same_bytes_again_in_threads_and_after_travelling(tiles: texrs.TileSet) 
     with texrs.threads(1):
         again = texrs.TileSet(DOTS, 48, seed=1, variants=2)
     assert again.key == tiles.key
-    assert np.array_equal(again.source.coordinates, tiles.source.coordinates)
+    assert np.array_equal(again.source_map.coordinates, tiles.source_map.coordinates)
     back = pickle.loads(pickle.dumps(tiles))
     assert np.array_equal(back[FAR : FAR + 60, 0:60], tiles[FAR : FAR + 60, 0:60])
     assert texrs.TileSet(DOTS, 48, seed=2, variants=1).key != tiles.key

@@ -220,7 +220,7 @@ def test_the_size_is_kept_where_a_cover_shows_no_more(name):
     assert made.image.shape == image.shape
     assert all(j["cover"] > 0 and j["overlap"] == 0 for j in made.report["joints"].values())
     # What covers the ends is from elsewhere in the picture, and nothing but the ends is covered.
-    assert 0.6 < (made.source.reuse().verbatim) <= 1
+    assert 0.6 < (made.source_map.reuse().verbatim) <= 1
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_any_size_is_exact(size):
     made = texrs.tile(image, size=size)
     rows, columns = (size, size) if isinstance(size, int) else size
     assert made.image.shape == (rows, columns, 3)
-    at = made.source.coordinates.astype(int)
+    at = made.source_map.coordinates.astype(int)
     np.testing.assert_array_equal(made.image, image[at[..., 0], at[..., 1]])
     assert max(texrs.check_tiling(made.image).seam) <= 1.5
     assert made.report["method"] == ("quilt" if max(rows, columns) > 256 else "tile")
@@ -250,7 +250,7 @@ def test_an_axis_that_does_not_wrap_keeps_its_middle(size, wrap):
     for axis in (0, 1):
         if not wrap[axis]:
             first = (96 - sides[axis]) // 2
-            assert (made.source.coordinates[..., axis] == np.indices(sides)[axis] + first).all()
+            assert (made.source_map.coordinates[..., axis] == np.indices(sides)[axis] + first).all()
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (2, 9), (3, 3), (5, 64), (8, 8)])
@@ -270,7 +270,7 @@ def test_axes_that_do_not_wrap_keep_their_size(wrap):
     for axis in (0, 1):
         if not wrap[axis]:
             assert made.report["overlap"][axis] == 0
-            assert (made.source.coordinates[..., axis] == np.indices(made.source.shape)[axis]).all()
+            assert (made.source_map.coordinates[..., axis] == np.indices(made.source_map.shape)[axis]).all()
     if wrap == (False, False):
         np.testing.assert_array_equal(made.image, image)
 
@@ -279,7 +279,7 @@ def test_every_pixel_of_the_result_keeps_its_neighbours_but_at_the_cut():
     made = texrs.tile(picture("pebbles", 128), overlap=(30, 24))
     pieces = made.stages["source_regions"]
     for axis in (0, 1):
-        torn = ~made.source.continues(axis)
+        torn = ~made.source_map.continues(axis)
         change = pieces != np.roll(pieces, -1, axis)
         np.testing.assert_array_equal(torn.swapaxes(0, axis)[:-1], change.swapaxes(0, axis)[:-1])
 
@@ -293,9 +293,9 @@ def test_every_map_in_register():
     made = [texrs.tile(each, overlap=24) for each in stack]
     for each, result in zip(stack, made, strict=True):
         assert result.image.dtype == each.dtype
-        at = result.source.coordinates.astype(int)
+        at = result.source_map.coordinates.astype(int)
         np.testing.assert_array_equal(result.image, each[at[..., 0], at[..., 1]])
-    np.testing.assert_array_equal(made[0].source.coordinates, made[1].source.coordinates)
+    np.testing.assert_array_equal(made[0].source_map.coordinates, made[1].source_map.coordinates)
     np.testing.assert_array_equal(made[1].image, made[0].image.astype(np.uint16) * 257)
 
 
@@ -398,7 +398,7 @@ def test_same_bytes_for_any_number_of_threads():
             made.append(texrs.tile(image))
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
-        assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()
+        assert other.source_map.coordinates.tobytes() == made[0].source_map.coordinates.tobytes()
 
 
 def test_an_exemplar_is_tiled_as_its_array():

@@ -225,7 +225,7 @@ def test_only_colours_of_a_material_are_evened():
     material = texrs.Material({"albedo": image, "height": image[..., 0].astype(np.uint16) * 257})
     made = texrs.tile(material)
     assert made.report["flatten_lighting"] is True
-    at = made.source.coordinates.astype(int)
+    at = made.source_map.coordinates.astype(int)
     np.testing.assert_array_equal(made.material["height"].pixels, material["height"].pixels[at[..., 0], at[..., 1]])
     even = material.flatten()["albedo"].pixels
     np.testing.assert_array_equal(made.material["albedo"].pixels, even[at[..., 0], at[..., 1]])

@@ -48,7 +48,7 @@ def test_labels_and_everything_else_follow():
     rows, columns = (AUGMENT(IMAGE, each, seed=3).mask for each in (ROWS, COLUMNS))
     assert np.array_equal(made.image, IMAGE[rows, columns])
     assert np.array_equal(made.mask, LABELS[rows, columns])
-    assert np.array_equal(made.source.render(LABELS, interpolation="nearest"), made.mask)
+    assert np.array_equal(made.source_map.render(LABELS, interpolation="nearest"), made.mask)
 
 
 def test_boxes_are_around_what_is_seen_of_them():
@@ -132,7 +132,7 @@ def test_things_of_large_pictures_are_found_on_half_of_the_samples(dtype: str):
     assert found.max() == pytest.approx(whole.max(), rel=0.2)
     made = texrs.transforms.TextureAugment()(image, sample.labels, seed=2)
     assert made.image.dtype == image.dtype
-    assert (made.image == image[tuple(np.moveaxis(made.source.coordinates.astype(int), -1, 0))]).all()
+    assert (made.image == image[tuple(np.moveaxis(made.source_map.coordinates.astype(int), -1, 0))]).all()
 
 
 def test_what_keeps_to_lines_is_found_on_all_samples():

@@ -57,7 +57,7 @@ def show(thing: Any) -> list[str]:
         return [digest(found[name]) for name in sorted(found)] + [repr((thing.labels, thing.repeat))]
     made = thing.window((-9, 30, 4)[-thing.axes :], (20, 14, 11)[-thing.axes :])
     maps = [] if made.material is None else [each.pixels for each in made.material.values()]
-    return [digest(array) for array in (made.image, made.source.coordinates, made.source.jacobians(), *maps)]
+    return [digest(array) for array in (made.image, made.source_map.coordinates, made.source_map.jacobians(), *maps)]
 
 
 @pytest.mark.parametrize("name", THINGS)
@@ -143,9 +143,9 @@ def test_results_travel(tmp_path: Path) -> None:
     dots = samples.dots((96, 96)).image
     made = texrs.synthesize(WEAVE, 48, field=TURNED)
     back = pickle.loads(pickle.dumps(made))
-    assert np.array_equal(back.source.render(WEAVE), made.stages["before_blending"])
-    assert np.array_equal(back.source.jacobians(), made.source.jacobians())
-    assert repr(back.source.finish) == repr(made.source.finish)
+    assert np.array_equal(back.source_map.render(WEAVE), made.stages["before_blending"])
+    assert np.array_equal(back.source_map.jacobians(), made.source_map.jacobians())
+    assert repr(back.source_map.finish) == repr(made.source_map.finish)
     elements = texrs.elements.analyse(dots)
     again = pickle.loads(pickle.dumps(elements))
     assert np.array_equal(texrs.self_splice(again).image, texrs.self_splice(elements).image)
@@ -177,7 +177,7 @@ def test_points_between_pixels_carry_places_on() -> None:
     plane = texrs.PlaneTexture(texrs.Exemplar(ramp, labels=False, repeat=False), seed=5, interpolation="linear")
     points = np.random.default_rng(0).uniform(-50, 50, (200, 2))
     voxel = np.floor(points + 0.5)
-    at = plane.window((-52, -52), 104).source.coordinates[tuple((voxel + 52).astype(int).T)]
+    at = plane.window((-52, -52), 104).source_map.coordinates[tuple((voxel + 52).astype(int).T)]
     inside = ((at > 1) & (at < (30, 38))).all(axis=1)
     wanted = plane.sample(voxel) + (points - voxel) @ [1, 100]
     assert inside.sum() > 100

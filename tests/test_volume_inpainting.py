@@ -55,8 +55,8 @@ def test_a_hole_has_no_step_at_its_border(name: str) -> None:
     assert measure_step(result.image, hole) <= 1.2
     assert result.image.dtype == volume.dtype
     # The map alone is exact, and looks nowhere into the hole.
-    np.testing.assert_array_equal(result.source.render([given]), result.stages["before_blending"])
-    places = np.rint(result.source.coordinates).astype(int)
+    np.testing.assert_array_equal(result.source_map.render([given]), result.stages["before_blending"])
+    places = np.rint(result.source_map.coordinates).astype(int)
     assert not hole[tuple(np.moveaxis(places, -1, 0))].any()
     # What was in the hole does not matter.
     assert (texrs.inpaint(volume, hole, seed=3).image == result.image).all()
@@ -110,7 +110,7 @@ def test_holes_of_any_shape() -> None:
     for hole in (corner, specks, corner | specks):
         result = texrs.inpaint(volume, hole, screening=0)
         assert (result.image[~hole] == volume[~hole]).all()
-        assert ((result.source.label > 0) == hole).all()
+        assert ((result.source_map.label > 0) == hole).all()
 
 
 @pytest.mark.parametrize(

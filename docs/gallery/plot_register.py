@@ -12,12 +12,12 @@ import texrs
 
 pebbles = texrs.samples.pebbles((160, 160))
 result = texrs.design(pebbles.image, (192, 240), seed=2)
-stones = result.source.render(pebbles.labels, interpolation="nearest")
+stones = result.source_map.render(pebbles.labels, interpolation="nearest")
 
 figure, row = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
 shown = {
     "the result": result.image,
-    "where each pixel comes from": result.source.coordinates[..., 1],
+    "where each pixel comes from": result.source_map.coordinates[..., 1],
     "the stones known in the example": texrs.volume.paint(stones),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):

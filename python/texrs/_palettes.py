@@ -51,14 +51,14 @@ class Palette:
 
     def keep(self, made: Synthesis) -> Synthesis:
         """Return a result whose pixels are pixels of the examples."""
-        if made.source.axes != 2:
+        if made.source_map.axes != 2:
             return made
-        source = make_plain(made.source)
+        source = make_plain(made.source_map)
         image = source.render(self.images if len(self.images) > 1 else self.images[0], interpolation="nearest")
         known = {"screening": 0.0, "interpolation": "nearest"}
         report = {**made.report, **{key: value for key, value in known.items() if key in made.report}}
         stages = {name: image if name == "before_blending" else stage for name, stage in made.stages.items()}
-        return replace(made, image=image, source=source, stages=stages, report={**report, "palette": self.count})
+        return replace(made, image=image, source_map=source, stages=stages, report={**report, "palette": self.count})
 
 
 @contextmanager
@@ -144,11 +144,11 @@ def make_plain(source: SourceMap) -> SourceMap:
 def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
     """Return a result whose maps are looked up to the nearest pixel, if the colours of its materials are few."""
     asked, bases = _ASKED.get(), [m.base for m in materials]
-    few = asked is not False and made.source.axes == 2 and all(has_few_colours(base) for base in bases)
+    few = asked is not False and made.source_map.axes == 2 and all(has_few_colours(base) for base in bases)
     if not few and not asked:
         return made
     assume("maps: few colours, looked up to the nearest pixel and never corrected; see --no-palette")
-    return replace(made, source=make_plain(made.source))
+    return replace(made, source_map=make_plain(made.source_map))
 
 
 def _keeps(image: Array, indexed: bool) -> bool:

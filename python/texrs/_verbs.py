@@ -122,7 +122,7 @@ def takes_materials(
 def finish(made: Synthesis, materials: list[Material], progress: Progress | None) -> Synthesis:
     """Return what a verb made of guides as what it makes of their materials."""
     made = _palettes.keep_material(made, materials)
-    material = apply_materials(materials, made.source, progress)
+    material = apply_materials(materials, made.source_map, progress)
     stages = {"guide" if name == "before_blending" else name: stage for name, stage in made.stages.items()}
     maps = {name: each.role.value for name, each in material.items()}
     return replace(

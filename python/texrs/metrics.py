@@ -150,7 +150,7 @@ def evaluate(
     >>> evaluate(pebbles, texrs.SourceMap.identity((96, 96))).score
     0.0
     >>> made = texrs.synthesize(pebbles, 96)
-    >>> evaluate(pebbles, made.source).score > 0
+    >>> evaluate(pebbles, made.source_map).score > 0
     True
 
     """

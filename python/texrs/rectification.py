@@ -104,7 +104,7 @@ def rectify(
     >>> import texrs
     >>> floor = texrs.samples.tilted_discs((192, 192))
     >>> flat = texrs.rectify(floor.image, view=texrs.View(slant=50, fov=53))
-    >>> flat.source.shapes, flat.report["plane"]["slant"]
+    >>> flat.source_map.shapes, flat.report["plane"]["slant"]
     (((192, 192),), 50.0)
 
     """
@@ -303,7 +303,7 @@ def grow(
     shape = (flat.shape[0], flat.shape[1])
     if any(wrap):
         made = tile(flat, wrap=wrap, size=size, progress=watch)
-        return made.source, "tile"
+        return made.source_map, "tile"
     if size is None or size == shape:
         return SourceMap.identity(shape), "nothing"
     if all(n <= m for n, m in zip(size, shape, strict=True)):
@@ -311,4 +311,4 @@ def grow(
         return cut(SourceMap.identity(shape), (places[0], places[1])), "nothing"
     from texrs.papers.design import design
 
-    return design(flat, size, seed=seed, wrap=False, progress=watch).source, "design"
+    return design(flat, size, seed=seed, wrap=False, progress=watch).source_map, "design"

@@ -28,8 +28,8 @@ class Synthesis:
     ----------
     image : (rows, columns[, C]) or (planes, rows, columns[, C]) array
         The result, in the dtype and with the channels of the exemplar.
-    source : SourceMap
-        Where each pixel comes from; ``source.render(exemplar)`` is ``stages["before_blending"]``, exactly.
+    source_map : SourceMap
+        Where each pixel comes from; ``source_map.render(exemplar)`` is ``stages["before_blending"]``, exactly.
     stages : mapping of str to array
         Pictures of the stages, in the order in which they were made. ``"before_blending"`` is the result before any colour
         correction.
@@ -43,13 +43,13 @@ class Synthesis:
     >>> import texrs
     >>> pebbles = texrs.samples.pebbles((64, 64)).image
     >>> made = texrs.design(pebbles, 96, seed=1)
-    >>> made.image.shape, made.source.shape, made.image.dtype == pebbles.dtype
+    >>> made.image.shape, made.source_map.shape, made.image.dtype == pebbles.dtype
     ((96, 96, 3), (96, 96), True)
 
     """
 
     image: Array
-    source: SourceMap
+    source_map: SourceMap
     stages: Mapping[str, Array] = field(default_factory=dict)
     report: Mapping[str, Any] = field(default_factory=dict)
     material: Material | None = None
@@ -57,7 +57,7 @@ class Synthesis:
     def __repr__(self) -> str:
         """Return the size, the channels and the dtype."""
         maps = "" if self.material is None else f", maps {', '.join(self.material)}"
-        return f"<Synthesis of {measure(self.image, self.source.axes)}{maps}>"
+        return f"<Synthesis of {measure(self.image, self.source_map.axes)}{maps}>"
 
     def save_stages(self, folder: Path) -> list[FilePath]:
         """Write each stage as a numbered PNG, and the report as ``report.json``.
@@ -109,13 +109,13 @@ class Synthesis:
 
     def _repr_html_(self) -> str | None:
         """Show a volume in a notebook by slices with sliders; of a picture nothing, so that it is shown as one."""
-        if self.source.axes == 2:
+        if self.source_map.axes == 2:
             return None
         return as_page(as_image(self.image, "image", axes=3))
 
     def _flatten(self, stage: Array) -> Array:
         """Return slices of what is as large as a volume; anything else is a picture already."""
-        if self.source.axes == 2 or stage.shape[:3] != self.source.shape:
+        if self.source_map.axes == 2 or stage.shape[:3] != self.source_map.shape:
             return stage
         from texrs.volume import slices
 

@@ -35,7 +35,7 @@ class D1:
 
 
 def d1(exemplar: np.ndarray, result: Any, size: tuple[int, int]) -> D1:
-    image, source = np.asarray(result.image), result.source
+    image, source = np.asarray(result.image), result.source_map
     floats = image.dtype.kind == "f"
     bounds = np.array([source.shapes[e] for e in range(len(source.shapes))], np.float64)[source.exemplar] - 1
     places = source.coordinates

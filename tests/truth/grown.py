@@ -218,7 +218,7 @@ def comparisons() -> Parts:
     exemplar = colour("stripes", *CUBE)
     field = fields.circular(axis="x")
     result = texrs.solid(exemplar, (24, 28, 28), field=field, quality="fast", seed=8)
-    found = volume.compare(exemplar, result.image, result.source, field)
+    found = volume.compare(exemplar, result.image, result.source_map, field)
     flat = volume.compare(colour("pebbles", 64, 64), colour("pebbles", 64, 80, seed=1))
     labels = [classes("weave_solid", *CUBE, seed=seed) for seed in (3, 4)]
     classed = volume.compare(*labels, classes=None, chosen=(2, 3))

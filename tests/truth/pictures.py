@@ -225,7 +225,7 @@ def designed(name: str, seed: int) -> texrs.Synthesis:
 
 @case
 def blends() -> Parts:
-    source = designed("pebbles", 7).source
+    source = designed("pebbles", 7).source_map
     within = box((112, 128), (16, 100), (10, 120))
     known = ~box((96, 96), (0, 8), (0, 96))
     args = ("pebbles", 96, 96)
@@ -241,9 +241,9 @@ def blends() -> Parts:
 
 @case
 def source_maps() -> Parts:
-    source = designed("leaves_and_flowers", 8).source
+    source = designed("leaves_and_flowers", 8).source_map
     args = ("leaves_and_flowers", 96, 96)
-    tiled = texrs.tile(source.render(colour(*args, seed=8))).source.compose(source)
+    tiled = texrs.tile(source.render(colour(*args, seed=8))).source_map.compose(source)
     reuse = source.reuse()
     return {
         "nearest": source.render(deep(*args, seed=8), interpolation="nearest"),

@@ -35,7 +35,7 @@ def case(make: Callable[[], Parts]) -> Callable[[], Parts]:
 
 def parts_of(result: Synthesis, *, report: Sequence[str] = (), stages: Sequence[str] = ()) -> dict[str, Any]:
     """Return the parts of what a verb returns: the image, the source map, and the stages and figures that are named."""
-    source = result.source
+    source = result.source_map
     return {
         "image": result.image,
         "coordinates": source.coordinates,

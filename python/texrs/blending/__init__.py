@@ -239,7 +239,7 @@ def apply(
     >>> import texrs
     >>> pebbles = texrs.samples.pebbles((64, 64)).image
     >>> result = texrs.design(pebbles, 64)
-    >>> bool((texrs.blending.apply(result.source, pebbles) == result.image).all())
+    >>> bool((texrs.blending.apply(result.source_map, pebbles) == result.image).all())
     True
 
     """

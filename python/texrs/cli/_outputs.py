@@ -383,7 +383,7 @@ def deliver(
     Voxels lie as those of the file ``volume``, with another spacing if that is given.
     """
     out = paths["out"] or ""
-    image, axes = np.asarray(result.image), result.source.axes
+    image, axes = np.asarray(result.image), result.source_map.axes
     suffix = find_suffix(Path(out))
     known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
     # The result takes its name last, when all else is written.
@@ -417,7 +417,7 @@ def deliver_beside(
     """Write what was asked for beside a result: its map, and pictures of its stages."""
     if (source := paths.get("source_map")) is not None:
         with write_output(source, "source_map", suffix=suffix, made=made) as place:
-            result.source.save(place)
+            result.source_map.save(place)
     if (stages := paths.get("stages")) is not None:
         with write_folder(stages, "stages", suffix=suffix, made=made) as folder:
             result.save_stages(folder)

@@ -37,7 +37,7 @@ def _results(workshop: Workshop) -> str:
     for i, (name, caption, options) in enumerate(SHOWN):
         workshop.watch(i / len(SHOWN))
         made = workshop.design(name, **options)
-        reuse = made.result.source.reuse()
+        reuse = made.result.source_map.reuse()
         rows.append(
             row(
                 figure(made.sample.image, "Example", note=_format_size(made.sample.image)),

@@ -39,7 +39,7 @@ def apply(
 ) -> Array:
     """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
 
-    ``apply(result.source, exemplar)`` is ``result.image``, bit for bit, except where elements are lit again (`texrs.splice`).
+    ``apply(result.source_map, exemplar)`` is ``result.image``, bit for bit, unless elements are lit again (`texrs.splice`).
     Seams disappear, samples are interpolated, and known pixels are kept, in the same way. A map without a finish is not
     corrected.
 
@@ -85,10 +85,10 @@ def apply(
     >>> import texrs
     >>> pebbles = texrs.samples.pebbles((64, 64)).image
     >>> result = texrs.design(pebbles, 64)
-    >>> bool((texrs.apply(result.source, pebbles) == result.image).all())
+    >>> bool((texrs.apply(result.source_map, pebbles) == result.image).all())
     True
     >>> heights = pebbles[..., :1].astype("float32")
-    >>> texrs.apply(result.source, heights).dtype
+    >>> texrs.apply(result.source_map, heights).dtype
     dtype('float32')
 
     """

@@ -62,7 +62,7 @@ class Finish:
     --------
     >>> import texrs
     >>> made = texrs.synthesize(texrs.samples.pebbles((48, 48)).image, 48)
-    >>> isinstance(made.source.finish, texrs.Finish), made.source.finish.wrap
+    >>> isinstance(made.source_map.finish, texrs.Finish), made.source_map.finish.wrap
     (True, (False, False))
 
     """

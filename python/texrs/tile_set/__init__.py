@@ -126,7 +126,7 @@ class TileSet(InParts):
             )
         )
         depth = _measure_depth(known)
-        costs = [np.asarray(KEEP * each.source.render(depth, interpolation="linear"), np.float32) for each in made]
+        costs = [np.asarray(KEEP * each.source_map.render(depth, interpolation="linear"), np.float32) for each in made]
         pictures = Pictures(np.stack([each.image for each in made]), np.stack(costs))
         advance = stage(watch, "tiles")
         step = find_step(list(pictures.images), known.segment().lattice, tile_size)
@@ -151,7 +151,7 @@ class TileSet(InParts):
             None,
             tuple(each.image.shape[:2] for each in made),
         )
-        self._source = outer.compose([each.source for each in made])
+        self._source = outer.compose([each.source_map for each in made])
 
     def __repr__(self) -> str:
         """Say what the tiles are."""
@@ -173,7 +173,7 @@ class TileSet(InParts):
         return None if self._like is None else self._like.replace(**self._maps)
 
     @property
-    def source(self) -> SourceMap:
+    def source_map(self) -> SourceMap:
         """Where the pixels of the atlas come from."""
         return self._source
 

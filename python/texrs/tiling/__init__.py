@@ -132,7 +132,7 @@ def tile(
     >>> result = texrs.tile(pebbles, size=(80, 96))
     >>> result.image.shape
     (80, 96, 3)
-    >>> row, column = result.source.coordinates[30, 40].astype(int)
+    >>> row, column = result.source_map.coordinates[30, 40].astype(int)
     >>> bool((result.image[30, 40] == pebbles[row, column]).all())
     True
 

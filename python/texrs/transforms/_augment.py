@@ -37,8 +37,8 @@ class Augmented(NamedTuple):
         Those that survive, (left, top, right, bottom) in pixels, see `follow_boxes`.
     which : (n,) int, or None
         Which of the boxes that were given each follows from, from 0.
-    source : SourceMap
-        Where each pixel comes from: whatever else is in register follows with ``source.render``.
+    source_map : SourceMap
+        Where each pixel comes from: whatever else is in register follows with ``source_map.render``.
     seed : int
         The seed that was used. The same seed gives the same sample again.
 
@@ -60,8 +60,8 @@ class Augmented(NamedTuple):
     """Those that survive, see `follow_boxes`."""
     which: NDArray[np.intp] | None
     """Which of the boxes that were given each follows from."""
-    source: SourceMap
-    """Where each pixel comes from: whatever else is in register follows with ``source.render``."""
+    source_map: SourceMap
+    """Where each pixel comes from: whatever else is in register follows with ``source_map.render``."""
     seed: int
     """The seed that was used. The same seed gives the same sample again."""
 
@@ -153,7 +153,7 @@ class TextureAugment:
         Returns
         -------
         Augmented
-            A named tuple of image, mask, boxes, which, source and seed.
+            A named tuple of image, mask, boxes, which, source_map and seed.
 
         Raises
         ------
@@ -168,7 +168,7 @@ class TextureAugment:
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
             raise InvalidInput(f"mask: needs the size of the image, {known.shape}, got {labels.shape[:2]}")
         things = known.remember("things of an augmented picture", lambda: find_things(known))
-        source = design(known, known.shape, seed=number, wrap=False, motion="keep", elements=things).source
+        source = design(known, known.shape, seed=number, wrap=False, motion="keep", elements=things).source_map
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")
         kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.min_visible)

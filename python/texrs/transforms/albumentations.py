@@ -56,7 +56,7 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
         seed = self.py_random.getrandbits(63)
         if parent_process() is not None:
             seed ^= crc32(current_process().name.encode()) << 31
-        return {"source": self._augment(image, seed=seed).source}
+        return {"source": self._augment(image, seed=seed).source_map}
 
     def apply(self, img: Array, *, source: Any, **params: Any) -> Array:
         """Return the picture, laid anew."""

@@ -46,7 +46,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         if not pictures:
             raise InvalidInput("inputs: needs a picture, got none")
         seed = int(torch.randint(2**62, ()).item())
-        source = self._augment(to_array(pictures[0]), seed=seed).source
+        source = self._augment(to_array(pictures[0]), seed=seed).source_map
         params: dict[str, Any] = {"source": source, "boxes": None, "index": None}
         for each in flat_inputs:
             if isinstance(each, tv_tensors.BoundingBoxes):

@@ -93,7 +93,7 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
     >>> import texrs
     >>> particles = texrs.samples.particles((48, 48, 48)).image
     >>> made = texrs.solid(particles, 48, seed=1)
-    >>> found = texrs.volume.integrity(particles, made.source)
+    >>> found = texrs.volume.integrity(particles, made.source_map)
     >>> found.torn < 0.1, found.largest[1] < 0.3
     (True, True)
 

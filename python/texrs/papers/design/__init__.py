@@ -177,7 +177,7 @@ def design(
     >>> result.image.shape, result.image.dtype
     ((128, 160, 3), dtype('uint8'))
     >>> heights = np.linspace(0, 1, 96 * 96, dtype=np.float32).reshape(96, 96)
-    >>> result.source.render(heights).shape
+    >>> result.source_map.render(heights).shape
     (128, 160)
     >>> stones = texrs.elements.Elements.of_sample(texrs.samples.pebbles((96, 96)))
     >>> texrs.design(stones, 96, copies=1, motion="move").report["segmentation"]

@@ -190,7 +190,7 @@ def splice(
     >>> buttons = Elements.of_sample(texrs.samples.dots((128, 128)))
     >>> stones = Elements.of_sample(texrs.samples.pebbles((128, 128)))
     >>> result = texrs.splice(buttons, stones, seed=1, screening=None)
-    >>> row, column = result.source.coordinates[30, 40].astype(int)
+    >>> row, column = result.source_map.coordinates[30, 40].astype(int)
     >>> result.image.shape, bool((result.image[30, 40] == buttons.image[row, column]).all())
     ((128, 128, 3), True)
 

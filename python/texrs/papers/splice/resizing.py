@@ -46,11 +46,11 @@ def read_elements(a: Elements, made: Synthesis) -> Elements:
 
     Nothing is looked for: the splice says where its elements are, and the mask is looked up as the picture is.
     """
-    size = np.array(made.source.shape)
+    size = np.array(made.source_map.shape)
     found = [match["found"] for match in made.report["matches"] if match["found"] is not None]
     points = np.array(found, np.float64).reshape(-1, 2)
     points = points[((points >= 0) & (points <= size - 1)).all(axis=1)]
-    mask = made.source.render(a.mask, interpolation="nearest")
+    mask = made.source_map.render(a.mask, interpolation="nearest")
     # A side that was left as it is goes around as it did.
     wrap = [w and n == m for w, n, m in zip(a.wrap, size, a.mask.shape, strict=True)]
     return replace(
@@ -79,9 +79,9 @@ def report_resized(
     a: Elements, entry: Elements, resized: Synthesis, edited: Synthesis, steps: Sequence[Step]
 ) -> Synthesis:
     """Return an edit of a texture in another size as one of the texture itself."""
-    whole = edited.source
+    whole = edited.source_map
     if edited is not resized:
-        whole = replace(whole.compose(resized.source), finish=whole.finish)
+        whole = replace(whole.compose(resized.source_map), finish=whole.finish)
     report: dict[str, Any] = {
         **edited.report,
         "edit": list(steps),
