@@ -48,7 +48,7 @@ def list_fields(size: int) -> dict[str, texrs.fields.Field]:
     return {
         "circular": fields.circular(axes=2),
         "zigzag": fields.zigzag(period=64, angle=30, axes=2),
-        "slant": fields.slant(30, axes=2),
+        "rotation": fields.rotation(30, axes=2),
         "ramp": fields.scale_ramp(1, 1.6, length=size, axes=2),
         "drawn": fields.from_array(drawn),
     }

@@ -34,12 +34,12 @@ FIELDS = {
     # Its folds must not lie on planes at which S6 looks for traces of the algorithm.
     "zigzag": fields.zigzag(period=60, angle=30, plane="xz"),
     "circular": fields.circular(axis="x", radial="z"),
-    "slant": fields.slant(30, "xz"),
-    "slant_3d": fields.slant_3d(30, 30),
+    "rotation": fields.rotation(30, "xz"),
+    "rotation_3d": fields.rotation_3d(30, 30),
 }
 LAYERED, ROUND, TRUNK = tuple(FIELDS), ("identity", "circular"), ("identity", "zigzag")
 ASKED = {"stripes": LAYERED, "pebbles": ROUND, "particles": ROUND, "wood": TRUNK, "foam": TRUNK}
-COHERENT = {"identity": 0.65, "zigzag": 0.55, "circular": 0.4, "slant": 0.55, "slant_3d": 0.55}
+COHERENT = {"identity": 0.65, "zigzag": 0.55, "circular": 0.4, "rotation": 0.55, "rotation_3d": 0.55}
 MEANING = """
 S1 where the layers lie (stripes): degrees that the field turns the normal (>= 10), median and 90th percentile of the
 error (exemplar's own + 3, + 6); S2 mean frequency over the exemplar's (0.90 to 1.15), less that of the identity

@@ -192,9 +192,9 @@ def solid() -> Iterator[Strip]:
         return volume.cube(texrs.solid(layers, 48, field=field, seed=2).image, 240)
 
     yield (
-        "slant:angle",
+        "rotation:angle",
         "How far the block is turned in a plane, in degrees.",
-        several([0, 15, 30, 45, 60], lambda a: grow(f"slant:angle={a}")),
+        several([0, 15, 30, 45, 60], lambda a: grow(f"rotation:angle={a}")),
     )
     yield (
         "scale_ramp:stop",

@@ -11,14 +11,14 @@ SOLIDS = {
         None,
         fields.zigzag(period=64, angle=30, plane="xz"),
         fields.circular(axis="y", radial="z"),
-        fields.slant(30, "xz"),
-        fields.slant_3d(30, 30),
+        fields.rotation(30, "xz"),
+        fields.rotation_3d(30, 30),
     ),
     "wood_solid": (
         None,
         fields.zigzag(period=64, angle=30, axis="y", plane="xy"),
         fields.circular(axis="z"),
-        fields.slant(45, "xy"),
+        fields.rotation(45, "xy"),
         fields.scale_ramp(0.7, 1.6, axis="x"),
     ),
 }

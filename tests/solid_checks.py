@@ -187,7 +187,7 @@ def turned_exemplar(exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
 
 def s9(exemplar: np.ndarray, size: int, seed: int = 0) -> Found:
     """A field that turns by right angles gives the texture of the turned exemplar."""
-    field = fields.slant(90, "xz")
+    field = fields.rotation(90, "xz")
     image = solid(exemplar, size, seed=seed, field=field).image
     assert field.constant is not None
     wanted = turned_exemplar(exemplar, field.constant)

@@ -22,13 +22,13 @@ def bend(points):
 
 def varied(axes):
     """One field of every kind."""
-    some = [fields.slant(a, "xy", axes=axes).constant * s for a, s in ((0, 1), (40, 1.5), (80, 1), (30, 0.7))]
+    some = [fields.rotation(a, "xy", axes=axes).constant * s for a, s in ((0, 1), (40, 1.5), (80, 1), (30, 0.7))]
     grid = np.array(some * 2).reshape(*((2, 4) if axes == 2 else (2, 2, 2)), axes, axes)
     stretched = grid @ np.diag([1.0, 2.0, 0.5][:axes])
     made = [
         fields.identity(axes),
         fields.constant(np.diag([2.0, 1.0, -1.0][:axes]) + 0.25),
-        fields.slant(25, "yx", axes=axes),
+        fields.rotation(25, "yx", axes=axes),
         fields.shear(0.7, axes=axes),
         fields.zigzag(20, 30, axes=axes),
         fields.zigzag(7.5, 30, axis="y", axes=axes),
@@ -45,7 +45,7 @@ def varied(axes):
         fields.from_function(bend, axes),
     ]
     if axes == 3:
-        made += [fields.slant_3d(30, 20), fields.circular("x"), fields.circular("y"), fields.spiral(9, "x")]
+        made += [fields.rotation_3d(30, 20), fields.circular("x"), fields.circular("y"), fields.spiral(9, "x")]
     return [*made, made[4].inverse(), made[8].inverse(), made[13].inverse()]
 
 
@@ -112,8 +112,8 @@ def test_fields_are_pickled_and_known_by_their_content(axes, i):
 def test_keys_tell_fields_apart(axes):
     keys = [f.key for f in VARIED[axes] if f.key is not None]
     assert len(set(keys)) == len(keys) == len(VARIED[axes]) - 1
-    assert fields.slant(30) == fields.slant(30.0)
-    assert fields.slant(30) != fields.slant(30.001)
+    assert fields.rotation(30) == fields.rotation(30.0)
+    assert fields.rotation(30) != fields.rotation(30.001)
     assert fields.identity(2) != "identity"
 
 
@@ -168,14 +168,14 @@ def test_zigzag_bands():
 
 
 def test_slants_turn_every_axis():
-    frame = fields.slant_3d().constant
+    frame = fields.rotation_3d().constant
     assert (np.abs(np.diag(frame)) < 0.9).all()
     assert_allclose(frame @ frame.T, np.eye(3), atol=1e-6)
-    assert fields.slant(20, "yz").constant[0, 1] == pytest.approx(np.sin(np.radians(20)))
+    assert fields.rotation(20, "yz").constant[0, 1] == pytest.approx(np.sin(np.radians(20)))
 
 
 def test_arrays_hold_at_the_middles_of_their_cells():
-    frames = np.stack([fields.slant(a, axes=2).constant for a in np.linspace(0, 90, 12)]).reshape(3, 4, 2, 2)
+    frames = np.stack([fields.rotation(a, axes=2).constant for a in np.linspace(0, 90, 12)]).reshape(3, 4, 2, 2)
     field = fields.from_array(frames, (9, 16))
     for row in range(3):
         for column in range(4):
@@ -193,7 +193,8 @@ def test_arrays_hold_at_the_middles_of_their_cells():
 def test_between_samples_size_is_kept(axes, seed):
     rng = np.random.default_rng(seed)
     turns = [
-        fields.slant(a, p, axes=axes).constant for a, p in zip(rng.uniform(-50, 50, 8), ["xy", "yx"] * 4, strict=True)
+        fields.rotation(a, p, axes=axes).constant
+        for a, p in zip(rng.uniform(-50, 50, 8), ["xy", "yx"] * 4, strict=True)
     ]
     sizes = np.exp(rng.uniform(-0.5, 0.5, 8))
     frames = (np.array(turns) * sizes[:, None, None]).reshape(*((2, 4) if axes == 2 else (2, 2, 2)), axes, axes)
@@ -206,7 +207,7 @@ def test_between_samples_size_is_kept(axes, seed):
 
 
 def test_stretches_are_kept_apart_from_rotations():
-    frame = fields.slant(30, axes=2).constant @ np.diag([3.0, 0.5])
+    frame = fields.rotation(30, axes=2).constant @ np.diag([3.0, 0.5])
     points, values = RNG.uniform(0, 9, (5, 2)), np.array([frame] * 5)
     for field in (fields.interpolate(points, values), fields.from_array(values[:4].reshape(2, 2, 2, 2), (20, 20))):
         assert_allclose(field.frames(RNG.uniform(-9, 30, (20, 2))), np.array([frame] * 20), rtol=1e-5, atol=1e-6)
@@ -214,7 +215,7 @@ def test_stretches_are_kept_apart_from_rotations():
 
 def test_interpolation_passes_through_its_points():
     points = np.array([[0, 0, 0], [10, 20, 30], [40.5, 0, 7]])
-    frames = np.array([fields.identity().constant, fields.slant_3d(50, 10).constant, np.diag([2.0, 2, 2])])
+    frames = np.array([fields.identity().constant, fields.rotation_3d(50, 10).constant, np.diag([2.0, 2, 2])])
     field = fields.interpolate(points, frames)
     assert_allclose(field.frames(points), frames, atol=1e-5)
     assert_allclose(field.frames(points + 1e-3), frames, atol=1e-2)
@@ -224,7 +225,7 @@ def test_interpolation_passes_through_its_points():
 def test_mirrored_frames_are_frames():
     flip = np.diag([1.0, -1.0])
     assert fields.constant(flip).constant[1, 1] == -1
-    grid = np.array([flip @ fields.slant(a, axes=2).constant for a in (0, 20, 40, 60)]).reshape(2, 2, 2, 2)
+    grid = np.array([flip @ fields.rotation(a, axes=2).constant for a in (0, 20, 40, 60)]).reshape(2, 2, 2, 2)
     assert (np.linalg.det(fields.from_array(grid, (9, 9)).lattice((9, 9))) < 0).all()
 
 
@@ -243,10 +244,10 @@ def narrowing(points):
         (lambda: fields.constant(np.eye(4)), "shape"),
         (lambda: fields.constant("turn"), "needs numbers"),
         (lambda: fields.constant([[1, 2], [3]]), "needs numbers"),
-        (lambda: fields.slant(1e9), "angle"),
-        (lambda: fields.slant(30, "xx"), "plane: must be one of xy"),
-        (lambda: fields.slant(30, "xz", axes=2), "plane: must be one of xy, yx"),
-        (lambda: fields.slant("steep"), "angle: needs a number"),
+        (lambda: fields.rotation(1e9), "angle"),
+        (lambda: fields.rotation(30, "xx"), "plane: must be one of xy"),
+        (lambda: fields.rotation(30, "xz", axes=2), "plane: must be one of xy, yx"),
+        (lambda: fields.rotation("steep"), "angle: needs a number"),
         (lambda: fields.circular("w"), "axis: must be one of x, y, z"),
         (lambda: fields.circular("x", axes=2), "round 'z' alone"),
         (lambda: fields.circular("z", radial="z"), "radial: round z it is x or y"),
@@ -328,7 +329,7 @@ def test_the_cause_is_kept():
 
 def test_fields_in_words():
     for name, text in fields.names().items():
-        if name != "slant_3d":
+        if name != "rotation_3d":
             assert fields.parse(name, 2).axes == 2
         assert fields.parse(name) == getattr(fields, name)()
         assert text.startswith(name)
@@ -344,7 +345,7 @@ def test_fields_in_words():
     [
         ("", 3, "there is no ''; known are identity"),
         ("circle", 3, "did you mean circular"),
-        ("slant_3d", 2, "for volumes"),
+        ("rotation_3d", 2, "for volumes"),
         ("zigzag:32", 2, "zigzag takes period=, angle=, axis=, plane="),
         ("zigzag:periode=32", 2, "zigzag takes"),
         ("zigzag:period=", 2, "zigzag takes"),

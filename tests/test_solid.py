@@ -64,7 +64,7 @@ ARRAYS = {
 @pytest.mark.parametrize("name", ARRAYS)
 def test_what_comes_in_is_what_comes_out(name):
     exemplar = ARRAYS[name]
-    made = texrs.solid(exemplar, 24, seed=1, quality="fast", field=fields.slant(25))
+    made = texrs.solid(exemplar, 24, seed=1, quality="fast", field=fields.rotation(25))
     assert made.image.dtype == exemplar.dtype
     assert made.image.shape == (24, 24, 24, *exemplar.shape[3:])
     check_seen(made, exemplar)
@@ -76,7 +76,7 @@ def test_what_comes_in_is_what_comes_out(name):
 @pytest.mark.parametrize("name", ARRAYS)
 def test_pictures_too(name):
     exemplar = ARRAYS[name][5]
-    for options in ({"wrap": True}, {"field": fields.slant(25, axes=2)}, {"quality": "fast"}):
+    for options in ({"wrap": True}, {"field": fields.rotation(25, axes=2)}, {"quality": "fast"}):
         made = texrs.synthesize(exemplar, (37, 20), seed=1, **options)
         assert made.image.dtype == exemplar.dtype
         assert made.image.shape == (37, 20, *exemplar.shape[2:])
@@ -475,7 +475,7 @@ def test_bad_input_of_pictures():
         (WEAVE[:10], 20, {}, "exemplar: each side must be at least 16"),
         (STRIPES, 20, {}, "a volume is not an image"),
         (WEAVE, (20, 20, 20), {}, "size: needs (rows, columns)"),
-        (WEAVE, 20, {"field": fields.slant_3d()}, "field: needs a field of 2 axes, got <3-D field"),
+        (WEAVE, 20, {"field": fields.rotation_3d()}, "field: needs a field of 2 axes, got <3-D field"),
     ):
         with pytest.raises(InvalidInput) as caught:
             texrs.synthesize(exemplar, size, **options)

@@ -95,7 +95,7 @@ def test_s9_right_angles_give_the_turned_exemplar():
 
 
 def test_turned_exemplars_are_what_the_frame_says():
-    field = fields.slant(90, "xz")
+    field = fields.rotation(90, "xz")
     volume = np.random.default_rng(0).random((4, 5, 6))
     turned = checks.turned_exemplar(volume, field.constant)
     # A step of the exemplar is the frame's step of the output.
@@ -194,7 +194,7 @@ def test_cheats_fail():
     # Only the places are turned, not what is between them.
     assert "median" in checks.s1(stripes, stripes, FIELDS["zigzag"]).failed
     # A field that leaves the layers where they are says nothing.
-    assert "turned" in checks.s1(stripes, stripes, fields.slant(30, "xy")).failed
+    assert "turned" in checks.s1(stripes, stripes, fields.rotation(30, "xy")).failed
     # Blocks side by side.
     cells = (
         np.random.default_rng(1).integers(0, 40, (3, 3, 3, 3)).repeat(24, 0).repeat(24, 1).repeat(24, 2)[:64, :64, :64]

@@ -120,7 +120,7 @@ def test_maps_to_follow_come_from_files(here: Path, capsys: Capture) -> None:
 
 
 def test_frames_come_from_a_file_and_sizes_from_the_example(here: Path) -> None:
-    frames = np.stack([fields.slant(a, "xy", axes=2).constant for a in range(4)]).reshape(2, 2, 2, 2)
+    frames = np.stack([fields.rotation(a, "xy", axes=2).constant for a in range(4)]).reshape(2, 2, 2, 2)
     np.savez("frames.npz", frames)
     assert main(["synthesize", "in.png", "-o", "out.png", "--field", "frames.npz", "--quality", "fast", "-q"]) == 0
     field = fields.from_array(frames, (128, 128))
@@ -162,7 +162,7 @@ WRONG = [
     ("synthesize v.npy -o out.png", "v.npy"),
     ("synthesize in.png -o out.png --size 9x9x9", "--size: needs WIDTHxHEIGHT"),
     ("synthesize in.png -o out.png --wrap z", "--wrap: must be one of default, xy, x, y, none"),
-    ("synthesize in.png -o out.png --field slant_3d", "--field: slant_3d is for volumes"),
+    ("synthesize in.png -o out.png --field rotation_3d", "--field: rotation_3d is for volumes"),
     ("synthesize in.png -o out.exr", "out.exr: .exr cannot hold"),
 ]
 

@@ -36,7 +36,7 @@ def scattered(appearance, region, seed=0):
 
 FIELDS = {
     "still": lambda axes: None,
-    "turned": lambda axes: fields.slant(33, axes=axes),
+    "turned": lambda axes: fields.rotation(33, axes=axes),
     "larger": lambda axes: fields.constant(np.eye(axes) * 1.7),
     "smaller": lambda axes: fields.constant(np.eye(axes) * 0.4),
     "sheared": lambda axes: fields.shear(0.7, axes=axes),
@@ -81,7 +81,7 @@ def test_passes_are_those_of_the_twin(axes, kind, wrap):
 @pytest.mark.parametrize("axes", [2, 3])
 def test_each_option_is_that_of_the_twin(axes, options):
     appearance, region = exemplar(axes, channels=4 if axes == 2 else 1), region_of(axes, origin=9)
-    frames = to_fixed(fields.slant(-20, axes=axes), region)
+    frames = to_fixed(fields.rotation(-20, axes=axes), region)
     held = np.arange(region.points) % 5 == 0
     start = scattered(appearance, region, seed=1)
     found = appearance.correct(start, region, frames, passes=2, held=held, **options)

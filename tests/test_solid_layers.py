@@ -24,7 +24,7 @@ SOLID = samples.particles((32, 32, 32)).image
 PLANE = samples.dots((48, 48)).image
 FIELDS: dict[str, Callable[[int], fields.Field | None]] = {
     "none": lambda axes: None,
-    "turned": lambda axes: fields.slant(30, axes=axes),
+    "turned": lambda axes: fields.rotation(30, axes=axes),
     "circular": lambda axes: fields.circular(centre=(4 if axes == 2 else -30,) * axes, axes=axes),
     "zigzag": lambda axes: fields.zigzag(40, 35, axes=axes),
     "ramp": lambda axes: fields.scale_ramp(0.4, 1.8, length=60, axes=axes),

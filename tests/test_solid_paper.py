@@ -127,7 +127,7 @@ def test_speckle(of_stripes, stripes):
 
 
 def test_turned_textures_lie_wrong_and_are_too_fine(stripes):
-    field = fields.slant_3d()
+    field = fields.rotation_3d()
     normal = volume.texture_normal(volume.lightness(stripes))
     off, size = {}, {}
     for method in (None, "paper"):
@@ -143,7 +143,7 @@ def test_turned_textures_lie_wrong_and_are_too_fine(stripes):
 
 def test_most_of_which_compensation_cures(stripes):
     """Neighbours read where the diagonal leads, not where the lattice makes it end: the paper leaves it out."""
-    field = fields.slant_3d()
+    field = fields.rotation_3d()
     normal = volume.texture_normal(volume.lightness(stripes))
     off = []
     for method in ("paper", "paper-compensated"):

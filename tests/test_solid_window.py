@@ -222,7 +222,7 @@ def test_oblique_slices_carry_places_on() -> None:
 def test_windows_look_as_far_as_their_frames() -> None:
     here = Region.whole((4, 4))
     assert world.window_reach(to_fixed(None, here), 2) == 2
-    assert world.window_reach(to_fixed(fields.slant(45, axes=2), here), 2) == 3
+    assert world.window_reach(to_fixed(fields.rotation(45, axes=2), here), 2) == 3
     assert world.window_reach(to_fixed(fields.constant([[3, 0], [0, 1]]), here), 2) == 6
     assert world.blocks_reach(6, 2) == 32
 

@@ -65,7 +65,7 @@ def measure(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(("angle", "wanted"), [(90, (0, 0, 1)), (45, (0.71, 0, -0.71))])
 def test_ellipsoids_keep_their_axes_in_millimetres(angle: int, wanted: tuple[float, ...]) -> None:
     before, _ = measure(ELLIPSOIDS)
-    field = fields.slant(angle, "xz")
+    field = fields.rotation(angle, "xz")
     turned = texrs.solid(ELLIPSOIDS, (30, 56, 56), field=field, spacing=SPACING)
     after, direction = measure(turned.image)
     np.testing.assert_allclose(after, before, rtol=0.1)
@@ -81,14 +81,14 @@ def test_ellipsoids_keep_their_axes_in_millimetres(angle: int, wanted: tuple[flo
 def test_the_command_reads_the_spacing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, out = str(tmp_path / "scan.nrrd"), str(tmp_path / "turned.nrrd")
     io.write_volume(source, ELLIPSOIDS, spacing=SPACING)
-    arguments = ["--size", "56x56x30", "--field", "slant:angle=90,plane=xz", "-q"]
+    arguments = ["--size", "56x56x30", "--field", "rotation:angle=90,plane=xz", "-q"]
     assert main(["solid", source, "-o", out, *arguments]) == 0, capsys.readouterr().err
-    wanted = texrs.solid(ELLIPSOIDS, (30, 56, 56), field="slant:angle=90,plane=xz", spacing=SPACING)
+    wanted = texrs.solid(ELLIPSOIDS, (30, 56, 56), field="rotation:angle=90,plane=xz", spacing=SPACING)
     np.testing.assert_array_equal(io.read_volume(out), wanted.image)
     assert io.read_spacing(out) == SPACING
     # What is said on the command line counts more than what the file states.
     assert main(["solid", source, "-o", out, *arguments, "--spacing", "1"]) == 0
-    plain = texrs.solid(ELLIPSOIDS, (30, 56, 56), field="slant:angle=90,plane=xz")
+    plain = texrs.solid(ELLIPSOIDS, (30, 56, 56), field="rotation:angle=90,plane=xz")
     np.testing.assert_array_equal(io.read_volume(out), plain.image)
     assert io.read_spacing(out) == (1, 1, 1)
     for wrong in ("1x2", "wide", "0x1x1", "1x1x-1"):
@@ -97,22 +97,22 @@ def test_the_command_reads_the_spacing(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_textures_without_borders_turn_in_space(tmp_path: Path) -> None:
-    texture = texrs.SolidTexture(ELLIPSOIDS, field="slant:angle=90,plane=xz", spacing=SPACING)
+    texture = texrs.SolidTexture(ELLIPSOIDS, field="rotation:angle=90,plane=xz", spacing=SPACING)
     after, direction = measure(texture[0:30, 0:56, 0:56])
     np.testing.assert_allclose(after, measure(ELLIPSOIDS)[0], rtol=0.1)
     assert abs(direction[2]) > 0.9
     assert texture.spacing == SPACING
-    assert texture.key != texrs.SolidTexture(ELLIPSOIDS, field="slant:angle=90,plane=xz").key
+    assert texture.key != texrs.SolidTexture(ELLIPSOIDS, field="rotation:angle=90,plane=xz").key
     source, out = tmp_path / "scan.nrrd", tmp_path / "part.nrrd"
     io.write_volume(source, ELLIPSOIDS, spacing=SPACING)
-    words = ["--size", "56x56x30", "--origin", "0,0,0", "--field", "slant:angle=90,plane=xz", "-q"]
+    words = ["--size", "56x56x30", "--origin", "0,0,0", "--field", "rotation:angle=90,plane=xz", "-q"]
     assert main(["solid", str(source), "-o", str(out), *words]) == 0
     np.testing.assert_array_equal(io.read_volume(out), texture[0:30, 0:56, 0:56])
 
 
 @pytest.mark.parametrize(
     "field",
-    [fields.slant(30, "xz"), fields.circular("y"), fields.zigzag(9, axis="z"), fields.scale_ramp(1, 2, axis="z")],
+    [fields.rotation(30, "xz"), fields.circular("y"), fields.zigzag(9, axis="z"), fields.scale_ramp(1, 2, axis="z")],
 )
 def test_frames_are_those_of_space(field: fields.Field) -> None:
     spaced = fields.as_field(field, 3, spacing=SPACING)
@@ -141,7 +141,7 @@ def test_the_middle_and_the_length_are_those_of_the_output_in_space() -> None:
 
 
 def test_arrays_spread_over_voxels_and_turn_in_space() -> None:
-    frames = np.broadcast_to(fields.slant(90, "yz").constant, (4, 4, 4, 3, 3))
+    frames = np.broadcast_to(fields.rotation(90, "yz").constant, (4, 4, 4, 3, 3))
     spaced = fields.as_field(frames, 3, (8, 8, 8), spacing=(2, 1, 1))
     np.testing.assert_allclose(spaced.frames((1, 6, 3)), [[0, 0.5, 0], [-2, 0, 0], [0, 0, 1]], atol=1e-6)
 
@@ -191,13 +191,13 @@ def test_statistics_are_those_of_space() -> None:
     flat = np.sin(z * np.pi / 6)
     turned = np.sin((z * np.cos(np.pi / 6) + y * np.sin(np.pi / 6)) * np.pi / 6)
     angles = [
-        np.median(volume.orientation_errors(turned, fields.slant(a, "zy"), (1, 0, 0), spacing=(2, 1, 1)))
+        np.median(volume.orientation_errors(turned, fields.rotation(a, "zy"), (1, 0, 0), spacing=(2, 1, 1)))
         for a in (30, 0)
     ]
     assert angles[0] < 8
     assert 22 < angles[1] < 38
     report = volume.compare(
-        np.float32(flat / 2 + 0.5), np.float32(turned / 2 + 0.5), field=fields.slant(30, "zy"), spacing=(2, 1, 1)
+        np.float32(flat / 2 + 0.5), np.float32(turned / 2 + 0.5), field=fields.rotation(30, "zy"), spacing=(2, 1, 1)
     )
     assert report.orientation is not None
     assert report.orientation[1, 0] < 8

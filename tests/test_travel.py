@@ -205,7 +205,7 @@ def test_normals_of_points_turn_with_the_texture() -> None:
     normals[..., 0], normals[..., 2] = 0.6, 0.8
     normals[0, 0] = (-0.6, 0, 0.8)  # Signed.
     turned = texrs.PlaneTexture(
-        texrs.Material({"normal": normals, "albedo": WEAVE[:32, :32]}), field=fields.slant(90, axes=2)
+        texrs.Material({"normal": normals, "albedo": WEAVE[:32, :32]}), field=fields.rotation(90, axes=2)
     )
     every = turned.sample_maps([[3.25, 4.5], [10, 10]])["normal"]
     window = turned.window((10, 10), 1).material

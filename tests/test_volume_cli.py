@@ -119,14 +119,14 @@ def test_labels_are_painted(here, capsys, dtype):
 def test_fields_in_words_and_in_files(here):
     size = (40, 48, 56)
     assert read_field("circular:axis=y", About(size=size)) == fields.circular("y").over(size)
-    frames = np.stack([fields.slant_3d(a, a).constant for a in range(8)]).reshape(2, 2, 2, 3, 3)
+    frames = np.stack([fields.rotation_3d(a, a).constant for a in range(8)]).reshape(2, 2, 2, 3, 3)
     np.savez("frames.npz", frames)
     assert read_field("frames.npz", About(size=size)) == fields.from_array(frames, size)
     np.savez("two.npz", frames, frames)
     np.savez("flat.npz", frames * 0)
     for text, extent, says in (
         ("round", size, "--field: there is no 'round'"),
-        ("slant_3d", size[:2], "--field: slant_3d is for volumes"),
+        ("rotation_3d", size[:2], "--field: rotation_3d is for volumes"),
         ("two.npz", size, "two.npz: needs a single array, or one with the key"),
         ("flat.npz", size, "flat.npz: the frame at"),
         ("frames.npz", size[:2], "frames.npz: holds (2, 2, 2, 3, 3), a field of 3 axes; 2 are needed"),

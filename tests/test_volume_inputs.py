@@ -199,10 +199,10 @@ def test_phases_stay_as_they_are():
         .repeat(4, 1)
         .repeat(4, 2)
     )
-    for options in ({}, {"field": "slant:angle=30"}, {"quality": "fast"}, {"interpolation": "cubic"}):
+    for options in ({}, {"field": "rotation:angle=30"}, {"quality": "fast"}, {"interpolation": "cubic"}):
         made = texrs.solid(phases, 36, **options).image
         assert set(np.unique(made)) <= set(np.unique(phases))
-    assert set(np.unique(texrs.SolidTexture(phases, field="slant:angle=30")[0:20, 0:20, 0:20])) <= set(
+    assert set(np.unique(texrs.SolidTexture(phases, field="rotation:angle=30")[0:20, 0:20, 0:20])) <= set(
         np.unique(phases)
     )
 

@@ -113,7 +113,9 @@ def test_frequency_halves_where_features_double(stripes):
     assert volume.frequency(double, window=56, whole=True) / exemplar == pytest.approx(0.5, abs=0.08)
 
 
-@pytest.mark.parametrize("field", [fields.slant(30, "yz"), fields.slant_3d(30, 30), fields.slant(45, "zx")], ids=str)
+@pytest.mark.parametrize(
+    "field", [fields.rotation(30, "yz"), fields.rotation_3d(30, 30), fields.rotation(45, "zx")], ids=str
+)
 def test_turning_keeps_frequency_and_is_seen_as_orientation(stripes, field):
     turned = warped(stripes, field)
     assert volume.frequency(turned, window=56) / volume.frequency(stripes, window=56) == pytest.approx(1, abs=0.06)
@@ -226,7 +228,7 @@ def test_coherence_under_a_field(name):
 
 def test_frames_of_the_map_are_used_where_no_field_is_given():
     shape = (8, 9, 10)
-    field = fields.slant_3d(40, 25)
+    field = fields.rotation_3d(40, 25)
     plain = source_of(SourceMap.identity(shape).coordinates @ field.jacobians((0, 0, 0)).T, (40,) * 3)
     tables = (None, field.jacobians((0, 0, 0))[None], field.lattice(shape))
     rates = []

@@ -32,7 +32,7 @@ def synthesize_under_a_zigzag() -> Parts:
 
 @case
 def synthesize_under_an_array() -> Parts:
-    turns = [[fields.slant(angle, axes=2).constant * size for angle, size in row] for row in FRAMES]
+    turns = [[fields.rotation(angle, axes=2).constant * size for angle, size in row] for row in FRAMES]
     field = fields.from_array(np.array(turns), extent=(96, 128))
     result = texrs.synthesize(Exemplar(channels("dots", 80, 80), repeat=False), (96, 128), field=field, quality="fast")
     return parts_of(result, report=GROWN)
@@ -122,7 +122,7 @@ def solid_along_a_trend() -> Parts:
 
 @case
 def solid_as_printed() -> Parts:
-    field = fields.slant_3d(15, 25)
+    field = fields.rotation_3d(15, 25)
     result = texrs.solid(colour("particles", *CUBE, seed=2), 28, field=field, method="paper", seed=5)
     return parts_of(result, report=GROWN)
 
@@ -130,12 +130,12 @@ def solid_as_printed() -> Parts:
 @case
 def frames_of_all_fields() -> Parts:
     corners = [(0, 0, 0), (10, 0, 12), (4, 9, 3)]
-    kinds = [fields.slant(40), fields.constant(1.3 * np.eye(3)), fields.shear(0.4)]
+    kinds = [fields.rotation(40), fields.constant(1.3 * np.eye(3)), fields.shear(0.4)]
     several = {
         "spiral": fields.spiral(angle=20, axis="y"),
         "zigzag": fields.zigzag(period=7, plane="yz"),
         "ramp": fields.scale_ramp(0.7, 1.8, axis="z"),
-        "slants": fields.slant_3d(20, -35),
+        "slants": fields.rotation_3d(20, -35),
         "points": fields.interpolate(corners, [kind.frames((0, 0, 0)) for kind in kinds]),
         "function": fields.from_function(lambda points: (1 + points[:, :1, np.newaxis] / 20) * np.eye(3)),
         "words": fields.parse("circular:axis=z,radial=y,centre=3x4x5"),

@@ -16,7 +16,7 @@ CUBE = 320
 """Pixels a side of the cubes."""
 
 VOLUMES = (
-    ("stripes", "slant_3d"),
+    ("stripes", "rotation_3d"),
     ("stripes", "zigzag:period=64,plane=xz"),
     ("wood_solid", "zigzag:period=64"),
     ("particles", "identity"),

@@ -10,8 +10,8 @@ x, y and z stand for the axes of columns, rows and planes.
 `circular`           wound round an axis
 `spiral`             the same, turned by an angle
 `zigzag`             turned by an angle and by its opposite, in bands
-`slant`              turned by an angle in a plane
-`slant_3d`           turned in two planes
+`rotation`              turned by an angle in a plane
+`rotation_3d`           turned in two planes
 `shear`              leaning
 `scale_ramp`         growing along an axis
 `constant`           any matrix
@@ -36,7 +36,7 @@ from texrs.fields._field import LEAST_DETERMINANT, WORST_CONDITION, Field, check
 from texrs.fields._given import FieldLike, as_field, read
 from texrs.fields._parse import names, parse
 from texrs.fields._sampled import from_array, from_function, interpolate
-from texrs.fields._shapes import circular, constant, identity, scale_ramp, shear, slant, slant_3d, spiral, zigzag
+from texrs.fields._shapes import circular, constant, identity, rotation, rotation_3d, scale_ramp, shear, spiral, zigzag
 
 __all__ = [
     "LEAST_DETERMINANT",
@@ -57,10 +57,10 @@ __all__ = [
     "names",
     "parse",
     "read",
+    "rotation",
+    "rotation_3d",
     "scale_ramp",
     "shear",
-    "slant",
-    "slant_3d",
     "spiral",
     "zigzag",
 ]

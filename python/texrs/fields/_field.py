@@ -277,7 +277,7 @@ class Field(ABC):
         >>> fields.constant([[2, 0], [0, 4]]).inverse().constant
         array([[0.5 , 0.  ],
                [0.  , 0.25]], dtype=float32)
-        >>> fields.slant(30).inverse().inverse() == fields.slant(30)
+        >>> fields.rotation(30).inverse().inverse() == fields.rotation(30)
         True
 
         """

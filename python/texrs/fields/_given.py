@@ -151,7 +151,7 @@ def as_field(
 
     A quarter turn in a volume whose planes lie 2 apart, and whose rows and columns 1:
 
-    >>> fields.as_field("slant:angle=90,plane=yz", 3, spacing=(2, 1, 1)).constant.round(3) + 0
+    >>> fields.as_field("rotation:angle=90,plane=yz", 3, spacing=(2, 1, 1)).constant.round(3) + 0
     array([[ 0. ,  0.5,  0. ],
            [-2. ,  0. ,  0. ],
            [ 0. ,  0. ,  1. ]], dtype=float32)

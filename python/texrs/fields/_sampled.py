@@ -66,7 +66,7 @@ def from_array(
     --------
     >>> import numpy as np
     >>> from texrs import fields
-    >>> corners = np.stack([[fields.slant(a, axes=2).constant for a in (-30, 30)]] * 2)
+    >>> corners = np.stack([[fields.rotation(a, axes=2).constant for a in (-30, 30)]] * 2)
     >>> field = fields.from_array(corners, extent=(64, 64))
     >>> field.frames((31.5, 31.5)).round(3) + 0  # in the middle between the two, and as large as they are
     array([[1., 0.],
@@ -126,7 +126,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
     Examples
     --------
     >>> from texrs import fields
-    >>> turned = fields.slant(90, axes=2).constant
+    >>> turned = fields.rotation(90, axes=2).constant
     >>> field = fields.interpolate([(0, 0), (0, 100)], [fields.identity(2).constant, turned])
     >>> field.frames([(0, 0), (0, 50), (0, 100)])[:, 0, 1].round(3) + 0  # half a right angle half-way
     array([0.   , 0.707, 1.   ], dtype=float32)

@@ -75,7 +75,7 @@ def constant(matrix: ArrayLike) -> Field:
     return Constant(len(m), m, f"constant [{rows}]")
 
 
-def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
+def rotation(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
     """Return the field that turns the texture everywhere by one angle in one plane.
 
     Parameters
@@ -101,23 +101,23 @@ def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
     Examples
     --------
     >>> from texrs import fields
-    >>> fields.slant(90, "xy", axes=2).constant.round(3) + 0
+    >>> fields.rotation(90, "xy", axes=2).constant.round(3) + 0
     array([[ 0.,  1.],
            [-1.,  0.]], dtype=float32)
 
     """
     degrees = _as_angle(angle)
     first, second = _as_plane(plane, check_axes(axes), "plane")
-    return Constant(axes, turn(degrees, first, second, axes), f"slant of {degrees:g} degrees in the plane {plane}")
+    return Constant(axes, turn(degrees, first, second, axes), f"rotation of {degrees:g} degrees in the plane {plane}")
 
 
-def slant_3d(angle: float = 30, angle2: float = 30) -> Field:
+def rotation_3d(angle: float = 30, angle2: float = 30) -> Field:
     """Return the field that turns the texture in the plane xy, then in the plane yz, so that no axis stays.
 
     Parameters
     ----------
     angle : float
-        Degrees in xy, as in `slant`, within 360 either way.
+        Degrees in xy, as in `rotation`, within 360 either way.
     angle2 : float
         Degrees in yz, afterwards; within 360 either way.
 
@@ -134,13 +134,13 @@ def slant_3d(angle: float = 30, angle2: float = 30) -> Field:
     Examples
     --------
     >>> from texrs import fields
-    >>> fields.slant_3d(30, 20).describe()
-    'slant of 30 degrees in the plane xy, then of 20 degrees in the plane yz'
+    >>> fields.rotation_3d(30, 20).describe()
+    'rotation of 30 degrees in the plane xy, then of 20 degrees in the plane yz'
 
     """
     first, second = _as_angle(angle), _as_angle(angle2, "angle2")
     matrix = turn(second, 1, 0, 3) @ turn(first, 2, 1, 3)
-    text = f"slant of {first:g} degrees in the plane xy, then of {second:g} degrees in the plane yz"
+    text = f"rotation of {first:g} degrees in the plane xy, then of {second:g} degrees in the plane yz"
     return Constant(3, matrix, text)
 
 
@@ -281,11 +281,11 @@ def zigzag(
     period : float
         Width of two bands, at least 2 voxels; in the unit of the spacing if one is stated.
     angle : float
-        Degrees, as in `slant`, within 360 either way.
+        Degrees, as in `rotation`, within 360 either way.
     axis : str, optional
         "x", "y" or "z": across the bands. By default the first of ``plane``.
     plane : str
-        Two of "x", "y" and "z": what turns, as in `slant`.
+        Two of "x", "y" and "z": what turns, as in `rotation`.
     axes : int
         2 or 3.
 
