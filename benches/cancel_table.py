@@ -132,7 +132,7 @@ VERBS: dict[str, Callable[[Given], Call]] = {
     "stores.map_to_zarr": lambda g: bind(
         texrs.stores.map_to_zarr, functools.partial(texrs.synthesize, g.picture, SIDE), g.seeds, g.folder + "/many.zarr"
     ),
-    "paint": lambda g: bind(texrs.painting.paint, g.ball, texrs.SolidTexture(g.volume), scale=40, atlas=256),
+    "paint": lambda g: bind(texrs.painting.texture_mesh, g.ball, texrs.SolidTexture(g.volume), scale=40, atlas=256),
     "turntable": lambda g: bind(texrs.volume.turntable, g.volume, g.folder + "/turn.gif", frames=8),
     "kernels.mean_shift": lambda g: bind(texrs.kernels.mean_shift.mean_shift, g.light, 7, 0.1),
     "kernels.regions": lambda g: bind(texrs.kernels.regions.merge, g.light, 0.2),

@@ -13,13 +13,13 @@ from scipy.ndimage import map_coordinates
 
 import texrs
 from texrs import samples
-from texrs.painting import Painted, choose_scale, paint
+from texrs.painting import TexturedMesh, choose_scale, texture_mesh
 
 POINTS = 1500
 SHARES = (0.5, 0.9, 0.99)
 
 
-def find_edges(painted: Painted) -> dict[str, np.ndarray]:
+def find_edges(painted: TexturedMesh) -> dict[str, np.ndarray]:
     """Return corners (n, 2 sides, 2 ends) of the edges that two triangles share, by whether the atlas is cut there."""
     place = np.unique(np.round(painted.vertices, 5), axis=0, return_inverse=True)[1].reshape(-1)
     ends = np.concatenate([painted.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
@@ -47,7 +47,7 @@ def main() -> None:
     rng = np.random.default_rng(0)
     print(f"{'mesh':20} {'edges':12} {'side to side':>20} {'to the texture':>20}")
     for name in given.meshes:
-        painted = paint(name, texture, atlas=given.atlas)
+        painted = texture_mesh(name, texture, atlas=given.atlas)
         assert painted.uv is not None
         side, size, pixels = given.atlas, choose_scale(painted.vertices, texture), painted.maps["image"].astype(float)
 

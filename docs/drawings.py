@@ -75,7 +75,7 @@ def source_map() -> Any:
         )
     show(panels[2], colour_places(source.coordinates, sample.image.shape), "the source map: places as colours")
     labels = source.render(sample.labels, interpolation="nearest")
-    show(panels[3], volume.paint(labels), "labels, through the same map")
+    show(panels[3], volume.label_to_color(labels), "labels, through the same map")
     key = panels[2].inset_axes((0.02, 0.03, 0.22, 0.3))
     place = np.stack(np.meshgrid(range(112), range(112), indexing="ij"), axis=-1)
     show(key, colour_places(place, (112, 112)), "")
@@ -288,8 +288,8 @@ def solid() -> tuple[Any, Measured]:
     }
     figures = {name: volume.integrity(stone, each.source_map) for name, each in made.items()}
     names = {"torn": "share of the voxels in elements that are torn", "crumbs": "crumbs of elements, in 100 000 voxels"}
-    shown = [(n, volume.cube(m.image, 320)) for n, m in made.items()]
-    return compare([("the example", volume.cube(stone, 240))], shown), tell(figures, names)
+    shown = [(n, volume.render_block(m.image, 320)) for n, m in made.items()]
+    return compare([("the example", volume.render_block(stone, 240))], shown), tell(figures, names)
 
 
 IDEAS: tuple[Callable[[], Any], ...] = (source_map, element, scale_map, frame_field, wrap)

@@ -189,7 +189,7 @@ def solid() -> Iterator[Strip]:
     layers = samples.stripes((32, 32, 32)).image
 
     def grow(field: str) -> Picture:
-        return volume.cube(texrs.solid(layers, 48, field=field, seed=2).image, 240)
+        return volume.render_block(texrs.solid(layers, 48, field=field, seed=2).image, 240)
 
     yield (
         "rotation:angle",
@@ -257,7 +257,7 @@ def augment() -> Iterator[Strip]:
         return image
 
     def label(seed: int) -> Picture:
-        return volume.paint(texrs.transforms.TextureAugment()(buttons.image, buttons.labels, seed=seed).mask)
+        return volume.label_to_color(texrs.transforms.TextureAugment()(buttons.image, buttons.labels, seed=seed).mask)
 
     yield ("seed", "Another picture each, and its boxes.", several([0, 1, 2, 3, 4], draw))
     yield ("seed, with labels", "The labels of the same pictures.", several([0, 1, 2, 3, 4], label))

@@ -26,8 +26,8 @@ def four() -> np.ndarray:
         [
             label(stones, "input", HEIGHT, given=True),
             label(large, "texrs design", HEIGHT),
-            label(volume.cube(wood, 200), "input", HEIGHT, given=True),
-            label(volume.cube(rings, 200), "texrs solid", HEIGHT),
+            label(volume.render_block(wood, 200), "input", HEIGHT, given=True),
+            label(volume.render_block(rings, 200), "texrs solid", HEIGHT),
         ],
         [
             label(dots.image, "input", HEIGHT, given=True),

@@ -37,10 +37,10 @@ def main() -> None:
     rows = []
     for name, shown in SOLIDS.items():
         example = samples.load(name).image
-        cubes = [volume.cube(example, round(SIDE * example.shape[0] / SIZE))]
+        cubes = [volume.render_block(example, round(SIDE * example.shape[0] / SIZE))]
         for field in shown[1:]:
             grown = texrs.solid(example, SIZE, field=field, seed=1)
-            cubes.append(volume.cube(grown.image, SIDE))
+            cubes.append(volume.render_block(grown.image, SIDE))
         rows.append(beside(cubes))
     texrs.io.write(FOLDER / "solid.jpg", below(rows))
     pairs = []

@@ -109,12 +109,12 @@ def s3b(mask: np.ndarray, made: Synthesis, *, turned: bool = False) -> Found:
     They are counted in boxes of the exemplar's size, in whose borders as many are cut.
     """
     there = made.source_map.render(mask.astype(np.uint8), interpolation="nearest") > 0
-    before = volume.particles(mask)
+    before = volume.component_statistics(mask)
     found = []
     for corner in np.ndindex(2, 2, 2):
         starts = [c * max(0, n - m) for c, n, m in zip(corner, there.shape, mask.shape, strict=True)]
         part = tuple(slice(s, s + m) for s, m in zip(starts, mask.shape, strict=True))
-        p = volume.particles(there[part])
+        p = volume.component_statistics(there[part])
         found.append((p.density / before.density, p.mean / before.mean, p.median / before.median))
     count, size, median = np.mean(found, axis=0)
     limits = (0.35, 0.35, 0.35) if turned else (0.2, 0.25, 0.2)

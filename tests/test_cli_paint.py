@@ -36,7 +36,7 @@ def read_glb(path: str) -> dict:
 def test_an_atlas_and_its_provenance(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["paint", "ball.stl", "stripes.tif", "-o", "a.glb", "--atlas", "64", *SMALL]
     assert main(words) == 0
-    made = texrs.painting.paint("ball.stl", texrs.SolidTexture(STRIPES), scale=2, atlas=64)
+    made = texrs.painting.texture_mesh("ball.stl", texrs.SolidTexture(STRIPES), scale=2, atlas=64)
     shown = trimesh.load("a.glb", force="mesh", process=False)
     assert np.array_equal(np.asarray(shown.visual.material.baseColorTexture)[..., :3], made.maps["image"])
     assert main(["rerun", "a.glb", "-q"]) == 0
@@ -77,8 +77,8 @@ def test_directions_are_at_the_scale_of_the_atlas(here: Path) -> None:
     texture, surface = texrs.SolidTexture(STRIPES, quality="fast"), read_mesh("ball.stl")
     scale = texrs.painting.find_scale(surface, texture, atlas=32)
     assert scale < 4 * 20 / 12
-    turned = texrs.painting.follow("ball.stl", "around:z", scale=scale)
-    made = texrs.painting.paint(
+    turned = texrs.painting.field_on_surface("ball.stl", "around:z", scale=scale)
+    made = texrs.painting.texture_mesh(
         "ball.stl", texrs.SolidTexture(STRIPES, field=turned, quality="fast"), scale=scale, atlas=32
     )
     shown = trimesh.load("a.glb", force="mesh", process=False)

@@ -9,7 +9,7 @@ import pytest
 import texrs
 from texrs import painting, samples
 from texrs.errors import FileError, InvalidInput
-from texrs.painting import follow, paint
+from texrs.painting import field_on_surface, texture_mesh
 from texrs.painting._baking import bake_points, lean
 from texrs.painting._meshes import find_normals, find_tangents
 from texrs.painting._reading import read_mesh
@@ -23,18 +23,18 @@ BALL = trimesh.creation.icosphere(subdivisions=2, radius=10.0)
 
 
 def test_corners_show_the_texture_where_they_lie() -> None:
-    painted = paint(BALL, TEXTURE, scale=1.5, atlas=None)
+    painted = texture_mesh(BALL, TEXTURE, scale=1.5, atlas=None)
     assert np.array_equal(painted.maps["image"], TEXTURE.sample(BALL.vertices[:, ::-1] * 1.5))
     assert painted.uv is None
 
 
 @pytest.fixture(scope="module")
-def baked() -> texrs.painting.Painted:
+def baked() -> texrs.painting.TexturedMesh:
     pytest.importorskip("xatlas")
-    return paint(BALL, TEXTURE, scale=1.0, atlas=128)
+    return texture_mesh(BALL, TEXTURE, scale=1.0, atlas=128)
 
 
-def test_texels_show_the_texture_where_they_lie(baked: texrs.painting.Painted) -> None:
+def test_texels_show_the_texture_where_they_lie(baked: texrs.painting.TexturedMesh) -> None:
     assert baked.uv is not None
     points, there = bake_points(baked.vertices, baked.faces, baked.uv, 128, 0)
     assert there.mean() > 0.3
@@ -57,7 +57,7 @@ def test_no_voxel_is_smaller_than_a_texel_by_default(
         return {"image": np.zeros((len(points), 3), np.uint8)}
 
     monkeypatch.setattr(painting, "_sample", sample)
-    paint(BALL, texture, atlas=side, padding=0)
+    texture_mesh(BALL, texture, atlas=side, padding=0)
     surface = read_mesh(BALL)
     finest = 4 * 24 / 20
     texel = painting.find_scale(surface, texture, atlas=side, padding=0) / texture.spacing[0]
@@ -69,7 +69,7 @@ def test_no_voxel_is_smaller_than_a_texel_by_default(
     assert np.median(apart) * texel < 1.2
 
 
-def test_nothing_is_seen_where_pieces_meet(baked: texrs.painting.Painted) -> None:
+def test_nothing_is_seen_where_pieces_meet(baked: texrs.painting.TexturedMesh) -> None:
     """A point on the edge of two pieces has nearly the same colour in both, with what a viewer mixes."""
     from scipy.ndimage import map_coordinates
 
@@ -83,9 +83,9 @@ def test_nothing_is_seen_where_pieces_meet(baked: texrs.painting.Painted) -> Non
     assert np.median(apart) < 12
 
 
-def test_files_go_around(baked: texrs.painting.Painted, tmp_path: Path) -> None:
+def test_files_go_around(baked: texrs.painting.TexturedMesh, tmp_path: Path) -> None:
     BALL.export(tmp_path / "ball.stl")
-    coloured = paint(tmp_path / "ball.stl", TEXTURE, scale=1.0, atlas=None)
+    coloured = texture_mesh(tmp_path / "ball.stl", TEXTURE, scale=1.0, atlas=None)
     coloured.save(tmp_path / "ball.ply")
     back = trimesh.load(tmp_path / "ball.ply", process=False)
     assert np.array_equal(back.visual.vertex_colors[:, :3], coloured.maps["image"])
@@ -93,14 +93,14 @@ def test_files_go_around(baked: texrs.painting.Painted, tmp_path: Path) -> None:
     there = trimesh.load(tmp_path / "ball.glb", force="mesh", process=False)
     assert np.allclose(there.visual.uv, baked.uv, atol=1e-5)
     assert np.array_equal(np.asarray(there.visual.material.baseColorTexture)[..., :3], baked.maps["image"])
-    again = paint(tmp_path / "ball.glb", TEXTURE, scale=1.0, atlas=64)  # Its own atlas is kept.
+    again = texture_mesh(tmp_path / "ball.glb", TEXTURE, scale=1.0, atlas=64)  # Its own atlas is kept.
     assert np.allclose(again.uv, baked.uv, atol=1e-5)
 
 
 def test_materials_and_depth() -> None:
     maps = {"albedo": STRIPES.astype(np.uint16) * 257, "height": STRIPES[..., 0].astype(np.float32)}
     texture = texrs.SolidTexture(texrs.Material(maps, axes=3))
-    painted = paint(BALL, texture, scale=1.0, atlas=None)
+    painted = texture_mesh(BALL, texture, scale=1.0, atlas=None)
     assert {name: (a.shape, str(a.dtype)) for name, a in painted.maps.items()} == {
         "albedo": ((162, 3), "uint16"),
         "height": ((162,), "float32"),
@@ -119,7 +119,7 @@ def test_heights_lean_as_they_do_on_the_surface(tmp_path: Path) -> None:
     normal = lean(points[..., 1].astype(np.float32), points, there, there)
     assert np.allclose(normal[..., 1], -np.sin(steep), atol=1e-5)
     maps = {"albedo": STRIPES.astype(np.uint16) * 257, "height": STRIPES[..., 0], "roughness": STRIPES[..., 1]}
-    painted = paint(BALL, texrs.SolidTexture(texrs.Material(maps, axes=3)), scale=1.0, atlas=64)
+    painted = texture_mesh(BALL, texrs.SolidTexture(texrs.Material(maps, axes=3)), scale=1.0, atlas=64)
     painted.save(tmp_path / "ball.glb")
     data = (tmp_path / "ball.glb").read_bytes()
     said = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
@@ -160,20 +160,20 @@ TURNED = np.array([[0, 1], [0, 0], [1, 0], [1, 1]], float)  # Columns of the atl
 def test_normals_of_space_lean_on_a_plane_as_they_do_in_the_texture(vector, role, wanted, turned: bool) -> None:
     mesh = trimesh.Trimesh(SQUARE, HALVES, process=False)
     mesh.visual = trimesh.visual.TextureVisuals(uv=TURNED if turned else (SQUARE[:, :2] - 2) / 7)
-    relief = paint(mesh, carved(vector, role), scale=1.0, atlas=16).relief
+    relief = texture_mesh(mesh, carved(vector, role), scale=1.0, atlas=16).relief
     assert relief is not None
     x, y, z = wanted
     assert np.allclose(np.median(relief, axis=(0, 1)), (y, -x, z) if turned else wanted, atol=1e-5)
 
 
-def test_normals_of_space_tilt_a_ball_by_what_lies_in_its_surface(baked: texrs.painting.Painted) -> None:
+def test_normals_of_space_tilt_a_ball_by_what_lies_in_its_surface(baked: texrs.painting.TexturedMesh) -> None:
     """Of a relief that rises along x the part in the surface counts; the bytes of a viewer give that normal back."""
     from texrs.painting._relief import bake_frames
 
-    flat = paint(BALL, carved((0, 0, 1)), scale=1.0, atlas=128).relief
+    flat = texture_mesh(BALL, carved((0, 0, 1)), scale=1.0, atlas=128).relief
     assert flat is not None
     assert np.median(flat[..., 2]) > 0.99999
-    relief = paint(BALL, carved((0.6, 0, 0.8)), scale=1.0, atlas=128).relief
+    relief = texture_mesh(BALL, carved((0.6, 0, 0.8)), scale=1.0, atlas=128).relief
     assert relief is not None
     assert baked.uv is not None
     normals = find_normals(baked.vertices, baked.faces)
@@ -194,7 +194,7 @@ def test_normals_of_space_turn_with_the_field_and_are_written(tmp_path: Path) ->
     field = texrs.fields.from_function(lambda points: np.broadcast_to(quarter, (len(points), 3, 3)), 3)
     mesh = trimesh.Trimesh(SQUARE, HALVES, process=False)
     mesh.visual = trimesh.visual.TextureVisuals(uv=(SQUARE[:, :2] - 2) / 7)
-    painted = paint(mesh, carved((0.6, 0, 0.8), field=field), scale=1.0, atlas=16)
+    painted = texture_mesh(mesh, carved((0.6, 0, 0.8), field=field), scale=1.0, atlas=16)
     assert painted.relief is not None
     assert np.allclose(np.median(painted.relief, axis=(0, 1)), (0, 0.6, 0.8), atol=1e-5)
     # Those of a volume are directions in space, and turn too; y grows against the rows.
@@ -205,7 +205,7 @@ def test_normals_of_space_turn_with_the_field_and_are_written(tmp_path: Path) ->
     assert np.abs(pixels - 255 * (np.array([0, 0.6, 0.8]) + 1) / 2).max() <= 1
 
 
-def test_smooth_things_stay_smooth_where_the_atlas_is_cut_and_edges_sharp(baked: texrs.painting.Painted) -> None:
+def test_smooth_things_stay_smooth_where_the_atlas_is_cut_and_edges_sharp(baked: texrs.painting.TexturedMesh) -> None:
     normals = find_normals(baked.vertices, baked.faces)
     assert (normals * baked.vertices / 10).sum(axis=1).min() > 0.99
     _, same = np.unique(baked.vertices, axis=0, return_inverse=True)
@@ -236,31 +236,31 @@ def test_directions_lie_in_the_surface_as_they_are_said(tmp_path: Path) -> None:
         ("curvature:least", np.tile([0, 0, 1.0], (12, 1)), False),
         ([[[4, 0, -9], [4, 0, 9]]], np.tile([0, 0, 1.0], (12, 1)), True),
     ):
-        field = follow(mesh, said, scale=2.0, resolution=32)
+        field = field_on_surface(mesh, said, scale=2.0, resolution=32)
         found = along_surface(field, points)
         dots = (found * wanted).sum(axis=1)
         assert (dots if signed else np.abs(dots)).min() > 0.9, said
         # Planes of the exemplar go up out of the surface.
         assert (field.frames(points[:, ::-1] * 2.0)[..., 0][:, ::-1] * out).sum(axis=1).min() > 0.9
     (tmp_path / "s.json").write_text(json.dumps({"strokes": [{"points": [[4, 0, -9], [4, 0, 9]]}]}))
-    again = follow(mesh, str(tmp_path / "s.json"), scale=2.0, resolution=32)
+    again = field_on_surface(mesh, str(tmp_path / "s.json"), scale=2.0, resolution=32)
     assert np.array_equal(along_surface(again, points), found)
 
 
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda: paint(BALL, STRIPES), InvalidInput, "texture: needs a texrs.SolidTexture"),
-        (lambda: paint(7, TEXTURE), InvalidInput, "mesh: needs a file"),
-        (lambda: paint(([[0, 0, 0]], [[0, 0, 1]]), TEXTURE), InvalidInput, "faces reach 1"),
-        (lambda: paint(BALL, TEXTURE, scale=0), InvalidInput, "scale"),
-        (lambda: paint(BALL, TEXTURE, atlas=4), InvalidInput, "atlas"),
-        (lambda: paint("nowhere.obj", TEXTURE), FileError, "nowhere.obj"),
-        (lambda: follow(BALL, "north", scale=1), InvalidInput, "directions: needs x, y, z"),
-        (lambda: follow(BALL, "curvature:some", scale=1), InvalidInput, "must be one of curvature"),
-        (lambda: follow(BALL, "[]", scale=1), InvalidInput, "needs strokes"),
-        (lambda: follow(BALL, [[[0, 0, 1]]], scale=1), InvalidInput, "stroke 0 needs at least two points"),
-        (lambda: follow(BALL, "nowhere.json", scale=1), FileError, "nowhere.json"),
+        (lambda: texture_mesh(BALL, STRIPES), InvalidInput, "texture: needs a texrs.SolidTexture"),
+        (lambda: texture_mesh(7, TEXTURE), InvalidInput, "mesh: needs a file"),
+        (lambda: texture_mesh(([[0, 0, 0]], [[0, 0, 1]]), TEXTURE), InvalidInput, "faces reach 1"),
+        (lambda: texture_mesh(BALL, TEXTURE, scale=0), InvalidInput, "scale"),
+        (lambda: texture_mesh(BALL, TEXTURE, atlas=4), InvalidInput, "atlas"),
+        (lambda: texture_mesh("nowhere.obj", TEXTURE), FileError, "nowhere.obj"),
+        (lambda: field_on_surface(BALL, "north", scale=1), InvalidInput, "directions: needs x, y, z"),
+        (lambda: field_on_surface(BALL, "curvature:some", scale=1), InvalidInput, "must be one of curvature"),
+        (lambda: field_on_surface(BALL, "[]", scale=1), InvalidInput, "needs strokes"),
+        (lambda: field_on_surface(BALL, [[[0, 0, 1]]], scale=1), InvalidInput, "stroke 0 needs at least two points"),
+        (lambda: field_on_surface(BALL, "nowhere.json", scale=1), FileError, "nowhere.json"),
     ],
 )
 def test_wrong_arguments(call, error: type[Exception], message: str) -> None:

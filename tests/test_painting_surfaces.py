@@ -9,7 +9,7 @@ import pytest
 import texrs
 from texrs import _notices, samples
 from texrs.errors import FileError, InputWarning, InvalidInput
-from texrs.painting import paint
+from texrs.painting import texture_mesh
 from texrs.painting._baking import bake_points
 from texrs.painting._reading import read_mesh
 
@@ -47,10 +47,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def bake(text: str, name: str = "plate.obj", **options: object) -> tuple[texrs.painting.Painted, _notices.Notices]:
+def bake(text: str, name: str = "plate.obj", **options: object) -> tuple[texrs.painting.TexturedMesh, _notices.Notices]:
     Path(name).write_text(text)
     with _notices.collect(show=lambda _: None) as notices:
-        made = paint(name, TEXTURE, **{"scale": 20.0, "atlas": 32, "padding": 0, **options})
+        made = texture_mesh(name, TEXTURE, **{"scale": 20.0, "atlas": 32, "padding": 0, **options})
     return made, notices
 
 
@@ -58,7 +58,7 @@ def read_words(path: str, word: str) -> list[str]:
     return [line for line in Path(path).read_text().splitlines() if line.split()[:1] == [word]]
 
 
-def check_texels(made: texrs.painting.Painted) -> None:
+def check_texels(made: texrs.painting.TexturedMesh) -> None:
     """Each texel shows the texture at its place on the surface, in the picture of its set."""
     for k in range(len(made.sets)):
         faces = made.faces if made.which is None else made.faces[made.which == k]
@@ -117,7 +117,7 @@ def test_faces_that_lie_over_others_of_their_material_are_reported(here) -> None
     assert "plate.obj: UVs of 2 faces lie over others" in notices.ignored[0]
     Path("plate.obj").write_text(mirrored)
     with pytest.warns(InputWarning, match="lie over others"):
-        paint("plate.obj", TEXTURE, scale=20.0, atlas=32)
+        texture_mesh("plate.obj", TEXTURE, scale=20.0, atlas=32)
     pytest.importorskip("xatlas")
     apart, notices = bake(mirrored, unwrap=True)
     assert not notices.ignored
@@ -127,7 +127,7 @@ def test_faces_that_lie_over_others_of_their_material_are_reported(here) -> None
 def test_pictures_that_would_repeat_are_refused_with_the_way_out(here) -> None:
     Path("plate.obj").write_text(TILES.replace("vt 2 0", "vt 3.5 0"))
     with pytest.raises(InvalidInput, match=r"UVs of 1 faces cross a tile's border \(u 0 to 3.5.*--unwrap"):
-        paint("plate.obj", TEXTURE, scale=20.0, atlas=32)
+        texture_mesh("plate.obj", TEXTURE, scale=20.0, atlas=32)
 
 
 def test_faces_without_uvs_are_laid_out_and_the_others_stay(here) -> None:
@@ -196,7 +196,7 @@ def test_a_scene_keeps_places_names_and_uvs_without_materials(here) -> None:
     assert sorted(surface.vertices.round(6).tolist()) == sorted(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [5, 0, 0], [5, 1, 0], [4, 1, 0]]
     )
-    made = paint(surface, TEXTURE, scale=20.0, atlas=32)
+    made = texture_mesh(surface, TEXTURE, scale=20.0, atlas=32)
     assert len(made.sets) == 2  # Both copies have the same UVs, and lie at different places.
     made.save("painted.glb")
     assert np.allclose(read_mesh("painted.glb").vertices, surface.vertices, atol=1e-6)
@@ -206,7 +206,7 @@ def test_progress_moves_with_the_work(here) -> None:
     texture = texrs.SolidTexture(STRIPES, seed=3)
     seen: list[tuple[str, float]] = []
     box = trimesh.creation.box((2, 2, 2))
-    paint(box, texture, scale=20.0, atlas=None, progress=lambda stage, share: seen.append((stage, share)))
+    texture_mesh(box, texture, scale=20.0, atlas=None, progress=lambda stage, share: seen.append((stage, share)))
     shares = [share for stage, share in seen if stage == "sample"]
     assert shares == sorted(shares)
     assert shares[-1] == 1

@@ -278,5 +278,5 @@ def test_uvs_without_a_material(here: Path) -> None:
     document = json.loads(Path("model.gltf").read_text())
     del document["materials"], document["meshes"][0]["primitives"][0]["material"]
     Path("leaf.gltf").write_text(json.dumps(document))
-    made = texrs.painting.paint("leaf.gltf", texrs.SolidTexture(samples.stripes((32, 32, 32)).image), atlas=16)
+    made = texrs.painting.texture_mesh("leaf.gltf", texrs.SolidTexture(samples.stripes((32, 32, 32)).image), atlas=16)
     assert np.allclose(made.uv, uv)

@@ -33,7 +33,7 @@ THINGS = {
     "Guide": texrs.Guide(exemplar=PEBBLES[..., 0], output=PEBBLES[..., 1]),
     "ElementOptions": texrs.ElementOptions(labels=DOTS.labels),
     "Comparison": texrs.volume.compare(VOLUME, VOLUME),
-    "Particles": texrs.volume.particles(VOLUME[..., 0] > 100),
+    "Particles": texrs.volume.component_statistics(VOLUME[..., 0] > 100),
     "Material": STONES,
     "Map": STONES["height"],
     "ScaleMap": texrs.scale_maps.from_angles((64, 64), 40, 90),

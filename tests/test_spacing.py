@@ -176,13 +176,15 @@ def test_statistics_are_those_of_space() -> None:
     z, y, x = np.meshgrid(np.arange(40) * 2.0, np.arange(64) * 1.0, np.arange(24) * 1.0, indexing="ij")
     along = ((z // 4) % 2 == 0) | (x < 0)
     across = ((y // 4) % 2 == 0) | (x < 0)
-    first = volume.two_point(along, 16, spacing=(2, 1, 1))[0]
-    second = volume.two_point(across, 16, spacing=(2, 1, 1))[1]
+    first = volume.two_point_correlation(along, 16, spacing=(2, 1, 1))[0]
+    second = volume.two_point_correlation(across, 16, spacing=(2, 1, 1))[1]
     np.testing.assert_allclose(first[::2], second[::2], atol=0.05)
-    np.testing.assert_allclose(volume.lineal_path(along, 8, spacing=(2, 1, 1))[0, [0, 2, 4]], [0.5, 0.25, 0], atol=0.03)
+    np.testing.assert_allclose(
+        volume.lineal_path_function(along, 8, spacing=(2, 1, 1))[0, [0, 2, 4]], [0.5, 0.25, 0], atol=0.03
+    )
     waves = np.sin(2 * np.pi * z / 16)
     assert volume.autocorrelation(waves, 16, spacing=(2, 1, 1))[0, [8, 16]].round(2).tolist() == [-1, 1]
-    pieces = volume.particles(ELLIPSOIDS > 0, spacing=SPACING)
+    pieces = volume.component_statistics(ELLIPSOIDS > 0, spacing=SPACING)
     assert pieces.median == pytest.approx(4 / 3 * np.pi * np.prod(SEMI), rel=0.1)
     # Layers that are oblique in space.
     layers = np.sin((z + y) * np.pi / 6)
@@ -230,10 +232,10 @@ def test_pictures_have_the_proportions_of_space(tmp_path: Path) -> None:
 
 def test_a_mesh_shows_the_texture_in_its_proportions() -> None:
     pytest.importorskip("trimesh")
-    from texrs.painting import paint
+    from texrs.painting import texture_mesh
 
     corners, faces = [[0, 0, 0], [8, 0, 0], [0, 8, 0], [0, 0, 8.0]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
     texture = texrs.SolidTexture(ELLIPSOIDS, quality="fast", spacing=(2, 1, 1))
-    painted = paint((corners, faces), texture, scale=3, atlas=None)
+    painted = texture_mesh((corners, faces), texture, scale=3, atlas=None)
     at = np.array(painted.vertices)[:, ::-1] * 3 / (2, 1, 1)
     np.testing.assert_array_equal(painted.maps["image"], texture.sample(at))

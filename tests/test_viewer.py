@@ -86,7 +86,7 @@ def test_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["slice", f"{tmp_path}/a.npy", "-o", f"{tmp_path}/a.html", "--cube"]) == 2
     assert "a page shows slices along all axes, without --cube" in capsys.readouterr().err
     labels = np.arange(4 * 4 * 4).reshape(4, 4, 4)
-    assert_array_equal(take_apart(volume.Viewer(labels, labels=True)._repr_html_())[0], volume.paint(labels))
+    assert_array_equal(take_apart(volume.Viewer(labels, labels=True)._repr_html_())[0], volume.label_to_color(labels))
     with pytest.raises(FileError, match=r"ends in \.html"):
         volume.Viewer(labels).save(tmp_path / "a.png")
     with pytest.raises(InvalidInput, match="volume"):

@@ -37,12 +37,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("--at x=7", lambda: VOLUME[:, :, 7]),
         ("--at row=-1", lambda: VOLUME[:, -1]),
         ("--at column=7", lambda: VOLUME[:, :, 7]),
-        ("--oblique /0,1,1", lambda: volume.oblique(VOLUME, None, (1, 1, 0))),
+        ("--oblique /0,1,1", lambda: volume.oblique_slice(VOLUME, None, (1, 1, 0))),
         (
             "--oblique 7,8.5,9/0.2,-1,1 --interpolation nearest",
-            lambda: volume.oblique(VOLUME, (9, 8.5, 7), (1, -1, 0.2), interpolation="nearest"),
+            lambda: volume.oblique_slice(VOLUME, (9, 8.5, 7), (1, -1, 0.2), interpolation="nearest"),
         ),
-        ("--cube --size 64 --threads 1", lambda: volume.cube(VOLUME, 64)),
+        ("--cube --size 64 --threads 1", lambda: volume.render_block(VOLUME, 64)),
     ],
 )
 def test_slice_writes_what_the_functions_make(here, capsys, arguments, expected):
@@ -110,7 +110,7 @@ def test_labels_are_painted(here, capsys, dtype):
     marked = samples.particles((32, 32, 32)).labels % 100
     io.write_volume("labels.npy", marked.astype(dtype))
     assert main(["slice", "labels.npy", "-o", "a.png", "--labels", "--at", "row=9"]) == 0
-    expected = volume.paint((marked != 0 if dtype == "bool" else marked).astype(np.int64))
+    expected = volume.label_to_color((marked != 0 if dtype == "bool" else marked).astype(np.int64))
     np.testing.assert_array_equal(iio.imread("a.png"), expected[:, 9])
     assert main(["slice", "v.npy", "-o", "b.png", "--labels"]) == 2
     assert "v.npy: needs integers of shape" in capsys.readouterr().err

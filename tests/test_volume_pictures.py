@@ -31,7 +31,7 @@ def test_cuts_along_the_axes_are_slices(dtype):
     for axis, place in ((0, 3), (1, 4), (2, 7)):
         normal, point = np.eye(3)[axis], np.where(np.arange(3) == axis, place, (np.array(v.shape[:3]) - 1) / 2)
         for sign in (1, -2.5):
-            found = volume.oblique(v, point, sign * normal, interpolation="cubic")
+            found = volume.oblique_slice(v, point, sign * normal, interpolation="cubic")
             assert found.dtype == v.dtype
             assert_array_equal(found, np.take(v, place, axis=axis))
 
@@ -41,16 +41,16 @@ def test_cuts_in_any_direction():
     normal = np.array([1, -2, 0.5])
     steps = np.array([[2.0, 1, 0], [0.5, 0.5, 1]])  # both across the normal
     assert_allclose(steps @ normal, 0)
-    cut = volume.oblique(ramp, (9, 11, 13), axes=steps, size=(5, 7))
+    cut = volume.oblique_slice(ramp, (9, 11, 13), axes=steps, size=(5, 7))
     at = np.array([9, 11, 13]) + np.arange(-2, 3)[:, None, None] * steps[0] + np.arange(-3, 4)[:, None] * steps[1]
     assert_allclose(cut, at @ [3, 5, 7], rtol=1e-5)
-    whole = volume.oblique(ramp + 1, (9, 11, 13), normal)
+    whole = volume.oblique_slice(ramp + 1, (9, 11, 13), normal)
     assert (whole > 0).mean() > 0.5
-    wide = volume.oblique(ramp + 1, (9, 11, 13), normal, size=(99, 101))
+    wide = volume.oblique_slice(ramp + 1, (9, 11, 13), normal, size=(99, 101))
     assert wide.shape == (99, 101)
     assert (wide[[0, -1]] == 0).all()
     labels = (ramp > 150).astype(np.uint8)
-    assert set(np.unique(volume.oblique(labels, None, normal, interpolation="nearest"))) == {0, 1}
+    assert set(np.unique(volume.oblique_slice(labels, None, normal, interpolation="nearest"))) == {0, 1}
 
 
 def test_the_cube_shows_its_faces():
@@ -58,7 +58,7 @@ def test_the_cube_shows_its_faces():
     v[0, ..., 0] = 255  # the front is red,
     v[0:, 0, :, 1] = 255  # the top green,
     v[0:, :, -1, 2] = 255  # the right blue
-    picture = volume.cube(v, 200)
+    picture = volume.render_block(v, 200)
     rows, columns = picture.shape[:2]
     assert max(rows, columns) == 200
     assert picture.dtype == np.uint8
@@ -74,7 +74,7 @@ def test_the_cube_shows_its_faces():
 
 def test_from_the_front_the_cube_is_its_first_plane():
     v = np.repeat(np.repeat(VOLUME[:, :7, :9], 4, axis=1), 4, axis=2)
-    picture = volume.cube(v, 1000, azimuth=0, elevation=0, interpolation="nearest")
+    picture = volume.render_block(v, 1000, azimuth=0, elevation=0, interpolation="nearest")
     inside = picture[..., 3] == 255
     rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
     middle = picture[np.ix_(
@@ -87,7 +87,7 @@ def test_from_the_front_the_cube_is_its_first_plane():
 @pytest.mark.parametrize("shape", [(1, 9, 9), (9, 1, 9, 4), (2, 2, 2, 7), (5, 60, 5)])
 def test_cubes_of_odd_volumes(shape):
     for dtype in (np.uint8, np.float32, bool):
-        picture = volume.cube(RNG.random(shape).astype(dtype), 32, azimuth=-130, elevation=-20)
+        picture = volume.render_block(RNG.random(shape).astype(dtype), 32, azimuth=-130, elevation=-20)
         assert max(picture.shape[:2]) == 32
         assert (picture[..., 3] == 255).any()
 
@@ -127,15 +127,15 @@ def test_a_turntable_that_is_stopped_leaves_nothing(tmp_path):
 
 def test_labels_are_painted_apart():
     labels = np.arange(60).reshape(3, 4, 5)
-    painted = volume.paint(labels)
+    painted = volume.label_to_color(labels)
     assert painted.shape == (3, 4, 5, 3)
     table = painted.reshape(60, 3).astype(int)
     apart = np.abs(table[:, None] - table).sum(-1) + 999 * np.eye(60, dtype=int)
     assert apart.min() > 5
     assert apart[:16, :16].min() > 40
-    assert (volume.paint(labels % 7)[0, 0] == painted[0, 0]).all()
-    assert volume.paint(np.array([[0, 2**40]]))[0, 1].tolist() != volume.paint([[0]])[0, 0].tolist()
-    assert volume.paint(np.eye(3, dtype=bool), [(0, 0, 0), (255, 0, 9)])[1, 1].tolist() == [255, 0, 9]
+    assert (volume.label_to_color(labels % 7)[0, 0] == painted[0, 0]).all()
+    assert volume.label_to_color(np.array([[0, 2**40]]))[0, 1].tolist() != volume.label_to_color([[0]])[0, 0].tolist()
+    assert volume.label_to_color(np.eye(3, dtype=bool), [(0, 0, 0), (255, 0, 9)])[1, 1].tolist() == [255, 0, 9]
 
 
 def signed_volume(vertices, faces):
@@ -145,7 +145,7 @@ def signed_volume(vertices, faces):
 
 def test_surfaces_are_closed_and_face_outwards(tmp_path):
     sample = samples.particles((40, 48, 56))
-    vertices, faces = volume.surface(sample.labels > 0, spacing=(3, 2, 1))
+    vertices, faces = volume.extract_surface(sample.labels > 0, spacing=(3, 2, 1))
     inside = 6 * (sample.labels > 0).sum()
     assert signed_volume(vertices, faces) == pytest.approx(inside, rel=0.05)
     assert (vertices.max(0) <= [56, 96, 120]).all()
@@ -157,7 +157,7 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
     assert (tmp_path / "particles.stl").stat().st_size == 84 + 50 * len(faces)
     corner = np.zeros((4, 4, 4), bool)
     corner[:2, :2, :2] = True
-    closed, opened = volume.surface(corner)[1], volume.surface(corner, closed=False)[1]
+    closed, opened = volume.extract_surface(corner)[1], volume.extract_surface(corner, closed=False)[1]
     assert len(opened) < len(closed)
 
 
@@ -169,31 +169,31 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
         (lambda p: volume.slices(VOLUME, (7, 0, 0)), "at: needs an integer from -7 to 6"),
         (lambda p: volume.slices(VOLUME, gap=-1), "gap"),
         (lambda p: volume.slices(np.full((3, 3, 3), np.nan)), "NaN"),
-        (lambda p: volume.oblique(VOLUME), "one of the two"),
-        (lambda p: volume.oblique(VOLUME, normal=(1, 0, 0), axes=np.eye(3)[:2]), "one of the two"),
-        (lambda p: volume.oblique(VOLUME, normal=(0, 0, 0)), "normal: needs three numbers"),
-        (lambda p: volume.oblique(VOLUME, normal="up"), "normal"),
-        (lambda p: volume.oblique(VOLUME, (1, 2), (1, 0, 0)), "point"),
-        (lambda p: volume.oblique(VOLUME, (99, 0, 0), (1, 0, 0)), "does not meet the volume"),
-        (lambda p: volume.oblique(VOLUME, axes=[[1, 0, 0], [2, 0, 0]]), "not parallel"),
-        (lambda p: volume.oblique(VOLUME, normal=(1, 0, 0), size=(10**6, 10**6)), "more than the limit"),
-        (lambda p: volume.oblique(VOLUME, normal=(1, 0, 0), interpolation="best"), "interpolation"),
-        (lambda p: volume.cube(VOLUME, 5000), "size: needs an integer from 16 to 4096"),
-        (lambda p: volume.cube(VOLUME, elevation=100), "elevation"),
-        (lambda p: volume.cube(VOLUME, azimuth=float("nan")), "azimuth"),
+        (lambda p: volume.oblique_slice(VOLUME), "one of the two"),
+        (lambda p: volume.oblique_slice(VOLUME, normal=(1, 0, 0), axes=np.eye(3)[:2]), "one of the two"),
+        (lambda p: volume.oblique_slice(VOLUME, normal=(0, 0, 0)), "normal: needs three numbers"),
+        (lambda p: volume.oblique_slice(VOLUME, normal="up"), "normal"),
+        (lambda p: volume.oblique_slice(VOLUME, (1, 2), (1, 0, 0)), "point"),
+        (lambda p: volume.oblique_slice(VOLUME, (99, 0, 0), (1, 0, 0)), "does not meet the volume"),
+        (lambda p: volume.oblique_slice(VOLUME, axes=[[1, 0, 0], [2, 0, 0]]), "not parallel"),
+        (lambda p: volume.oblique_slice(VOLUME, normal=(1, 0, 0), size=(10**6, 10**6)), "more than the limit"),
+        (lambda p: volume.oblique_slice(VOLUME, normal=(1, 0, 0), interpolation="best"), "interpolation"),
+        (lambda p: volume.render_block(VOLUME, 5000), "size: needs an integer from 16 to 4096"),
+        (lambda p: volume.render_block(VOLUME, elevation=100), "elevation"),
+        (lambda p: volume.render_block(VOLUME, azimuth=float("nan")), "azimuth"),
         (lambda p: volume.turntable(VOLUME, p / "a.png"), r"ends in \.gif"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", frames=1), "frames"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", frames=100, size=1024), "more than 67108864 pixels"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", background=(1, 2)), "background"),
         (lambda p: volume.turntable(VOLUME, p / "none" / "a.gif", size=16), "there is no folder"),
-        (lambda p: volume.paint(np.zeros((4, 4))), "labels: needs integers"),
-        (lambda p: volume.paint([[0, -1]]), "at least 0, got -1"),
-        (lambda p: volume.paint([[0, 2]], [(0, 0, 0)]), "reach 2, but there are 1 colours"),
-        (lambda p: volume.paint([[0, 2]], [(0, 0, 300)]), "from 0 to 255"),
-        (lambda p: volume.surface(np.zeros((4, 4, 4), bool)), "no surface"),
-        (lambda p: volume.surface(np.zeros((4, 4, 4))), "mask: needs bool"),
-        (lambda p: volume.surface(np.zeros((1, 4, 4), bool)), "at least 2"),
-        (lambda p: volume.surface(np.eye(4, dtype=bool)[None].repeat(4, 0), spacing=(1, 1, 0)), "spacing"),
+        (lambda p: volume.label_to_color(np.zeros((4, 4))), "labels: needs integers"),
+        (lambda p: volume.label_to_color([[0, -1]]), "at least 0, got -1"),
+        (lambda p: volume.label_to_color([[0, 2]], [(0, 0, 0)]), "reach 2, but there are 1 colours"),
+        (lambda p: volume.label_to_color([[0, 2]], [(0, 0, 300)]), "from 0 to 255"),
+        (lambda p: volume.extract_surface(np.zeros((4, 4, 4), bool)), "no surface"),
+        (lambda p: volume.extract_surface(np.zeros((4, 4, 4))), "mask: needs bool"),
+        (lambda p: volume.extract_surface(np.zeros((1, 4, 4), bool)), "at least 2"),
+        (lambda p: volume.extract_surface(np.eye(4, dtype=bool)[None].repeat(4, 0), spacing=(1, 1, 0)), "spacing"),
     ],
 )
 def test_bad_input_gets_a_sentence(make, says, tmp_path):

@@ -62,7 +62,7 @@ def test_classes_of_few_colours():
 @given(seed=st.integers(0, 10_000), share=st.floats(0, 1))
 def test_correlations_against_slow_twins(axes, seed, share):
     mask = np.random.default_rng(seed).random((5, 7, 6)[:axes]) < share
-    for found, along in ((volume.two_point(mask, 6), False), (volume.lineal_path(mask, 6), True)):
+    for found, along in ((volume.two_point_correlation(mask, 6), False), (volume.lineal_path_function(mask, 6), True)):
         assert found.shape == (axes, 7)
         for axis in range(axes):
             lines = np.moveaxis(mask, axis, 0)
@@ -80,7 +80,7 @@ def test_correlations_against_slow_twins(axes, seed, share):
 
 def test_particles_are_counted(particles):
     inside = particles.labels > 0
-    found = volume.particles(inside)
+    found = volume.component_statistics(inside)
     sizes = np.bincount(particles.labels.ravel())[1:]
     # Pieces that the border cuts off from each other are counted each.
     assert len(particles.centres) <= found.count <= 1.6 * len(particles.centres)
@@ -89,11 +89,11 @@ def test_particles_are_counted(particles):
     assert found.deciles[0] <= found.deciles[4] <= found.deciles[8]
     blocks = np.zeros((9, 9, 9), bool)
     blocks[0:2, 0:2, 0:2] = blocks[4:7, 4:7, 4:7] = blocks[7, 7, 7] = True  # the last touches by a corner alone
-    three = volume.particles(blocks, least=1)
+    three = volume.component_statistics(blocks, least=1)
     assert (three.count, three.mean, three.median) == (3, 12, 8)
     assert three.deciles == (1, 1, 1, 8, 8, 8, 27, 27, 27)
-    assert volume.particles(blocks).count == 2
-    assert volume.particles(np.zeros((4, 4), bool)).count == 0
+    assert volume.component_statistics(blocks).count == 2
+    assert volume.component_statistics(np.zeros((4, 4), bool)).count == 0
 
 
 # --- structure -------------------------------------------------------------------------------------------------------
@@ -313,9 +313,9 @@ CUBE = np.zeros((16, 16, 16), np.uint8)
         (lambda: volume.classes([[1, 2], [3]]), "exemplar: not an array"),
         (lambda: volume.classes(CUBE, 99), "count"),
         (lambda: volume.classes(CUBE).of(np.zeros((4, 4, 4, 3), np.uint8)), "needs 1 colour channels, got 3"),
-        (lambda: volume.two_point(CUBE * 0.5), "mask: needs bool"),
-        (lambda: volume.two_point(CUBE, 0), "reach"),
-        (lambda: volume.particles(CUBE, least=0), "least"),
+        (lambda: volume.two_point_correlation(CUBE * 0.5), "mask: needs bool"),
+        (lambda: volume.two_point_correlation(CUBE, 0), "reach"),
+        (lambda: volume.component_statistics(CUBE, least=0), "least"),
         (lambda: volume.frequency(CUBE[:8]), "at least 16"),
         (lambda: volume.frequency(CUBE, window=99), "window"),
         (lambda: volume.frequency(np.full((20, 20), np.inf)), "finite"),

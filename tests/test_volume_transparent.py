@@ -28,7 +28,7 @@ def add_up(colours: np.ndarray, alpha: np.ndarray) -> tuple[np.ndarray, float]:
 @pytest.mark.parametrize("alpha", [0.02, 0.3, 1.0])
 def test_an_even_block_is_as_opaque_as_it_is_deep(alpha: float) -> None:
     block = np.full((12, 32, 32, 3), 200, np.uint8)
-    seen = volume.transparent(block, 64, **FRONT, transfer=[(0, None, alpha)], shading=False)
+    seen = volume.render_volume(block, 64, **FRONT, transfer=[(0, None, alpha)], shading=False)
     middle = seen[28:36, 28:36].reshape(-1, 4)
     assert_allclose(middle[:, :3], 200, atol=1)
     assert_allclose(middle[:, 3] / 255, 1 - (1 - alpha) ** 12, atol=0.025)
@@ -39,20 +39,22 @@ def test_what_lies_in_front_hides_what_is_behind() -> None:
     block = np.zeros((16, 32, 32, 3), np.uint8)
     block[2:5], block[11:14] = (255, 0, 0), (0, 0, 255)
     stops = [(0, None, 0), (0.2, None, 0), (1 / 3, None, 0.4)]
-    front = volume.transparent(block, 64, **FRONT, transfer=stops, shading=False)[32, 32]
+    front = volume.render_volume(block, 64, **FRONT, transfer=stops, shading=False)[32, 32]
     colours = block[:, 16, 16] / 255
     total, alpha = add_up(colours, np.where(colours.any(axis=1), 0.4, 0))
     assert_allclose(front[3] / 255, alpha, atol=0.05)
     assert_allclose(front[:3] / 255, total / alpha, atol=0.08)
-    behind = volume.transparent(block, 64, azimuth=180, elevation=0, transfer=stops, shading=False)[32, 32]
+    behind = volume.render_volume(block, 64, azimuth=180, elevation=0, transfer=stops, shading=False)[32, 32]
     assert_allclose(behind[:3], front[2::-1], atol=2)
     solid = [(0, None, 0), (0.2, None, 0), (1 / 3, None, 1)]
-    assert_array_equal(volume.transparent(block, 64, **FRONT, transfer=solid, shading=False)[32, 32], [255, 0, 0, 255])
+    assert_array_equal(
+        volume.render_volume(block, 64, **FRONT, transfer=solid, shading=False)[32, 32], [255, 0, 0, 255]
+    )
 
 
 def test_by_default_what_stands_out_is_seen() -> None:
     image = PARTICLES.image
-    seen = volume.transparent(image, 96, **FRONT)
+    seen = volume.render_volume(image, 96, **FRONT)
     # A pixel is covered where there is a particle behind it, and hardly where there is none.
     column = (PARTICLES.labels > 0).sum(axis=0)
     scale = seen.shape[0] / (48 * 1.04)
@@ -78,7 +80,7 @@ def test_any_volume(kind: str, channels: int) -> None:
             np.uint8
         )
     given = {"uint8": given, "uint16": given.astype(np.uint16) * 257, "float32": (given / 255).astype(np.float32)}[kind]
-    seen = volume.transparent(given, 32)
+    seen = volume.render_volume(given, 32)
     assert seen.dtype == np.uint8
     assert seen.shape[2] == 4
     assert 0 < (seen[..., 3] > 0).mean() < 1
@@ -88,17 +90,17 @@ def test_the_same_bytes() -> None:
     pictures = []
     for count in (1, 2, 7):
         with texrs.threads(count):
-            pictures.append(volume.transparent(PARTICLES.image, 64))
+            pictures.append(volume.render_volume(PARTICLES.image, 64))
     assert all((p == pictures[0]).all() for p in pictures)
-    assert_array_equal(volume.transparent(PARTICLES.image, 64, azimuth=400), pictures[0])
+    assert_array_equal(volume.render_volume(PARTICLES.image, 64, azimuth=400), pictures[0])
 
 
 def test_transfer_functions() -> None:
     grey = np.linspace(0, 255, 24).astype(np.uint8)[:, None, None] * np.ones((24, 24, 24), np.uint8)
     text = "0:own:0, 0.5:#f00:0, 0.6:#ff0000:0.5, 0.7:#00f:0"
     stops = [(0, None, 0), (0.5, (255, 0, 0), 0), (0.6, "#f00", 0.5), (0.7, "#0000ff", 0)]
-    assert_array_equal(volume.transparent(grey, 32, transfer=text), volume.transparent(grey, 32, transfer=stops))
-    seen = volume.transparent(grey, 64, azimuth=90, elevation=0, transfer=text, shading=False)
+    assert_array_equal(volume.render_volume(grey, 32, transfer=text), volume.render_volume(grey, 32, transfer=stops))
+    seen = volume.render_volume(grey, 64, azimuth=90, elevation=0, transfer=text, shading=False)
     covered = np.flatnonzero(seen[32, :, 3])
     assert (covered.max() - covered.min()) < 64 * 0.35  # A sheet of the values that are seen.
     assert seen[32, covered, 0].max() > 150
@@ -124,14 +126,14 @@ def test_transfer_functions() -> None:
 )
 def test_what_is_no_transfer_function(transfer: object, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
-        volume.transparent(PARTICLES.image, 32, transfer=transfer)
+        volume.render_volume(PARTICLES.image, 32, transfer=transfer)
 
 
 def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     io.write_volume(tmp_path / "a.npy", PARTICLES.image)
     words = ["slice", f"{tmp_path}/a.npy", "-o", f"{tmp_path}/a.png", "--transparent", "--size", "64", "-q"]
     assert main([*words, "--transfer", "0:own:0,0.3:#ff8800:0.1"]) == 0
-    wanted = volume.transparent(PARTICLES.image, 64, transfer="0:own:0,0.3:#ff8800:0.1")
+    wanted = volume.render_volume(PARTICLES.image, 64, transfer="0:own:0,0.3:#ff8800:0.1")
     assert_array_equal(io.read(tmp_path / "a.png"), wanted)
     assert main([*words, "--transfer", "0.3"]) == 2
     assert "needs VALUE:COLOUR:ALPHA" in capsys.readouterr().err

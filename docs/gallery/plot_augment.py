@@ -27,7 +27,7 @@ for (above, below), (title, picture, labels, around) in zip(rows.T, shown, stric
         above.add_patch(
             plt.Rectangle((left - 0.5, top - 0.5), right - left, bottom - top, fill=False, ec="lime", lw=1.5)
         )
-    below.imshow(texrs.volume.paint(labels))
+    below.imshow(texrs.volume.label_to_color(labels))
     above.set_axis_off()
     below.set_axis_off()
 plt.show()

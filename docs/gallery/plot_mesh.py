@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import texrs
-from texrs.painting import paint
+from texrs.painting import texture_mesh
 
 turns, around = np.meshgrid(np.linspace(0, 2 * np.pi, 361)[:-1], np.linspace(0, 2 * np.pi, 65)[:-1], indexing="ij")
 middle = np.stack(
@@ -27,7 +27,7 @@ quads = np.stack([n, np.roll(n, -1, 0), np.roll(np.roll(n, -1, 0), -1, 1), np.ro
 faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 block = texrs.samples.particles((48, 48, 48)).image
-painted = paint((corners, faces), texrs.SolidTexture(block, seed=2), scale=16, atlas=None)
+painted = texture_mesh((corners, faces), texrs.SolidTexture(block, seed=2), scale=16, atlas=None)
 shade = np.clip(0.35 + 0.65 * (out @ [-0.4, 0.5, 0.77]), 0.15, 1).reshape(-1, 1)
 colours = (painted.maps["image"] / 255 * shade)[painted.faces].mean(axis=1)
 

@@ -23,7 +23,7 @@ paved = texrs.splice(wall, texrs.layouts.cells(panes), (240, 320), layout_scale=
 figure, row = plt.subplots(1, 3, width_ratios=[192, 320, 320], figsize=(11, 3.4), layout="constrained")
 shown = {
     "a wall": wall.image,
-    "cells": texrs.volume.paint(panes),
+    "cells": texrs.volume.label_to_color(panes),
     "paved with its bricks": paved,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):

@@ -18,7 +18,7 @@ figure, row = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
 shown = {
     "the result": result.image,
     "where each pixel comes from": result.source_map.coordinates[..., 1],
-    "the stones known in the example": texrs.volume.paint(stones),
+    "the stones known in the example": texrs.volume.label_to_color(stones),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

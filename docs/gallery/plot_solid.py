@@ -13,7 +13,10 @@ wood = texrs.samples.wood_solid((48, 48, 48)).image
 rings = texrs.solid(wood, 72, field="circular:axis=z", seed=5).image
 
 figure, row = plt.subplots(1, 2, figsize=(9, 4.8), layout="constrained")
-shown = {"the example": texrs.volume.cube(wood, 400), "wound round an axis": texrs.volume.cube(rings, 400)}
+shown = {
+    "the example": texrs.volume.render_block(wood, 400),
+    "wound round an axis": texrs.volume.render_block(rings, 400),
+}
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)
     axes.set_title(title)

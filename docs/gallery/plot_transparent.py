@@ -15,9 +15,9 @@ dark = [(0, None, 0.3), (0.35, None, 0.3), (0.36, None, 0), (1, None, 0)]
 
 figure, row = plt.subplots(1, 3, figsize=(11, 4), layout="constrained")
 shown = {
-    "from outside": volume.cube(block, 400),
-    "what stands out": volume.transparent(block, 400),
-    "what is dark": volume.transparent(block, 400, transfer=dark),
+    "from outside": volume.render_block(block, 400),
+    "what stands out": volume.render_volume(block, 400),
+    "what is dark": volume.render_volume(block, 400, transfer=dark),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

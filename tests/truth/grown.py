@@ -181,12 +181,12 @@ def patches_of_a_solid() -> Parts:
 @case
 def pictures_of_volumes() -> Parts:
     image, labels = colour("particles", *CUBE, seed=2), classes("weave_solid", *CUBE, seed=3)
-    vertices, faces = volume.surface(labels == 2)
+    vertices, faces = volume.extract_surface(labels == 2)
     return {
         "slices": volume.slices(image, (3, 20, 30)),
-        "oblique": volume.oblique(image, normal=(1, 2, 0.5)),
-        "cube": volume.cube(image, 80),
-        "paint": volume.paint(labels.astype(np.int32)),
+        "oblique": volume.oblique_slice(image, normal=(1, 2, 0.5)),
+        "cube": volume.render_block(image, 80),
+        "paint": volume.label_to_color(labels.astype(np.int32)),
         "vertices": vertices,
         "faces": faces,
     }

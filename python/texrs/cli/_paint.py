@@ -24,7 +24,7 @@ from texrs.cli._texts import About
 from texrs.errors import InvalidInput
 from texrs.io._temporary import name_prefix
 from texrs.materials import Material
-from texrs.painting import find_scale, follow, paint
+from texrs.painting import field_on_surface, find_scale, texture_mesh
 from texrs.painting._files import check_suffix
 from texrs.painting._reading import read_mesh
 from texrs.papers.solid.window import SolidTexture
@@ -42,10 +42,13 @@ BLOCK = Kind("FILE|FOLDER", read_block, "A volume, a folder of volumes that are 
 TEXTURE = Options(SolidTexture, arguments={"exemplar": BLOCK}, leave={"cache_bytes": "one process makes all"}, axes=3)
 MESH = Kind("FILE", lambda text, about: text, ".obj, .ply, .stl or .glb.")
 PAINTED = Options(
-    paint, only=("mesh", "scale", "atlas", "padding", "unwrap"), arguments={"mesh": MESH}, names={"scale": "voxels"}
+    texture_mesh,
+    only=("mesh", "scale", "atlas", "padding", "unwrap"),
+    arguments={"mesh": MESH},
+    names={"scale": "voxels"},
 )
 FOLLOWED = Options(
-    follow,
+    field_on_surface,
     only=("directions", "along"),
     kinds={"directions": Kind("AXIS|around:AXIS|curvature|FILE.json", lambda text, about: text)},
     optional={"directions": "as the texture lies"},
@@ -97,8 +100,10 @@ def paint_command(
             # The field must turn the texture at the scale that the mesh shows it.
             if "scale" not in painted:
                 painted["scale"] = find_scale(surface, texture, **painted)
-            texture = SolidTexture(**call | {"field": follow(surface[:2], **followed, scale=painted["scale"])})
-        made = paint(surface, texture, **painted, progress=progress)
+            texture = SolidTexture(
+                **call | {"field": field_on_surface(surface[:2], **followed, scale=painted["scale"])}
+            )
+        made = texture_mesh(surface, texture, **painted, progress=progress)
     depth: Any = bits
     with TemporaryDirectory(prefix=name_prefix(), dir=folder) as beside:
         # Files name each other, so they are written under their own names first.

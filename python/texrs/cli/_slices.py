@@ -24,7 +24,7 @@ from texrs.cli._readers import read_stated_spacing, read_volume
 from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
 from texrs.fields._spaced import as_distances
-from texrs.volume import Viewer, cube, cubes, oblique, paint, slices, transparent, turntable
+from texrs.volume import Viewer, cubes, label_to_color, oblique_slice, render_block, render_volume, slices, turntable
 from texrs.volume._stretch import find_cube
 from texrs.volume._values import as_direction
 from texrs.volume.pictures import as_steps, check_cube, check_turntable
@@ -70,14 +70,14 @@ ACROSS = Options(
     },
 )
 CUT = Options(
-    oblique,
+    oblique_slice,
     only=("normal", "interpolation"),
     names={"normal": "oblique"},
     kinds={"normal": Kind("X,Y,Z/X,Y,Z", parse_oblique, "A point and a normal; /0,1,1 is through the middle.")},
 )
-BLOCK = Options(cube, only=("size", "azimuth", "elevation", "interpolation"))
+BLOCK = Options(render_block, only=("size", "azimuth", "elevation", "interpolation"))
 CLEAR = Options(
-    transparent,
+    render_volume,
     only=("size", "azimuth", "elevation", "transfer", "shading"),
     kinds={
         "transfer": Kind(
@@ -140,7 +140,7 @@ def slice_command(
         place_in_cubes(options, length, voxels.shape[:3])
     if labels:
         with name_arguments(labels=volume):
-            voxels = paint(voxels)
+            voxels = label_to_color(voxels)
         if used not in (ACROSS, CLEAR):
             options["interpolation"] = "nearest"
     if not (as_cube or as_clear or as_turntable or paged):
@@ -196,12 +196,12 @@ def place_in_cubes(options: dict[str, Any], length: Sequence[int], sides: Sequen
 def draw(voxels: Array, used: Options, options: dict[str, Any]) -> Array:
     """Return the picture that was asked for."""
     if used is BLOCK:
-        return cube(voxels, **options)
+        return render_block(voxels, **options)
     if used is CLEAR:
-        return transparent(voxels, **options)
+        return render_volume(voxels, **options)
     if used is CUT:
         point, normal = options.pop("normal")
-        return oblique(voxels, point, normal, **options)
+        return oblique_slice(voxels, point, normal, **options)
     place = options.get("at")
     if isinstance(place, tuple):
         axis, number = place

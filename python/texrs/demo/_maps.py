@@ -12,7 +12,7 @@ from texrs._typing import Array, Labels
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.materials import Material
 from texrs.papers.design import design
-from texrs.volume import paint
+from texrs.volume import label_to_color
 
 RELIEF = 12.0
 """Height of the relief, in pixels."""
@@ -74,7 +74,7 @@ def show(material: Material, whose: str) -> list[str]:
     notes = {"normal": "y up, turned", "labels": "never mixed"}
     return [
         figure(
-            paint(each.pixels) if each.role.labelled else each.pixels,
+            label_to_color(each.pixels) if each.role.labelled else each.pixels,
             f"{name.capitalize()} {whose}",
             note=f"{each.pixels.dtype}{', ' if name in notes else ''}{notes.get(name, '')}",
             exact=each.role.labelled,

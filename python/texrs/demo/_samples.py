@@ -5,7 +5,7 @@ from __future__ import annotations
 from texrs import samples
 from texrs._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop, load_sample
-from texrs.volume import cube
+from texrs.volume import render_block
 
 SIDE, EDGE = 128, 64
 """Pixels a side of the pictures, and of the volumes."""
@@ -26,7 +26,7 @@ def _samples(workshop: Workshop) -> str:
         volume = sample.image.ndim == 4
         note = ("a volume; " * volume) + (f"known: {', '.join(known)}" if known else "nothing else known")
         pictures.append(
-            figure(cube(sample.image, 2 * SIDE) if volume else sample.image, name, note=note.replace("_", " "))
+            figure(render_block(sample.image, 2 * SIDE) if volume else sample.image, name, note=note.replace("_", " "))
         )
     pictures += [figure(load_sample(name, SIDE).image, name, note="photograph") for name in PHOTOGRAPHS]
     return code("texrs samples -o examples") + grid(pictures, least=140)

@@ -6,7 +6,7 @@ from texrs import fields, samples
 from texrs._html import card, cards, code, figure
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.papers.solid import solid, synthesize
-from texrs.volume import cube
+from texrs.volume import render_block
 
 EDGE, SIZE = 64, 80
 """Voxels a side of the examples, and of what is grown."""
@@ -36,8 +36,10 @@ def _solid(workshop: Workshop) -> str:
         workshop.watch(i / total)
         example = samples.load(name, size=(EDGE,) * 3).image
         made = solid(example, SIZE, field=fields.parse(words), seed=3)
-        given = figure(cube(example, CUBE), name.replace("_", " ").capitalize(), note="the example")
-        grown.append(card([given], figure(cube(made.image, CUBE), words.partition(":")[0], note=f"--field {words}")))
+        given = figure(render_block(example, CUBE), name.replace("_", " ").capitalize(), note="the example")
+        grown.append(
+            card([given], figure(render_block(made.image, CUBE), words.partition(":")[0], note=f"--field {words}"))
+        )
     for i, (name, words) in enumerate(PICTURES, start=len(VOLUMES)):
         workshop.watch(i / total)
         picture = load_sample(name, SIDE).image

@@ -451,7 +451,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
 
 
 def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: bool = True) -> None:
-    """Write a surface of triangles as .stl, whole or not at all (see `texrs.volume.surface`).
+    """Write a surface of triangles as .stl, whole or not at all (see `texrs.volume.extract_surface`).
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from texrs.errors import InvalidInput
 from texrs.io._files import as_path
 from texrs.materials import Map, Role
 from texrs.painting._baking import bake_points, fill_between, lean
-from texrs.painting._directions import follow
+from texrs.painting._directions import field_on_surface
 from texrs.painting._files import write_mesh
 from texrs.painting._meshes import find_tangents, shade
 from texrs.painting._reading import read_mesh
@@ -28,7 +28,7 @@ from texrs.painting._sets import Laid, lay_flat
 from texrs.painting._surface import MESH, PAINTED, Surface
 from texrs.papers.solid.window import SolidTexture
 
-__all__ = ["Painted", "follow", "paint"]
+__all__ = ["TexturedMesh", "field_on_surface", "texture_mesh"]
 
 
 def __dir__() -> list[str]:
@@ -42,7 +42,7 @@ _BLOCK = 256.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Painted:
+class TexturedMesh:
     """A painted mesh.
 
     Attributes
@@ -69,9 +69,9 @@ class Painted:
     Examples
     --------
     >>> import numpy as np
-    >>> from texrs.painting import Painted
+    >>> from texrs.painting import TexturedMesh
     >>> corners = np.eye(3)
-    >>> painted = Painted(corners, np.array([[0, 1, 2]]), {"image": np.zeros((3, 3), np.uint8)}, None)
+    >>> painted = TexturedMesh(corners, np.array([[0, 1, 2]]), {"image": np.zeros((3, 3), np.uint8)}, None)
     >>> painted.maps["image"].shape
     (3, 3)
 
@@ -116,8 +116,8 @@ class Painted:
         --------
         >>> import pathlib, tempfile
         >>> import numpy as np
-        >>> from texrs.painting import Painted
-        >>> painted = Painted(np.eye(3), np.array([[0, 1, 2]]), {"image": np.zeros((3, 3), np.uint8)}, None)
+        >>> from texrs.painting import TexturedMesh
+        >>> painted = TexturedMesh(np.eye(3), np.array([[0, 1, 2]]), {"image": np.zeros((3, 3), np.uint8)}, None)
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in painted.save(pathlib.Path(folder, "triangle.ply"))]
         ['triangle.ply']
@@ -140,7 +140,7 @@ class Painted:
         return write_mesh(as_path(path), surface._replace(uv=self.uv), self.sets, which, several, reliefs, depth)
 
 
-def paint(
+def texture_mesh(
     mesh: Any,
     texture: SolidTexture,
     *,
@@ -149,7 +149,7 @@ def paint(
     padding: int = 4,
     unwrap: bool = False,
     progress: Progress | bool | None = None,
-) -> Painted:
+) -> TexturedMesh:
     """Sample a texture of space over the surface of a mesh.
 
     Parameters
@@ -176,7 +176,7 @@ def paint(
 
     Returns
     -------
-    Painted
+    TexturedMesh
 
     Raises
     ------
@@ -188,10 +188,10 @@ def paint(
     Examples
     --------
     >>> import texrs
-    >>> from texrs.painting import paint
+    >>> from texrs.painting import texture_mesh
     >>> corners, faces = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
     >>> stripes = texrs.SolidTexture(texrs.samples.stripes((32, 32, 32)).image)
-    >>> paint((corners, faces), stripes, scale=4, atlas=None).maps["image"].shape
+    >>> texture_mesh((corners, faces), stripes, scale=4, atlas=None).maps["image"].shape
     (4, 3)
 
     """
@@ -206,7 +206,7 @@ def paint(
     roles = {} if material is None else {name: each.role for name, each in material.items()}
     if side is None:
         corners = _sample(texture, surface.vertices * size, watch)
-        return Painted(surface.vertices, surface.faces, corners, None, roles, _surface=surface._replace(uv=None))
+        return TexturedMesh(surface.vertices, surface.faces, corners, None, roles, _surface=surface._replace(uv=None))
     with answering(watch, "atlas", 0.0):
         laid = lay_flat(surface, side, more, fresh=fresh)
         baked = [bake_points(*_take_set(laid, k), side, more) for k in range(len(laid.names))]
@@ -222,7 +222,7 @@ def paint(
         maps[name] = _stack([_spread(v, there) for v, (_, there) in zip(np.split(all_, ends), baked, strict=True)])
     relief = _make_relief(texture, laid, baked, maps, size, more)
     surface, which = laid.surface, None if len(laid.names) == 1 else laid.which
-    return Painted(surface.vertices, surface.faces, maps, surface.uv, roles, relief, laid.names, which, surface)
+    return TexturedMesh(surface.vertices, surface.faces, maps, surface.uv, roles, relief, laid.names, which, surface)
 
 
 def _make_relief(
@@ -286,7 +286,7 @@ def choose_scale(vertices: NDArray[np.float64], texture: SolidTexture) -> float:
 def find_scale(
     surface: Surface, texture: SolidTexture, *, atlas: int | None, padding: int = 4, unwrap: bool = False
 ) -> float:
-    """Return the default scale of `paint`."""
+    """Return the default scale of `texture_mesh`."""
     size = choose_scale(surface.vertices, texture)
     if atlas is None:
         return size

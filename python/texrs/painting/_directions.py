@@ -26,7 +26,7 @@ from texrs.painting._meshes import find_normals
 from texrs.painting._reading import read_mesh
 from texrs.painting._surface import Floats64
 
-__all__ = ["follow"]
+__all__ = ["field_on_surface"]
 
 NEAR = 12
 """Neighbours of a point."""
@@ -40,7 +40,7 @@ FINEST = 64
 DIGITS = 6
 
 
-def follow(
+def field_on_surface(
     mesh: Any, directions: str | Sequence[Any], *, scale: float, along: str = "x", resolution: int = 48
 ) -> Field:
     """Return a field that turns a texture of space into directions on a surface, to paint the mesh with.
@@ -76,9 +76,9 @@ def follow(
     Examples
     --------
     >>> import texrs
-    >>> from texrs.painting import follow
+    >>> from texrs.painting import field_on_surface
     >>> corners, faces = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
-    >>> field = follow((corners, faces), "z", scale=8, resolution=8)
+    >>> field = field_on_surface((corners, faces), "z", scale=8, resolution=8)
     >>> field.frames((16, 0.5, 0.5)).round(2)[:, 2] + 0  # up along z, which are planes, on the side of a pillar
     array([1., 0., 0.], dtype=float32)
 

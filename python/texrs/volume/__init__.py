@@ -1,14 +1,16 @@
 """Pictures of volumes, and statistics of how like its exemplar a synthesised one is.
 
-Pictures: `slices`, `oblique`, `cube`, `transparent` (seen through), `turntable`, `Viewer` (a page with sliders); `paint` gives
-labels colours, `surface` the triangles around one. `cubes` makes cubes of other voxels.
+Pictures: `slices`, `oblique_slice`, `render_block`, `render_volume` (seen through), `turntable` and `Viewer` (a page with
+sliders). `label_to_color` gives labels colours, and `extract_surface` returns the triangles around one. `cubes` makes cubes of
+other voxels.
 
 Statistics, each of which can be used alone, most of them for pictures too; `compare` makes a report of them all:
 
 ===========================  ===============================================================
 `classes`                    the colours of a texture's materials, and their shares
-`two_point` `lineal_path`    how materials lie along the axes
-`particles`                  how many pieces of a material there are, and how large
+`two_point_correlation`      how materials lie along the axes
+`lineal_path_function`       how long lines within one material are
+`component_statistics`       how many pieces of a material there are, and how large
 `autocorrelation`            of values along the axes
 `frequency`                  how fine a texture is
 `orientation_errors`         whether layers lie as a field turns them
@@ -22,10 +24,18 @@ Statistics, each of which can be used alone, most of them for pictures too; `com
 from texrs.volume._stretch import cubes
 from texrs.volume.compare import Comparison, compare
 from texrs.volume.integrity import Integrity, integrity
-from texrs.volume.labels import paint, surface
-from texrs.volume.pictures import cube, oblique, slices, turntable
+from texrs.volume.labels import extract_surface, label_to_color
+from texrs.volume.pictures import oblique_slice, render_block, slices, turntable
 from texrs.volume.reuse import CellReuse, cell_reuse, coherence
-from texrs.volume.statistics import Classes, Particles, classes, lightness, lineal_path, particles, two_point
+from texrs.volume.statistics import (
+    Classes,
+    ComponentStatistics,
+    classes,
+    component_statistics,
+    lightness,
+    lineal_path_function,
+    two_point_correlation,
+)
 from texrs.volume.structure import (
     autocorrelation,
     frequency,
@@ -35,40 +45,40 @@ from texrs.volume.structure import (
     speckle,
     texture_normal,
 )
-from texrs.volume.transparent import transparent
+from texrs.volume.transparent import render_volume
 from texrs.volume.viewer import Viewer
 
 __all__ = [
     "CellReuse",
     "Classes",
     "Comparison",
+    "ComponentStatistics",
     "Integrity",
-    "Particles",
     "Viewer",
     "autocorrelation",
     "cell_reuse",
     "classes",
     "coherence",
     "compare",
-    "cube",
+    "component_statistics",
     "cubes",
+    "extract_surface",
     "frequency",
     "integrity",
+    "label_to_color",
     "lightness",
-    "lineal_path",
-    "oblique",
+    "lineal_path_function",
+    "oblique_slice",
     "orientation_errors",
-    "paint",
-    "particles",
+    "render_block",
+    "render_volume",
     "seam_planes",
     "slice_distances",
     "slices",
     "speckle",
-    "surface",
     "texture_normal",
-    "transparent",
     "turntable",
-    "two_point",
+    "two_point_correlation",
 ]
 
 

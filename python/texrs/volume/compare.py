@@ -72,7 +72,7 @@ class Comparison:
     """
 
     shares: NDArray[np.float64]
-    particles: tuple[statistics.Particles, statistics.Particles]
+    particles: tuple[statistics.ComponentStatistics, statistics.ComponentStatistics]
     frequency: tuple[float, float]
     two_point: NDArray[np.float64]
     lineal_path: NDArray[np.float64]
@@ -237,10 +237,13 @@ def compare(
         turned = _turn_normal(field, second.shape[:count], normal, spacing)
     return Comparison(
         np.stack([np.bincount(a.ravel(), minlength=kinds) / a.size for a in labels]),
-        (statistics.particles(masks[0], spacing=spacing), statistics.particles(masks[1], spacing=spacing)),
+        (
+            statistics.component_statistics(masks[0], spacing=spacing),
+            statistics.component_statistics(masks[1], spacing=spacing),
+        ),
         (structure.frequency(grey[0], window=window), structure.frequency(grey[1], window=window)),
-        np.stack([statistics.two_point(m, _REACH, spacing=spacing) for m in masks]),
-        np.stack([statistics.lineal_path(m, _REACH, spacing=spacing) for m in masks]),
+        np.stack([statistics.two_point_correlation(m, _REACH, spacing=spacing) for m in masks]),
+        np.stack([statistics.lineal_path_function(m, _REACH, spacing=spacing) for m in masks]),
         np.stack([structure.autocorrelation(g, _REACH, spacing=spacing) for g in grey]),
         (structure.speckle(grey[0]), structure.speckle(grey[1])),
         float(structure.slice_distances(*grey).mean()),

@@ -12,7 +12,7 @@ from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.volume._values import as_direction
 
-__all__ = ["paint", "surface"]
+__all__ = ["extract_surface", "label_to_color"]
 
 _GROUND = (233, 230, 222)
 _MOST_COLOURS = 2**16
@@ -20,7 +20,7 @@ _GOLDEN = 0.6180339887498949
 """Steps of hue that come back to none they were at."""
 
 
-def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uint8]:
+def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uint8]:
     """Return each label a colour, so that a picture shows it.
 
     Parameters
@@ -44,7 +44,7 @@ def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uin
     Examples
     --------
     >>> from texrs import volume
-    >>> volume.paint([[0, 1], [1, 0]], [(255, 255, 255), (200, 30, 20)])[0, 1]
+    >>> volume.label_to_color([[0, 1], [1, 0]], [(255, 255, 255), (200, 30, 20)])[0, 1]
     array([200,  30,  20], dtype=uint8)
 
     """
@@ -68,7 +68,7 @@ def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uin
     return np.ascontiguousarray(given.astype(np.uint8)[array.astype(np.intp)])
 
 
-def surface(
+def extract_surface(
     mask: ArrayLike, *, spacing: Sequence[float] = (1, 1, 1), closed: bool = True
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Return the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
@@ -100,7 +100,7 @@ def surface(
     >>> from texrs import volume
     >>> block = np.zeros((8, 8, 8), bool)
     >>> block[2:6, 2:6, 2:6] = True
-    >>> vertices, faces = volume.surface(block)
+    >>> vertices, faces = volume.extract_surface(block)
     >>> vertices.min(), vertices.max()
     (np.float32(1.5), np.float32(5.5))
 

@@ -19,7 +19,7 @@ from texrs.io import atomic
 from texrs.kernels.gather import gather
 from texrs.volume._values import as_direction
 
-__all__ = ["cube", "oblique", "slices", "turntable"]
+__all__ = ["oblique_slice", "render_block", "slices", "turntable"]
 
 _LARGEST = 4096
 """Pixels a side of pictures of cubes."""
@@ -81,7 +81,7 @@ def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) 
     return out if np.ndim(volume) == 4 else out[..., 0]
 
 
-def oblique(
+def oblique_slice(
     volume: ArrayLike,
     point: Sequence[float] | None = None,
     normal: Sequence[float] | None = None,
@@ -123,7 +123,7 @@ def oblique(
     >>> import numpy as np
     >>> from texrs import volume
     >>> ramp = np.arange(20)[:, None, None] * np.ones((20, 20, 20), np.float32)
-    >>> cut = volume.oblique(ramp, (10, 10, 10), normal=(1, 1, 0))
+    >>> cut = volume.oblique_slice(ramp, (10, 10, 10), normal=(1, 1, 0))
     >>> cut.shape  # from corner to corner across, and a side
     (25, 20)
 
@@ -153,7 +153,7 @@ def oblique(
     return out if np.ndim(volume) == 4 else out[..., 0]
 
 
-def cube(
+def render_block(
     volume: ArrayLike,
     size: int = 512,
     *,
@@ -191,7 +191,7 @@ def cube(
     Examples
     --------
     >>> from texrs import samples, volume
-    >>> picture = volume.cube(samples.wood_solid((32, 32, 32)).image, 128)
+    >>> picture = volume.render_block(samples.wood_solid((32, 32, 32)).image, 128)
     >>> picture.shape[1:], picture[0, 0, 3], picture[60, 60, 3]
     ((115, 4), np.uint8(0), np.uint8(255))
 
@@ -303,7 +303,7 @@ def turntable(
 
 
 def check_cube(size: int = 512, azimuth: float = 40, elevation: float = 30) -> tuple[int, float, float]:
-    """Check what a block is to look like, before a volume is there; raises as `cube` does."""
+    """Check what a block is to look like, before a volume is there; raises as `render_block` does."""
     turned = as_float(azimuth, "azimuth", -1e6, 1e6), as_float(elevation, "elevation", -90, 90)
     return as_int(size, "size", 16, _LARGEST), *turned
 

@@ -20,7 +20,15 @@ from texrs.errors import InvalidInput
 from texrs.fields._spaced import as_distances
 from texrs.volume._values import as_colours, as_region, by_distance, correlate, drop_first, drop_last
 
-__all__ = ["Classes", "Particles", "classes", "lightness", "lineal_path", "particles", "two_point"]
+__all__ = [
+    "Classes",
+    "ComponentStatistics",
+    "classes",
+    "component_statistics",
+    "lightness",
+    "lineal_path_function",
+    "two_point_correlation",
+]
 
 _SAMPLE = 2**15
 """Pixels that classes are found on."""
@@ -127,8 +135,8 @@ class Classes:
 
 
 @dataclass(frozen=True, slots=True)
-class Particles:
-    """How many connected pieces of a material there are, and how large (see `particles`).
+class ComponentStatistics:
+    """How many connected pieces of a material there are, and how large (see `component_statistics`).
 
     Attributes
     ----------
@@ -147,7 +155,7 @@ class Particles:
     >>> from texrs import volume
     >>> mask = np.zeros((12, 12), bool)
     >>> mask[1:5, 1:5] = mask[7:11, 7:11] = True
-    >>> found = volume.particles(mask)
+    >>> found = volume.component_statistics(mask)
     >>> found.count, found.mean
     (2, 16.0)
 
@@ -241,7 +249,9 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
     return Classes(np.ascontiguousarray(best[np.argsort(best.mean(axis=1), kind="stable")], np.float32))
 
 
-def two_point(mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
+def two_point_correlation(
+    mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None
+) -> NDArray[np.float64]:
     """Return the two-point correlation S2 along each axis: how often both ends of a step are in a material.
 
     Parameters
@@ -269,14 +279,16 @@ def two_point(mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | No
     >>> import numpy as np
     >>> from texrs import volume
     >>> stripes = np.arange(40) % 4 < 2
-    >>> volume.two_point(np.tile(stripes, (40, 1)), 4)[1].round(2)
+    >>> volume.two_point_correlation(np.tile(stripes, (40, 1)), 4)[1].round(2)
     array([0.5 , 0.26, 0.  , 0.24, 0.5 ])
 
     """
     return by_distance(correlate(as_region(mask), as_int(reach, "reach", 1, 2**20), np.logical_and), spacing)
 
 
-def lineal_path(mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
+def lineal_path_function(
+    mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None
+) -> NDArray[np.float64]:
     """Return the lineal path along each axis: how often all of a step, with its ends, is in a material.
 
     Parameters
@@ -303,7 +315,7 @@ def lineal_path(mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | 
     --------
     >>> import numpy as np
     >>> from texrs import volume
-    >>> volume.lineal_path(np.tile(np.arange(40) % 4 < 2, (40, 1)), 2)[1].round(2)
+    >>> volume.lineal_path_function(np.tile(np.arange(40) % 4 < 2, (40, 1)), 2)[1].round(2)
     array([0.5 , 0.26, 0.  ])
 
     """
@@ -318,7 +330,9 @@ def lineal_path(mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | 
     return by_distance(out, spacing)
 
 
-def particles(mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | None = None) -> Particles:
+def component_statistics(
+    mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | None = None
+) -> ComponentStatistics:
     """Return how many connected pieces a material has, of neighbours that share a side, and how large they are.
 
     Parameters
@@ -332,7 +346,7 @@ def particles(mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | Non
 
     Returns
     -------
-    Particles
+    ComponentStatistics
         Their number, density and sizes.
 
     Raises
@@ -344,7 +358,7 @@ def particles(mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | Non
     --------
     >>> from texrs import samples, volume
     >>> stone = samples.particles((48, 48, 48))
-    >>> volume.particles(stone.mask).count >= len(stone.centres)  # a piece at the border may be two
+    >>> volume.component_statistics(stone.mask).count >= len(stone.centres)  # a piece at the border may be two
     True
 
     """
@@ -356,9 +370,9 @@ def particles(mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | Non
     cell = float(np.prod(as_distances(spacing, phase.ndim)))
     sizes = sizes[sizes >= low] * cell
     if not len(sizes):
-        return Particles(0, 0.0, np.nan, np.nan, (np.nan,) * 9)
+        return ComponentStatistics(0, 0.0, np.nan, np.nan, (np.nan,) * 9)
     deciles = np.quantile(sizes, np.arange(1, 10) / 10, method="inverted_cdf")
-    return Particles(
+    return ComponentStatistics(
         len(sizes),
         1e5 * len(sizes) / (phase.size * cell),
         float(sizes.mean()),

@@ -21,7 +21,7 @@ from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
 from texrs.volume.pictures import _MARGIN, _view, check_cube
 
-__all__ = ["Stop", "parse_transfer", "transparent"]
+__all__ = ["Stop", "parse_transfer", "render_volume"]
 
 Stop: TypeAlias = tuple[float, "str | Sequence[float] | None", float]
 """A value, the colour that is shown there, and the share of the light that a voxel keeps back."""
@@ -44,7 +44,7 @@ _THICK = 8.0
 """Voxels of things that are seen, of a hundred along the longest side, after which little light is left."""
 
 
-def transparent(
+def render_volume(
     volume: ArrayLike,
     size: int = 512,
     *,
@@ -95,7 +95,7 @@ def transparent(
     Examples
     --------
     >>> from texrs import samples, volume
-    >>> picture = volume.transparent(samples.particles((32, 32, 32)).image, 64)
+    >>> picture = volume.render_volume(samples.particles((32, 32, 32)).image, 64)
     >>> picture.shape[1:], bool((picture[..., 3] > 200).any()), picture[0, 0, 3]
     ((58, 4), True, np.uint8(0))
 
@@ -141,7 +141,7 @@ def parse_transfer(text: str) -> list[Stop]:
 
 
 def check_transfer(transfer: str | Sequence[Stop] | None) -> NDArray[np.float64] | None:
-    """Check what is to be seen, before a volume is there; raises as `transparent` does."""
+    """Check what is to be seen, before a volume is there; raises as `render_volume` does."""
     return None if transfer is None else _as_stops(parse_transfer(transfer) if isinstance(transfer, str) else transfer)
 
 

@@ -11,7 +11,7 @@ from texrs._typing import Path
 from texrs._viewer import as_page
 from texrs.errors import FileError
 from texrs.io import atomic
-from texrs.volume.labels import paint
+from texrs.volume.labels import label_to_color
 
 __all__ = ["Viewer"]
 
@@ -52,7 +52,7 @@ class Viewer:
 
     def __init__(self, volume: ArrayLike | Path, *, labels: bool = False) -> None:
         given = as_ndarray(volume, "volume", axes=3)
-        self._voxels = as_image(paint(given) if as_bool(labels, "labels") else given, "volume", axes=3)
+        self._voxels = as_image(label_to_color(given) if as_bool(labels, "labels") else given, "volume", axes=3)
 
     def __repr__(self) -> str:
         """Return the size, the channels and the dtype."""

@@ -16,7 +16,7 @@ from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import classify
 from texrs.papers.design.plan import Plan
 from texrs.source_map import SourceMap
-from texrs.volume import paint
+from texrs.volume import label_to_color
 
 __all__ = ["describe", "draw_stages"]
 
@@ -33,7 +33,7 @@ TINT = 0.55
 def draw_elements(plan: Plan) -> Array:
     """Return the exemplar with its elements in a colour each, between white lines."""
     seen, elements = as_rgb(plan.guide), plan.parts.elements
-    tinted = (1 - TINT) * seen + TINT / 255 * paint(elements)
+    tinted = (1 - TINT) * seen + TINT / 255 * label_to_color(elements)
     picture = np.where(elements[..., np.newaxis] > 0, tinted, seen)
     picture[1:][elements[1:] != elements[:-1]] = 1
     picture[:, 1:][elements[:, 1:] != elements[:, :-1]] = 1
