@@ -1,4 +1,4 @@
-"""What each verb takes, as `texrs.limits.memory` predicts it, beside the peak that is measured.
+"""What each verb takes, as `texrs.limits.estimate_memory` predicts it, beside the peak that is measured.
 
     python benches/memory_table.py [VERB ...]
 
@@ -86,7 +86,7 @@ def run(verb: str, side: int, size: int) -> None:
     picture = make_picture(verb, side)
     call, result = make_call(verb, picture, size), (size,) * (3 if verb == "solid" else 2)
     several = [picture.shape] * (2 if verb == "splice" else 1)
-    predicted = texrs.limits.memory(verb, several, result, dtype=picture.dtype)
+    predicted = texrs.limits.estimate_memory(verb, several, result, dtype=picture.dtype)
     gc.collect()
     # What the C library keeps for later is no memory of the verb.
     ctypes.CDLL(None).malloc_trim(0)

@@ -242,7 +242,7 @@ def test_python_is_told_in_its_own_words() -> None:
         with pytest.raises(LimitExceeded, match=words):
             verb(WEAVE, size=40_000)
     with (
-        texrs.limits.within(memory=4e9),
+        texrs.limits.context(memory=4e9),
         pytest.raises(LimitExceeded, match=r"texrs\.SolidTexture\.to_zarr and to_dask"),
     ):
         texrs.solid(STRIPES, 600)

@@ -88,7 +88,7 @@ def try_values(name, place, count):
         for number, value in values:
             calls += 1
             try:
-                with texrs.limits.within(seconds=0.15, pixels=2**22, voxels=2**21), end_in(30):
+                with texrs.limits.context(seconds=0.15, pixels=2**22, voxels=2**21), end_in(30):
                     call.change(parameter.name, value)
             except TexrsError:
                 pass
@@ -210,7 +210,7 @@ def try_extremes(name, place, count, seed=0):
     for number in range(0 if call is None else count):
         given = {k: hostile.exaggerate(v, rng) if rng.random() < 0.7 else v for k, v in call.arguments.items()}
         try:
-            with texrs.limits.within(seconds=0.3, pixels=2**22, voxels=2**21), end_in(30):
+            with texrs.limits.context(seconds=0.3, pixels=2**22, voxels=2**21), end_in(30):
                 made = call.call(given)
             if name not in MAY_BE_NONE and not all(np.isfinite(each).all() for each in hostile.list_floats(made)):
                 wrong.append(f"call {number}: no numbers")

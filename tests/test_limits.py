@@ -41,7 +41,7 @@ def _nothing_is_said(monkeypatch):
     for name in ("PIXELS", "VOXELS", "MEMORY", "SECONDS"):
         monkeypatch.delenv(f"TEXRS_{name}", raising=False)
     yield
-    limits.use()
+    limits.set()
 
 
 def test_every_verb_that_makes_something_is_here():
@@ -54,7 +54,7 @@ def test_every_verb_that_makes_something_is_here():
 def test_every_verb_compares_what_it_needs_before_it_begins(verb, said, monkeypatch):
     if said.get("pixels") and verb == "analyse":
         pytest.skip("makes no pixels but those it is given")
-    with limits.within(**said), pytest.raises(LimitExceeded, match="limit of|may be taken") as told:
+    with limits.context(**said), pytest.raises(LimitExceeded, match="limit of|may be taken") as told:
         VERBS[verb]()
     assert ":" in str(told.value)
 
@@ -62,7 +62,7 @@ def test_every_verb_compares_what_it_needs_before_it_begins(verb, said, monkeypa
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_stops_when_its_time_is_up(verb):
     with (
-        limits.within(seconds=1e-9),
+        limits.context(seconds=1e-9),
         pytest.raises(LimitExceeded, match=r"the limit of 1e-09 s was reached in the stage"),
     ):
         VERBS[verb]()
@@ -72,18 +72,18 @@ def test_the_least_of_what_is_said_holds(monkeypatch):
     assert limits.current() == limits.Limits(memory=limits.current().memory)
     monkeypatch.setenv("TEXRS_PIXELS", "1e6")
     assert limits.current().pixels == 1_000_000
-    limits.use(pixels=2_000_000, voxels=5)
+    limits.set(pixels=2_000_000, voxels=5)
     assert (limits.current().pixels, limits.current().voxels) == (1_000_000, 5)
-    with limits.within(pixels=1000, memory=1e6):
-        with limits.within(pixels=5000, seconds=9):
+    with limits.context(pixels=1000, memory=1e6):
+        with limits.context(pixels=5000, seconds=9):
             # No block allows more than the one around it.
             assert limits.current().pixels == 1000
             assert limits.current().memory == 1_000_000
             assert 0 < limits.current().seconds <= 9
-            with limits.within(seconds=100):
+            with limits.context(seconds=100):
                 assert limits.current().seconds <= 9
         assert limits.current().seconds is None
-    limits.use(pixels=2**30)
+    limits.set(pixels=2**30)
     monkeypatch.delenv("TEXRS_PIXELS")
     # More than usual can be asked for.
     assert limits.current().pixels == 2**30
@@ -92,7 +92,7 @@ def test_the_least_of_what_is_said_holds(monkeypatch):
 @pytest.mark.parametrize("name", ["pixels", "voxels", "memory", "seconds"])
 @pytest.mark.parametrize("value", [0, -1, True, "2", float("nan"), float("inf"), 10**400, 1j, [1]])
 def test_what_is_no_limit_is_refused(name, value, monkeypatch):
-    for call in (limits.within(**{name: value}).__enter__, lambda: limits.use(**{name: value})):
+    for call in (limits.context(**{name: value}).__enter__, lambda: limits.set(**{name: value})):
         with pytest.raises(InvalidInput, match=f"^{name}: needs a number of"):
             call()
     if isinstance(value, float | int) and not isinstance(value, bool):
@@ -107,7 +107,7 @@ def test_blocks_are_those_of_a_thread_or_a_task():
     def look(name):
         seen[name] = limits.current().pixels
 
-    with limits.within(pixels=1000):
+    with limits.context(pixels=1000):
         for name, run in {"bare": look, "copied": contextvars.copy_context().run}.items():
             arguments = (name,) if run is look else (look, name)
             thread = threading.Thread(target=run, args=arguments)
@@ -115,7 +115,7 @@ def test_blocks_are_those_of_a_thread_or_a_task():
             thread.join()
 
     async def one(pixels):
-        with limits.within(pixels=pixels):
+        with limits.context(pixels=pixels):
             await asyncio.sleep(0.01)
             return limits.current().pixels
 
@@ -141,7 +141,7 @@ def test_files_are_held_to_the_limits(tmp_path):
     texrs.io.write_volume(tmp_path / "v.tif", VOLUME)
     source = texrs.SourceMap.identity((64, 64))
     source.save(tmp_path / "map.npz")
-    with limits.within(pixels=4095, voxels=32767):
+    with limits.context(pixels=4095, voxels=32767):
         for read in (
             lambda: texrs.io.read(tmp_path / "a.png"),
             lambda: texrs.io.read_volume(tmp_path / "v.tif"),
@@ -153,16 +153,18 @@ def test_files_are_held_to_the_limits(tmp_path):
 
 
 def test_more_takes_more():
-    base = limits.memory("design", (256, 256, 3), (512, 512))
-    assert limits.memory("design", (256, 256, 3), (1024, 1024)) > base
-    assert limits.memory("design", [(256, 256, 3)] * 2, (512, 512)) > base
-    assert limits.memory("design", (256, 256, 3), (2048, 2048), dtype="f4") > limits.memory(
+    base = limits.estimate_memory("design", (256, 256, 3), (512, 512))
+    assert limits.estimate_memory("design", (256, 256, 3), (1024, 1024)) > base
+    assert limits.estimate_memory("design", [(256, 256, 3)] * 2, (512, 512)) > base
+    assert limits.estimate_memory("design", (256, 256, 3), (2048, 2048), dtype="f4") > limits.estimate_memory(
         "design", (256, 256, 3), (2048, 2048)
     )
-    assert limits.memory("solid", (64, 64, 64), field=True) > limits.memory("solid", (64, 64, 64, 1))
-    assert limits.memory("tile", np.shape(DOTS)) == limits.memory("tile", [list(DOTS.shape)], (64, 64))
+    assert limits.estimate_memory("solid", (64, 64, 64), field=True) > limits.estimate_memory("solid", (64, 64, 64, 1))
+    assert limits.estimate_memory("tile", np.shape(DOTS)) == limits.estimate_memory(
+        "tile", [list(DOTS.shape)], (64, 64)
+    )
     # A picture of 16384 x 16000 is not begun with on a machine of 32 GB.
-    assert limits.memory("perspective", (512, 512, 3), (16384, 16000)) > 32e9
+    assert limits.estimate_memory("perspective", (512, 512, 3), (16384, 16000)) > 32e9
 
 
 @pytest.mark.parametrize(
@@ -179,9 +181,9 @@ def test_more_takes_more():
 )
 def test_what_has_no_estimate_is_refused(wrong):
     with pytest.raises(TexrsError, match="^(verb|exemplar|size): "):
-        limits.memory(*wrong)
+        limits.estimate_memory(*wrong)
     with pytest.raises(TexrsError, match="^dtype: "):
-        limits.memory("tile", (9, 9), dtype="no such")
+        limits.estimate_memory("tile", (9, 9), dtype="no such")
 
 
 @pytest.mark.parametrize(

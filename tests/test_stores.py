@@ -457,7 +457,7 @@ def read_limits(number: int) -> texrs.limits.Limits:
 @pytest.mark.parametrize("scheduler", [None, 1, "cluster"])
 def test_workers_go_by_the_limits_of_who_asks(scheduler: int | str | None, request: pytest.FixtureRequest) -> None:
     where = request.getfixturevalue("client") if scheduler == "cluster" else scheduler
-    with texrs.limits.within(pixels=1000, voxels=2000, memory=3e8, seconds=60):
+    with texrs.limits.context(pixels=1000, voxels=2000, memory=3e8, seconds=60):
         ((_, found),) = workers.run(read_limits, [0], where)
     assert (found.pixels, found.voxels, found.memory) == (1000, 2000, 3 * 10**8)
     # What is done for others is not held to them.

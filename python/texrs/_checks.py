@@ -13,9 +13,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from texrs._calls import check_call
 from texrs.errors import InvalidInput, LimitExceeded
-from texrs.limits._estimates import memory
-from texrs.limits._now import MAX_PIXELS as MAX_PIXELS
-from texrs.limits._now import find
+from texrs.limits._context import MAX_PIXELS as MAX_PIXELS
+from texrs.limits._context import find
+from texrs.limits._estimates import estimate_memory
 
 FREE = 2**20
 """Bytes that may be taken without asking how many there are, which takes as long as to fill them."""
@@ -113,7 +113,7 @@ def check_work(
     Parameters
     ----------
     verb : str
-        As `texrs.limits.memory` knows it.
+        As `texrs.limits.estimate_memory` knows it.
     examples : sequence of (..., C) array
         What is looked into.
     size : sequence of int
@@ -123,7 +123,7 @@ def check_work(
     limit : int, optional
         Bytes that are allowed for this alone.
     **more
-        Options that `texrs.limits.memory` takes.
+        Options that `texrs.limits.estimate_memory` takes.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def check_work(
 
     """
     check_pixels(size, name, way=way)
-    needed = memory(verb, [each.shape for each in examples], size, dtype=examples[0].dtype, **more)
+    needed = estimate_memory(verb, [each.shape for each in examples], size, dtype=examples[0].dtype, **more)
     check_memory(needed, name, limit=limit, way=way)
 
 

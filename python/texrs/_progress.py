@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from texrs._calls import check_call
 from texrs.errors import InvalidInput
-from texrs.limits._now import check_time, find_end
+from texrs.limits._context import check_time, find_end
 
 if TYPE_CHECKING:
     # Numpy would come with it.

@@ -22,7 +22,7 @@ from texrs._cache import content_hash
 from texrs._checks import as_int
 from texrs._threads import threads
 from texrs.errors import InvalidInput, TexrsError
-from texrs.limits._now import said, use, within
+from texrs.limits._context import context, said, set
 
 __all__ = ["Scheduler", "WorkerLost", "run"]
 
@@ -116,7 +116,7 @@ def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
     # Ctrl-C goes to all processes of a terminal; who started this one says what is to be done.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _WORK, _THREADS = pickle.loads(payload), count
-    use(**most)
+    set(**most)
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
@@ -400,5 +400,5 @@ def _do_there(
 
     begun = time.monotonic()
     work = pickle.loads(task) if isinstance(task, bytes) else task
-    with within(**most), threads(count or max(1, get_worker().state.nthreads)):
+    with context(**most), threads(count or max(1, get_worker().state.nthreads)):
         return [work(number) for number in some], time.monotonic() - begun

@@ -53,7 +53,7 @@ def limit(
     with ExitStack() as stack:
         with name_arguments(pixels="--pixel-limit", seconds="--time-limit", memory="--memory-limit"):
             stack.enter_context(
-                limits.within(pixels=pixel_limit, voxels=pixel_limit, memory=memory, seconds=time_limit)
+                limits.context(pixels=pixel_limit, voxels=pixel_limit, memory=memory, seconds=time_limit)
             )
         stack.enter_context(collect(show=lambda line: note(line, quiet=quiet), strict=strict))
         yield

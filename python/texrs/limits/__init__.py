@@ -6,25 +6,25 @@ process allow (`ulimit -v`, control groups), and there is no limit to the time.
 
 They are said in three ways, of which the least holds:
 
-- in a block of code, for what this thread, or this asynchronous task, does in it: `within`;
-- for the whole process: `use`;
+- in a block of code, for what this thread, or this asynchronous task, does in it: `context`;
+- for the whole process: `set`;
 - from outside, in the environment: ``TEXRS_PIXELS``, ``TEXRS_VOXELS``, ``TEXRS_MEMORY`` (bytes) and ``TEXRS_SECONDS``.
 
-`memory` tells beforehand what a verb takes.
+`estimate_memory` tells beforehand what a verb takes.
 
 >>> import texrs
 >>> dots = texrs.samples.dots((64, 64)).image
->>> with texrs.limits.within(pixels=500_000):
+>>> with texrs.limits.context(pixels=500_000):
 ...     texrs.design(dots, 1024)
 Traceback (most recent call last):
     ...
 texrs.errors.LimitExceeded: size: (1024, 1024) has 1048576 pixels, more than the limit of 500000; texrs.TileSet makes ...
 """
 
-from texrs.limits._estimates import memory
-from texrs.limits._now import Limits, current, use, within
+from texrs.limits._context import Limits, context, current, set
+from texrs.limits._estimates import estimate_memory
 
-__all__ = ["Limits", "current", "memory", "use", "within"]
+__all__ = ["Limits", "context", "current", "estimate_memory", "set"]
 
 
 def __dir__() -> list[str]:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     # Numpy would come with it.
     from numpy.typing import DTypeLike
 
-__all__ = ["memory"]
+__all__ = ["estimate_memory"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ COSTS: dict[str, dict[str | None, Cost]] = {
 """By verb, and by the ``method`` or the ``quality`` that takes another amount than the others."""
 
 
-def memory(
+def estimate_memory(
     verb: str,
     exemplar: Sequence[int] | Sequence[Sequence[int]],
     size: Sequence[int] | None = None,
@@ -106,7 +106,7 @@ def memory(
     Examples
     --------
     >>> import texrs
-    >>> needed = texrs.limits.memory("design", (256, 256, 3), (2048, 2048))
+    >>> needed = texrs.limits.estimate_memory("design", (256, 256, 3), (2048, 2048))
     >>> 300e6 < needed < 450e6
     True
 

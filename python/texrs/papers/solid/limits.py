@@ -6,7 +6,7 @@ from texrs._arrays import as_int, check_memory
 from texrs._engine.pyramid import Region
 from texrs._typing import Array
 from texrs.fields import Field
-from texrs.limits import memory
+from texrs.limits import estimate_memory
 
 __all__ = ["LARGER", "check_region", "estimate_bytes"]
 
@@ -21,7 +21,7 @@ def estimate_bytes(image: Array, region: Region, field: Field | None, quality: s
     """Return the bytes that a synthesis takes, about."""
     verb = "solid" if len(region.shape) == 3 else "synthesize"
     varies = field is not None and field.constant is None
-    return memory(verb, image.shape, region.shape, dtype=image.dtype, method=quality, field=varies)
+    return estimate_memory(verb, image.shape, region.shape, dtype=image.dtype, method=quality, field=varies)
 
 
 def check_region(

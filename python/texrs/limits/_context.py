@@ -15,7 +15,7 @@ from typing import Any
 from texrs._memory import find_memory
 from texrs.errors import InvalidInput, LimitExceeded
 
-__all__ = ["MAX_PIXELS", "Limits", "check_time", "current", "find", "find_end", "said", "use", "within"]
+__all__ = ["MAX_PIXELS", "Limits", "check_time", "context", "current", "find", "find_end", "said", "set"]
 
 MAX_PIXELS = 2**28
 """Pixels or voxels that an array made by texrs may have, unless a limit is given."""
@@ -74,7 +74,7 @@ _BLOCK: ContextVar[_Said] = ContextVar("limits", default=_NOTHING)
 
 
 @contextmanager
-def within(
+def context(
     *,
     pixels: int | None = None,
     voxels: int | None = None,
@@ -107,12 +107,12 @@ def within(
     Notes
     -----
     A thread that is started inside the block does not know of it, unless it runs in a copy of the context
-    (`contextvars.copy_context`); threads of texrs do. `use` is for all of them.
+    (`contextvars.copy_context`); threads of texrs do. `set` is for all of them.
 
     Examples
     --------
     >>> import texrs
-    >>> with texrs.limits.within(memory=2e9, seconds=60):
+    >>> with texrs.limits.context(memory=2e9, seconds=60):
     ...     texrs.limits.current().memory
     2000000000
 
@@ -129,7 +129,7 @@ def within(
         _BLOCK.reset(token)
 
 
-def use(
+def set(
     *,
     pixels: int | None = None,
     voxels: int | None = None,
@@ -141,7 +141,7 @@ def use(
     Parameters
     ----------
     pixels, voxels, memory : optional
-        As in `within`.
+        As in `context`.
     seconds : float, optional
         Seconds that each call may take.
 
@@ -153,10 +153,10 @@ def use(
     Examples
     --------
     >>> import texrs
-    >>> texrs.limits.use(pixels=4096 * 4096)
+    >>> texrs.limits.set(pixels=4096 * 4096)
     >>> texrs.limits.current().pixels
     16777216
-    >>> texrs.limits.use()
+    >>> texrs.limits.set()
 
     """
     global _PROCESS
@@ -220,7 +220,7 @@ def check_time(end: tuple[float, float] | None, stage: str, share: float) -> Non
 
 
 def said() -> dict[str, Any]:
-    """Return what `use` and `within` take in a process that works for this block, which itself ends what takes too long."""
+    """Return what `set` and `context` take in a process that works for this block, which itself ends what takes too long."""
     found = {}
     for name in ("pixels", "voxels", "memory"):
         several = [getattr(each, name) for each in (_BLOCK.get(), _PROCESS)]
