@@ -269,7 +269,7 @@ class TileSet(InParts):
         if jacobian is not None and dense:
             arrays.append(jacobian)
         coordinates, exemplar, label, *found = self._read(start, sides, arrays)
-        here = SourceMap(coordinates, exemplar, label, found[-1] if dense else frame, source.shapes)
+        here = SourceMap(coordinates, exemplar, label, found[-1] if dense else jacobian, source.shapes)
         maps = dict(zip(names, found[: len(names)], strict=True))
         report = {"tile_size": self._side, "seed": self._seed, "origin": list(start)}
         if watch is not None:
