@@ -1,7 +1,7 @@
 //! Images warped by moved points, and shapes moved as a whole: the source coordinates of each
 //! output pixel.
 //!
-//! [`mesh`] warps a dense mesh with one vertex for each source pixel. [`scattered`] triangulates
+//! [`mesh`] warps a dense mesh with one vertex for each source pixel. [`scattered()`] triangulates
 //! scattered points. Both move triangles to the targets of their corners and rasterise them there.
 //! The source of a pixel is the barycentric interpolation of the source corners.
 //!
