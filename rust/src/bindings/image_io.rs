@@ -13,7 +13,7 @@ const FORMATS: [(&str, Format); 5] = [
     ("exr", Format::Exr),
 ];
 
-/// Named as NumPy names them.
+/// NumPy names of the sample types.
 const SAMPLES: [(&str, Sample); 4] = [
     ("uint8", Sample::U8),
     ("uint16", Sample::U16),
@@ -25,13 +25,14 @@ fn named<T: Copy>(argument: &'static str, name: &str, all: &[(&str, T)]) -> Resu
     let found = all.iter().find(|(known, _)| *known == name);
     found.map(|&(_, value)| value).ok_or_else(|| {
         let names: Vec<_> = all.iter().map(|(known, _)| *known).collect();
-        Error::value(argument, format!("one of {}; got {name}", names.join(", ")))
+        Error::value(argument, format!("must be one of {}; got {name}", names.join(", ")))
     })
 }
 
 type Parts<'py> = (Bound<'py, PyArray1<u8>>, &'static str, [usize; 3], u8);
 
-/// Samples as bytes, their dtype, (rows, columns, channels) and the Exif orientation that is still to be applied.
+/// Decodes an image file. Returns the samples as bytes, their dtype, the shape (rows, columns,
+/// channels), and the Exif orientation that the caller must still apply.
 #[pyfunction]
 pub(super) fn decode_image<'py>(
     py: Python<'py>,
