@@ -25,7 +25,10 @@ fn named<T: Copy>(argument: &'static str, name: &str, all: &[(&str, T)]) -> Resu
     let found = all.iter().find(|(known, _)| *known == name);
     found.map(|&(_, value)| value).ok_or_else(|| {
         let names: Vec<_> = all.iter().map(|(known, _)| *known).collect();
-        Error::value(argument, format!("must be one of {}; got {name}", names.join(", ")))
+        Error::value(
+            argument,
+            format!("must be one of {}; got {name}", names.join(", ")),
+        )
     })
 }
 
