@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import nibabel
 import numpy as np
 import pytest
 import tifffile
 
 import texrs
 from texrs import io as tio
+from texrs._notices import collect
 from texrs.cli import main
 from texrs.errors import FileError, InputWarning, InvalidInput
 
@@ -220,3 +222,45 @@ def test_info_describes_volumes(tmp_path, capsys, monkeypatch):
     Path("scan/scan_3.png").unlink()
     assert main(["info", "scan"]) == 2
     assert "scan: scan_3.png is missing" in capsys.readouterr().err
+
+
+def test_ome_states_channels_spacing_and_time(tmp_path: Path) -> None:
+    """Channels of OME-TIFF files are not planes, whichever comes first, and points in time are reported."""
+    volume = np.random.default_rng(4).integers(0, 255, (6, 2, 9, 11), np.uint8)
+    sizes = {"PhysicalSizeX": 0.5, "PhysicalSizeY": 0.5, "PhysicalSizeZ": 1.5}
+    tifffile.imwrite(tmp_path / "a.ome.tif", volume, metadata={"axes": "ZCYX", **sizes})
+    tifffile.imwrite(tmp_path / "b.ome.tif", np.moveaxis(volume, 1, 0), metadata={"axes": "CZYX"})
+    tifffile.imwrite(tmp_path / "c.ome.tif", volume[:, 0], metadata={"axes": "TYX"})
+    for name in "ab":
+        assert (tio.read_volume(tmp_path / f"{name}.ome.tif") == np.moveaxis(volume, 1, -1)).all()
+    assert tio.read_spacing(tmp_path / "a.ome.tif") == (1.5, 0.5, 0.5)
+    assert tio.read_spacing(tmp_path / "b.ome.tif") is None
+    with collect() as notices:
+        assert (tio.read_volume(tmp_path / "c.ome.tif") == volume[:, 0]).all()
+    assert notices.assumed == [f"{tmp_path / 'c.ome.tif'}: its 6 points in time are read as planes"]
+    tifffile.imwrite(tmp_path / "d.ome.tif", volume[0], metadata={"axes": "CYX"})
+    assert (tio.read(tmp_path / "d.ome.tif") == np.moveaxis(volume[0], 0, -1)).all()
+
+
+def test_an_orientation_that_a_format_does_not_take_over_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    image = nibabel.Nifti1Image(
+        np.random.default_rng(1).integers(0, 255, (16, 16, 16), np.uint8), np.diag([0.7, 0.7, 1.6, 1])
+    )
+    nibabel.save(image, tmp_path / "a.nii.gz")
+    for name in ("o.nrrd", "o.nii", "o.tif"):
+        given = [
+            "solid",
+            str(tmp_path / "a.nii.gz"),
+            "--size",
+            "16x16x16",
+            "--quality",
+            "fast",
+            "-o",
+            str(tmp_path / name),
+        ]
+        assert main(given) == 0
+        lost = "its orientation, origin and unit are not kept" in capsys.readouterr().err
+        assert lost is (name != "o.nii")
+        np.testing.assert_allclose(tio.read_spacing(tmp_path / name) or 0, (1.6, 0.7, 0.7), rtol=1e-6)

@@ -27,7 +27,7 @@ from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
 from texrs.io._files import find_suffix
-from texrs.io._formats import RAW, STORE, check, holds_spacing, keeps_spacing
+from texrs.io._formats import RAW, STORE, check, detect_kind, holds_spacing, keeps_spacing
 from texrs.io._pillow import write_indexed
 from texrs.io._temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
@@ -355,6 +355,10 @@ def name_arguments(**names: str) -> Iterator[None]:
         raise type(error)(f"{', '.join(called)}:{said}") from None
 
 
+PLACING = ("nrrd", "nii", "nii.gz")
+"""Kinds of volumes that state where they lie."""
+
+
 def find_volume(source: Any, axes: int) -> str | None:
     """Return the file of the volume whose spacing, orientation, origin and units the result has; None if there is none."""
     there = axes == 3 and isinstance(source, str) and not source.startswith(SAMPLE)
@@ -408,6 +412,11 @@ def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[f
             )
         io.write_volume(path, image)
         return
+    kind = "" if volume is None else detect_kind(Path(volume))
+    if kind in PLACING and not suffix[1:].startswith(kind[:3]):
+        ignore(
+            f"{volume}: its orientation, origin and unit are not kept, because only files of its format take them over"
+        )
     io.write_volume(path, image, spacing=stated, like=volume)
 
 

@@ -116,7 +116,7 @@ def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
     -------
     (float, float, float) or None
         From plane to plane, from row to row and from column to column, as the file states it. NRRD, NIfTI, .vti,
-        .vtk, OME-Zarr and stacks of ImageJ (.tif) can. None if nothing is stated.
+        .vtk, OME-Zarr, OME-TIFF and stacks of ImageJ (.tif) can. None if nothing is stated.
 
     Raises
     ------
@@ -144,8 +144,9 @@ def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
 
 
 def read_unit(path: Path | None) -> str:
-    """Return the unit that a stack of ImageJ states; empty if there is none."""
+    """Return the unit that a stack of ImageJ or of OME states; empty if there is none."""
     if path is not None and detect_kind(path) == "slices":
         path = _series.list_slices(path, READ_IMAGES)[0]
-    found = _tiff.read_imagej(path) if path is not None and detect_kind(path) == "tiff" else None
+    tiff = path is not None and detect_kind(path) == "tiff"
+    found = (_tiff.read_imagej(path) or _tiff.read_ome(path)) if path is not None and tiff else None
     return "" if found is None else found[1]

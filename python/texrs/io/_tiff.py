@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import lzma
+import re
 import threading
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -41,6 +42,8 @@ _SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317
 """Tags that say how the pixels lie. tifffile goes on without a tag that it cannot read."""
 _ASSOCIATED = 1
 """Kind of an extra sample: an alpha that colours are multiplied by."""
+_OME = 2**16
+"""Maximum number of characters of the metadata of OME that are searched."""
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _SEPARATED, _YCBCR = 0, 1, 2, 3, 5, 6
 
 
@@ -53,7 +56,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
 
     length = check_file(path)
     # OME files can name other files to read; this one is all that was asked for.
-    with translate_errors(path, "decoding"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
+    with translate_errors(path, "decoding"), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
         _check_chain(path, tif, length)
         if not tif.series or not tif.pages:
             raise FileError(f"{path}: holds no image")
@@ -69,6 +72,9 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         tag = first.tags.get(_ORIENTATION)
         orientation = int(tag.value) if tag is not None and tag.value in range(1, 9) else 1
         _report_others(path, tif, series)
+        times = dict(zip(series.axes, series.shape, strict=True)).get("T", 1)
+        if times > 1:
+            assume(f"{path}: its {times} points in time are read as planes")
         if first.photometric == _SEPARATED or first.compression not in tifffile.TIFF.DECOMPRESSORS:
             return _read_otherwise(path, series, sides, channels, limit), orientation
         _check_unfolded(path, tif.filehandle, series)
@@ -134,7 +140,7 @@ def count_planes(path: Path) -> int:
     import tifffile
 
     length = check_file(path)
-    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
+    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
         _check_chain(path, tif, length)
         if not tif.series:
             return 0
@@ -142,9 +148,34 @@ def count_planes(path: Path) -> int:
 
 
 def read_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that ImageJ states, x first."""
-    found = read_imagej(path)
+    """Return the distances that ImageJ or OME states, x first."""
+    found = read_imagej(path) or read_ome(path)
     return None if found is None else found[0]
+
+
+def read_ome(path: Path) -> tuple[tuple[float, float, float], str] | None:
+    """Return the distances between voxels that OME states, x first, and their unit; None if it states none."""
+    import tifffile
+
+    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
+        pixels = re.search(r"<(?:\w+:)?Pixels\b[^>]*>", (tif.ome_metadata or "")[:_OME])
+    if pixels is None:
+        return None
+    sides = {axis: _read_side(pixels[0], axis) for axis in "XYZ"}
+    units = {unit for _, unit in sides.values()}
+    if len(units) > 1 or any(step is None for step, _ in sides.values()):
+        return None
+    x, y, z = (float(step or 1) for step, _ in sides.values())
+    return (x, y, z), units.pop()
+
+
+def _read_side(pixels: str, axis: str) -> tuple[float | None, str]:
+    """Return the distance along an axis in the text of an OME element, and its unit, which is micrometres by default."""
+    step, unit = (re.search(rf'\bPhysicalSize{axis}{end}="([^"]*)"', pixels) for end in ("", "Unit"))
+    with suppress(ValueError):
+        if step is not None:
+            return float(step[1]), "µm" if unit is None else unit[1]
+    return None, ""
 
 
 def read_imagej(path: Path) -> tuple[tuple[float, float, float], str] | None:

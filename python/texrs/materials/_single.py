@@ -25,8 +25,8 @@ class SingleMap(Material):
 def read_single(path: str) -> SingleMap | None:
     """Return the only map of a material; None if the name or the values of a file are those of an image.
 
-    Colours and heights are looked up and corrected like any image. Normals and vectors turn with the surface. There are no values
-    between labels.
+    Colours and heights are looked up and corrected like any image. Normals and vectors turn with the surface. Labels keep their
+    values.
     """
     role = guess_role(Path(path).stem)
     if role is None or not (role.normal or role.labelled or role is Role.VECTOR):
