@@ -23,14 +23,14 @@ verb = "design"
 inputs = ["stones/*.png"]
 out = "made/{name}-{preset}-{seed}.png"
 seeds = "3:5"
-options = { size = 48, tiles = 1, map = "maps/{name}-{preset}-{seed}.npz" }
+options = { size = 48, copies = 1, source_map = "maps/{name}-{preset}-{seed}.npz" }
 sheet = "made/sheet.png"
 
 [presets.still]
-plan = "still"
+motion = "keep"
 [presets.turned]
 rotate = 180.0
-mirror = false
+allow_mirror = false
 """
 
 

@@ -401,7 +401,7 @@ def test_a_type_checker_knows_every_option(verb):
 def test_variants_are_checked_at_once_and_made_when_they_are_asked_for():
     with pytest.raises(InvalidInput, match="^count"):
         texrs.design_variants(PICTURE, 0)
-    with pytest.raises(InvalidInput, match="^tiles"):
+    with pytest.raises(InvalidInput, match="^copies"):
         texrs.design_variants(PICTURE, 2, copies=0)
     seen = []
     found = texrs.design_variants(

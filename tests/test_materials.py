@@ -122,7 +122,7 @@ def test_elements_are_those_of_the_colours_where_these_tell_surely() -> None:
     made = texrs.splice(stones, sample.image, seed=1)
     assert made.material is not None
     assert made.material["normal"].pixels.dtype == np.float32
-    with pytest.raises(InvalidInput, match=r"^a: .*texrs.elements.analyse takes a box"):
+    with pytest.raises(InvalidInput, match=r"^elements: .*texrs.elements.analyse takes a box"):
         texrs.splice(
             Material({"albedo": np.full((64, 64, 3), 90, np.uint8), "mask": np.zeros((64, 64), bool)}), sample.image
         )

@@ -262,7 +262,7 @@ def test_pictures_are_analysed() -> None:
     image = samples.load("dots", size=(96, 96)).image
     assert texrs.splice(image, ENTRIES["pebbles"], 64).image.shape == (64, 64, 3)
     assert texrs.splice(image[..., 1], ENTRIES["pebbles"], 64).image.shape == (64, 64)
-    with pytest.raises(InvalidInput, match="^a: "):
+    with pytest.raises(InvalidInput, match="^elements: "):
         texrs.splice(np.zeros((40, 40)), ENTRIES["pebbles"])
 
 

@@ -231,7 +231,7 @@ def check_files(jobs: Sequence[tuple[Job, Any]], parameters: Sequence[Any]) -> N
 
 
 def place_arguments(recipe: Recipe, parameters: Sequence[Any]) -> Recipe:
-    """Return a recipe whose options that are arguments of the command, as ``hole`` of inpaint, are in their place."""
+    """Return a recipe whose options that are arguments of the command, as ``mask`` of inpaint, are in their place."""
     options, arguments = dict(recipe.options), list(recipe.arguments)
     flags = {flag.lstrip("-") for p in parameters for flag in p.opts if p.param_type_name == "option"}
     for place, p in enumerate(q for q in parameters if q.param_type_name == "argument"):

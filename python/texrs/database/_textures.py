@@ -87,7 +87,7 @@ class TextureDatabase:
     ----------
     path : path_like
         The folder; if it is not there it is made, in a folder that is, when the first texture is kept.
-    say : callable, optional
+    log : callable, optional
         Called with a sentence when something had to be remade; by default a warning is given.
 
     Raises
