@@ -1,9 +1,9 @@
-"""The coarse-to-fine engine: textures grown by corrected coordinates, in two and three dimensions.
+"""The coarse-to-fine engine: synthesis by corrected coordinates, in two and three dimensions.
 
-`texrs.growth.engine` is the loop over the levels, which takes a start, a corrector, and what is asked of the output
-beside the texture; `windows` is the engine's own start and corrector; `start` holds the other starts, `constraints`
-what may be asked, `sheets` patches of the sizes that a map asks for, `scales` growth from an atlas of scaled copies, and
-`settings` the numbers.
+`texrs.growth.engine` is the loop over the levels. It takes a start, a corrector and the constraints of the output.
+`windows` contains the engine's own start and corrector,
+and `start` the other starts. `constraints` holds the constraints of an output, and `settings` the numbers. `sheets` grows
+patches of the sizes in a scale map, and `scales` grows from an atlas of scaled copies.
 """
 
 from texrs.growth.constraints import Conditions, Constraints, Guide, Surroundings

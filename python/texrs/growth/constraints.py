@@ -1,4 +1,4 @@
-"""What is asked of an output beside the texture: points that are given, and a map to follow."""
+"""Constraints of an output: given points, and a guide map to follow."""
 
 from __future__ import annotations
 
@@ -20,10 +20,13 @@ from texrs.kernels.gather import gather
 __all__ = ["NOTHING", "Asked", "Conditions", "Constraints", "Guide", "Pins", "Surroundings", "average_points"]
 
 WEIGHT = 1500
-"""Cost of another colour than the given one, in 1/256: a tenth of the range costs about as much as windows that have
-nothing to do with each other."""
+"""Cost of a colour that differs from the given one, in 1/256. A difference of a tenth of the range costs about as much
+as two unrelated windows.
+"""
 FOLLOW = 150
-"""The same of a map that is followed: there a third of the range costs as much."""
+"""Cost of a difference from a guide map, in 1/256. A difference of a third of the range costs about as much as two
+unrelated windows.
+"""
 
 
 # --- what a caller asks ----------------------------------------------------------------------------------------------
@@ -31,26 +34,27 @@ FOLLOW = 150
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Constraints:
-    """Points of an output that are given, by what they show or by where they look.
+    """Points of an output that are given, by their values or by their source coordinates.
 
     Attributes
     ----------
     mask : (rows, columns) or (planes, rows, columns) bool or int array
-        The points that are given: those that are not 0.
+        Mask of the given points: those that are not 0.
     values : (size[, C]) array, optional
-        What given points show, exactly, in the exemplar's dtype and channels; those of other points are ignored.
+        Values of the given points, in the exemplar's dtype and channels; the output shows them exactly. Values of
+        other points are ignored.
     coordinates : (size, A) array, optional
-        Where given points look in the exemplar, instead: (row, column) or (plane, row, column) in samples, not beyond
-        its first and last ones. Others are ignored, and may be NaN.
+        Source coordinates of the given points, instead of values: (row, column) or (plane, row, column) in samples,
+        within the exemplar. Coordinates of other points are ignored, and may be NaN.
 
     Raises
     ------
     InvalidInput
-        Neither values nor coordinates, or both.
+        If neither values nor coordinates are given, or both.
 
     Examples
     --------
-    A picture that goes on from a piece of its exemplar:
+    An image that continues a part of its exemplar:
 
     >>> import numpy as np
     >>> import texrs
@@ -71,33 +75,34 @@ class Constraints:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Refuse what does not say what the points are to show."""
+        """Refuse constraints without exactly one of values and coordinates."""
         if (self.values is None) == (self.coordinates is None):
             raise InvalidInput("constraints: needs either values or coordinates of the points that mask marks")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Guide:
-    """Two maps, of which the exemplar's is to show what the output's says: for exemplars with a trend.
+    """Two maps: the output's map is followed by means of the exemplar's map. For exemplars with a trend.
 
     Attributes
     ----------
     exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
-        Finite numbers that broadcast to the exemplar's axes: what there is at each sample, such as how deep it lies.
+        Finite numbers that broadcast to the exemplar's axes: the guided quantity at each sample, such as its depth.
     output : (rows, columns[, C]) or (planes, rows, columns[, C]) array_like
-        Finite numbers, in the same units, that broadcast to the size of the output: what each point is to look for.
+        Finite numbers in the same unit, which broadcast to the size of the output: the requested quantity at each
+        point.
     weight : float
-        How much that counts beside looking like the exemplar, 0 to 100: at 1 a third of the range of the exemplar's
-        map costs as much as surroundings that have nothing to do with each other.
+        Weight of the guide compared with similarity to the exemplar, 0 to 100. At 1 a difference of a third of the
+        range of the exemplar's map costs as much as two unrelated windows.
 
     Raises
     ------
     InvalidInput
-        Maps that are not finite numbers, or a weight out of its range.
+        If a map has values that are not finite numbers, or the weight is out of its range.
 
     Examples
     --------
-    What grows brighter downwards, grown the other way round:
+    An exemplar that grows brighter downwards, synthesised upside down:
 
     >>> import numpy as np
     >>> import texrs
@@ -116,7 +121,7 @@ class Guide:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Check what can be checked without a size."""
+        """Check everything that does not depend on a size."""
         as_float(self.weight, "weight", 0, 100)
         for name, given in (("exemplar", self.exemplar), ("output", self.output)):
             values = try_array(given)
@@ -132,18 +137,18 @@ class Guide:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """What is asked of the points of one level.
+    """Constraints of the points of one level.
 
     Attributes
     ----------
     demand : Demand, optional
-        What they are to show.
+        Values that the points should show.
     held : (points) bool, optional
-        Points that keep their places.
+        Points whose coordinates are fixed.
     given : (points * A) int32, optional
-        The places of these, in units of 1/4096 of a sample; none where they have them already.
+        Coordinates of the fixed points, in units of 1/4096 of a sample. None if the points have them already.
     surrounds : bool
-        Whether the start receives the held points, and grows from them.
+        If True, the start receives the fixed points and grows from them.
 
     """
 
@@ -153,7 +158,7 @@ class Asked:
     surrounds: bool = False
 
     def place(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return places with those that are given put in."""
+        """Return the coordinates with the given ones inserted."""
         if self.held is None or self.given is None:
             return places
         return np.where(np.repeat(self.held, len(places) // len(self.held)), self.given, places)
@@ -163,15 +168,17 @@ NOTHING = Asked()
 
 
 class Held(Protocol):
-    """Points of the output that keep their places."""
+    """Points of the output whose coordinates are fixed."""
 
     def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
-        """Return which points of a level keep their places, (points) bool, and these, (points * A) int32."""
+        """Return the fixed points of a level, (points) bool, and their coordinates, (points * A) int32."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pins:
-    """Scattered points: a point of a level that stands for any of them is held, and shows what the first one does.
+    """Scattered fixed points.
+
+    A point of a level is fixed if it covers any of them, and takes the coordinates of the first one.
 
     ``mask`` is (size) bool, ``coordinates`` (size, A) float32.
     """
@@ -180,10 +187,10 @@ class Pins:
     coordinates: Floats
 
     def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
-        """Return which points of a level keep their places, and these."""
+        """Return the fixed points of a level, and their coordinates."""
         axes = len(region.shape)
         held, places = np.zeros(region.points, bool), np.zeros((region.points, axes), np.int32)
-        # Of several the last to be written is the first.
+        # NumPy keeps the last value written to a place, so write in reverse order to keep the first one.
         at = np.argwhere(self.mask)[::-1]
         theirs = self.coordinates[self.mask][::-1]
         index = np.ravel_multi_index(tuple(np.minimum(at // spacing, np.array(region.shape) - 1).T), region.shape)
@@ -194,17 +201,18 @@ class Pins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """What lies around a hole: a point of a level is held that stands for such points in the main.
+    """Known points around a hole. A point of a level is fixed if most of the points that it covers are known.
 
-    Were a point free that stands for as many known as unknown ones, nothing would tell coarse levels what has to go
-    on there. ``mask`` is (size) bool, ``places`` (size, A) int32: the samples that points show.
+    A point that covers as many known as unknown points is fixed too: otherwise coarse levels have no information about
+    how the surroundings continue. ``mask`` is (size) bool. ``places`` is (size, A) int32, the samples that the points
+    show.
     """
 
     mask: Bools
     places: NDArray[np.int32]
 
     def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
-        """Return which points of a level keep their places, and these."""
+        """Return the fixed points of a level, and their coordinates."""
         share = average_points(self.mask.astype(np.float32), region.shape, spacing)
         starts = [np.minimum(np.arange(n) * spacing, m - 1) for n, m in zip(region.shape, self.mask.shape, strict=True)]
         first = self.places[np.ix_(*starts)].astype(np.float64)
@@ -213,22 +221,24 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditions:
-    """Constraints and a guide, checked for an exemplar and a size: what is asked of each level of an output.
+    """Constraints and a guide, checked for an exemplar and a size.
+
+    They give the constraints of each level of an output.
 
     Attributes
     ----------
     image : (..., C) array
         The exemplar.
     mask : (size) bool, optional
-        The points that are given.
+        Mask of the given points.
     values : (size, C) array, optional
-        What these show.
+        Values of the given points.
     pins : Pins, optional
-        Where these look.
+        Source coordinates of the given points.
     maps : (Floats, Floats), optional
-        The guide: the exemplar's map and the output's, 0 to 1.
+        Guide: the map of the exemplar and the map of the output, both 0 to 1.
     weight : int
-        Of the guide, in 1/256.
+        Weight of the guide, in 1/256.
 
     """
 
@@ -243,12 +253,13 @@ class Conditions:
     def of(
         cls, image: Array, shape: tuple[int, ...], constraints: Constraints | None, guide: Guide | None
     ) -> Conditions:
-        """Check what a caller asks of an output of a shape.
+        """Check the constraints and the guide of a call for an output of a shape.
 
         Raises
         ------
         InvalidInput
-            Constraints or maps of other shapes or types, coordinates beyond the exemplar, or a guide beside values.
+            If constraints or maps have other shapes or types, if coordinates lie outside the exemplar, or if a guide
+            is combined with values.
 
         """
         for given, kind, name in ((constraints, Constraints, "constraints"), (guide, Guide, "guide")):
@@ -279,11 +290,11 @@ class Conditions:
 
     @property
     def free(self) -> bool:
-        """Whether nothing is asked."""
+        """Whether there are neither constraints nor a guide."""
         return not self.count and self.maps is None
 
     def show(self, composite: Array) -> Array:
-        """Return the picture with the values that are given, exactly."""
+        """Return the image with the given values inserted exactly."""
         if self.mask is None or self.values is None or self.pins is not None:
             return composite
         result = composite.copy()
@@ -291,12 +302,12 @@ class Conditions:
         return result
 
     def at(self, level: int, region: Region, spacing: int) -> Asked:
-        """Return what is asked of a level."""
+        """Return the constraints of a level."""
         held, given = (None, None) if self.pins is None else self.pins.at(region, spacing)
         return Asked(self._make_demand(region, spacing), held, given)
 
     def _make_demand(self, region: Region, spacing: int) -> Demand | None:
-        """Ask for the guide's map, or for the mean of the values that a point of the level stands for."""
+        """Return the demand of the guide's map, or of the mean of the given values that a point of the level covers."""
         if self.maps is not None and self.weight:
             mine, theirs = self.maps
             points = _pool(np.ones((*theirs.shape[:-1], 1), np.float32), region.shape, spacing)
@@ -315,7 +326,7 @@ class Conditions:
 
 
 def average_points(values: Array, shape: tuple[int, ...], spacing: int) -> Array:
-    """Return the mean of the points of the output that each point of a level stands for; the last stands for what is left."""
+    """Return the mean of the output points that each point of a level covers; the last point covers the rest."""
     sizes = [np.diff([*_find_starts(n, m, spacing), m]) for n, m in zip(shape, values.shape, strict=True)]
     return np.asarray(_pool(values, shape, spacing) / np.maximum(np.multiply.outer(*sizes), 1))
 
@@ -379,19 +390,19 @@ def _code(values: Floats) -> NDArray[np.int16]:
 
 
 def _find_starts(count: int, length: int, spacing: int) -> NDArray[np.intp]:
-    """Return where the points of a level begin along an axis of the output."""
+    """Return the first output coordinate of each point of a level along an axis."""
     return np.minimum(np.arange(count) * spacing, length - 1)
 
 
 def _pool(values: Floats, shape: tuple[int, ...], spacing: int) -> Floats:
-    """Sum values of the output over the points of a level."""
+    """Return the sums of output values over the points of a level."""
     for axis, n in enumerate(shape):
         values = np.add.reduceat(values, _find_starts(n, values.shape[axis], spacing), axis=axis)
     return values
 
 
 def _shrink(exemplar: Floats, spacing: int) -> Floats:
-    """Return the mean of the samples that a sample of a level stands for; those that are left at the ends are left out."""
+    """Return the mean of the samples that a sample of a level covers. Remaining samples at the ends are left out."""
     axes = exemplar.ndim - 1
     trimmed = exemplar[tuple(slice(0, n // spacing * spacing) for n in exemplar.shape[:axes])]
     for axis in range(axes):

@@ -1,17 +1,19 @@
-"""The coarse-to-fine engine: whatever grows by corrected coordinates goes through this one loop over the levels.
+"""The coarse-to-fine engine: the one loop over the levels for all synthesis by corrected coordinates.
 
-A level of the output has half the points of the next along each axis. Each point of it has a place, the sample of the
-exemplar that it shows, in fixed point. From level to level:
+A level of the output has half the points of the next finer level along each axis. Each point has a place in fixed
+point: the sample of the exemplar that it shows. The steps of each level are:
 
-1. the **start** gives the first level its places: patch-based initialisation, patches stitched along minimum cuts, or a draft
+1. The **start** gives the first level its places: patch-based initialisation, patches stitched along minimum cuts, or
+  a draft
    (`texrs.growth.start`);
-2. each finer level is **upsampled** from the one before, with the Jacobians of the frames;
-3. the **constraints** of the level are put in place (`texrs.growth.constraints`);
-4. the **corrector** changes places until every window of the output is like one of the exemplar (`texrs.growth.windows`,
-   or what a caller brings).
+2. Each finer level is **upsampled** from the one before, with the Jacobians of the frames.
+3. The **constraints** of the level are inserted (`texrs.growth.constraints`).
+4. The **corrector** changes places until every window of the output resembles a window of the exemplar
+  (`texrs.growth.windows`,
+   or a corrector of the caller).
 
-Each of these is a function that is handed in. Levels are numbered as those of the exemplar's pyramid, from 0 for the
-coarsest; an output may begin at one that is coarser still, below 0.
+The caller passes each of these as a function. Levels have the numbers of the exemplar's pyramid, from 0 for the
+coarsest. An output may begin at a coarser level, with a number below 0.
 """
 
 from __future__ import annotations
@@ -45,15 +47,16 @@ __all__ = [
 
 Places: TypeAlias = NDArray[np.int32]
 FramesAt: TypeAlias = Callable[[Region, int], NDArray[np.int16]]
-"""Returns the Jacobians of a region whose points are so many pixels apart, as `texrs._engine.pyramid.to_fixed`."""
+"""Return the Jacobians of a region whose points have a given distance in pixels, as `texrs._engine.pyramid.to_fixed`.
+"""
 Ask: TypeAlias = Callable[[int, Region, int], Asked]
-"""Returns what is asked of a level: its number, its region, and how many pixels its points are apart."""
+"""Return the constraints of a level, from its number, its region and the distance of its points in pixels."""
 Show: TypeAlias = Callable[[Places, Region, int], Array]
-"""Makes a picture of the places of a region whose points are so many pixels apart."""
+"""Return an image of the places of a region whose points have a given distance in pixels."""
 
 
 class Corrector(Protocol):
-    """Corrects the places of a level, which it may overwrite."""
+    """Correct the places of a level, which it may overwrite."""
 
     def __call__(
         self,
@@ -69,20 +72,20 @@ class Corrector(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patches:
-    """The patches that places come from.
+    """Patches that the places come from.
 
     Attributes
     ----------
     labels : (points) uint32
         The patch of each point.
     frames : (patches, A, A) float32
-        The Jacobian at the centre of each.
+        Jacobian at the centre of each patch.
     bent : bool
-        Whether they follow the field inside, too.
+        If True, the patches also follow the field inside.
     seams : float
         Mean cost of the seams at a point.
     healed : int
-        Moves by which torn elements were made whole, or given up.
+        Number of moves that repaired a torn element or removed it.
 
     """
 
@@ -100,17 +103,17 @@ class Patches:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """How an output begins.
+    """The first level of an output and how its places are computed.
 
     Attributes
     ----------
     level : int
         The first level.
     make : callable
-        Returns its places, and the patches that they come from, if any: of a region, with its frames, what is asked of it,
-        and the progress to report.
+        Function that returns the places and the patches that they come from, if any. Its arguments are a region, its
+        frames, the constraints and the progress to report.
     name : str
-        Of its picture among the stages; empty where there is none to show.
+        Name of its image among the stages. Empty if it has no image.
 
     """
 
@@ -121,7 +124,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class LevelDone:
-    """What was done at a level: passes, and the share of the points that the last two changed, where it is known."""
+    """Work done at a level: the passes, and the share of the points that the last two passes changed, if known."""
 
     shape: tuple[int, ...]
     passes: int
@@ -134,18 +137,18 @@ class LevelDone:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grown:
-    """What has grown.
+    """Result of the engine.
 
     Attributes
     ----------
     places : (points * A) int32
-        In units of 1/4096 of a sample.
+        Source coordinates, in units of 1/4096 of a sample.
     levels : tuple of LevelDone
-        What was done, from the first level on.
+        Work done at each level, from the first one on.
     stages : mapping of str to array
-        Pictures of the start and of each level but the last, whose places are the result.
+        Images of the start and of each level except the last, whose places are the result.
     patches : Patches, optional
-        Those of the start, where nothing was changed after it.
+        Patches of the start, if no later step changed them.
 
     """
 
@@ -156,7 +159,7 @@ class Grown:
 
 
 def nothing(level: int, region: Region, spacing: int) -> Asked:
-    """Ask for nothing beside the texture."""
+    """Return no constraints."""
     return NOTHING
 
 
@@ -168,7 +171,7 @@ def keep(
     asked: Asked,
     progress: Progress | None,
 ) -> Corrected:
-    """Correct nothing: what was stitched is whole."""
+    """Return the places unchanged, because stitched patches are complete."""
     return Corrected(places, 0, 0.0)
 
 
@@ -183,26 +186,26 @@ def grow(
     show: Show | None = None,
     progress: Progress | None = None,
 ) -> Grown:
-    """Grow a region from its coarsest level to its finest.
+    """Synthesise a region from its coarsest level to its finest.
 
     Parameters
     ----------
     region : Region
         The output.
     levels : int
-        Of the exemplar's pyramid; the last one has the output's resolution.
+        Number of levels of the exemplar's pyramid. The last one has the resolution of the output.
     start : Start
-        Where to begin, and with what.
+        First level and its places.
     correct : Corrector
-        What makes the places of a level fit.
+        Function that corrects the places of a level.
     frames : callable
-        The Jacobians at the points of a level.
+        Function that returns the Jacobians at the points of a level.
     ask : callable
-        What is asked of a level beside the texture.
+        Function that returns the constraints of a level.
     show : callable, optional
-        Makes the pictures of the stages; none are made without it.
+        Function that makes the images of the stages. No images are made by default.
     progress : callable, optional
-        Called with the stage and the share of it that is done; raising stops the work.
+        Called with the stage and its completed share. An exception that it raises stops the work.
 
     Returns
     -------
@@ -228,7 +231,7 @@ def grow(
         found = correct(places, level, here, jacobians, asked, progress)
         places, before = found.places, here
         patches = patches if found.passes == 0 and level == start.level else None
-        # What is coarser than the exemplar's coarsest level has nothing to show.
+        # Levels coarser than the exemplar's coarsest one have no image.
         if show is not None and 0 <= level < levels - 1:
             stages[f"level {level + 1}"] = show(places, here, spacing)
         done.append(LevelDone(here.shape, found.passes, found.changed))

@@ -1,4 +1,4 @@
-"""Growth from an atlas: elements of the sizes that a map asks for, around what is held."""
+"""Synthesis from an atlas: elements of the sizes in a scale map, around fixed points."""
 
 from __future__ import annotations
 
@@ -20,31 +20,36 @@ from texrs.growth.windows import Windows
 __all__ = ["FROM_ATLAS", "Scales", "grow_from_atlas"]
 
 FROM_ATLAS = Settings(passes=(12, 8, 4), reaches=(2, 2, 2), coarsest=32, rounds=6, candidates=1024)
-"""Where much of an atlas has not the wanted scale, more is tried, and coarser levels have more to tell apart."""
+"""Settings for growth from an atlas. They try more candidates, because much of an atlas does not have the requested
+scale, and coarse levels must tell more scales apart.
+"""
 
 WEIGHT = 1264
-"""Cost of another scale than the wanted one, in 1/256: at a factor of 1.6 as much as windows that have nothing to do
-with each other."""
+"""Cost of a scale that differs from the requested one, in 1/256. A factor of 1.6 costs as much as two unrelated
+windows.
+"""
 SLAB = 1 << 15
-"""Points of the target that are looked at at once."""
+"""Number of points of the target that are processed at once, to bound memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scales:
-    """Asks for the scales of a target, for copies of the exemplar's own size, and for nothing that is barred.
+    """Constraints that request the scales of a target.
+
+    They prefer unscaled copies of the exemplar, and allow no barred places.
 
     Attributes
     ----------
     atlas : Atlas
-        What is copied from.
+        Atlas to copy from.
     settings : Settings
-        Their weights count.
+        Settings. Only their weights are used.
     target : (rows, columns) float32, optional
-        The scales that are wanted; none where sizes do not count.
+        Requested scales. None if sizes do not count.
     strength : float
-        How much they count.
+        Weight of the scales.
     held : Held, optional
-        Points that are given, by the samples of the atlas that they show.
+        Fixed points, by the samples of the atlas that they show.
 
     """
 
@@ -55,7 +60,7 @@ class Scales:
     held: Held | None = None
 
     def at(self, level: int, region: Region, spacing: int) -> Asked:
-        """Return what is asked of a level."""
+        """Return the constraints of a level."""
         here = self.atlas.levels[level]
         share = self.settings.at(level, len(self.atlas.levels)).weight * self.strength
         weight = np.array([min(round(WEIGHT * share), 65535)], np.uint16)
@@ -70,7 +75,7 @@ class Scales:
             thick = max(1, SLAB // (spacing * self.target.shape[1]))
             for first in range(0, len(asked), thick):
                 band = asked[first : first + thick]
-                # The last point of a closed axis stands for what is left.
+                # The last point of a closed axis also covers the rest of the axis.
                 last = (first + thick) * spacing if first + thick < len(asked) else len(self.target)
                 logs = log_single(self.target[min(first * spacing, len(self.target) - 1) : last])
                 band[...] = code_logs(average_points(logs, band.shape, spacing))
@@ -89,33 +94,33 @@ def grow_from_atlas(
     show: Show | None = None,
     progress: Progress | None = None,
 ) -> Grown:
-    """Grow a region whose points ask for the scales of a target.
+    """Synthesise a region at the scales of a target.
 
     Parameters
     ----------
     atlas : Atlas
-        What is copied from.
+        Atlas to copy from.
     region : Region
-        What to fill.
+        Region to fill.
     target : (rows, columns) float32, optional
-        The scales that are wanted.
+        Requested scales.
     settings : Settings
-        How much work is done.
+        Settings of the engine.
     strength : float
-        How much the scales count.
+        Weight of the scales.
     held : Held, optional
         Points that are given.
     seed : int
-        Chooses the texture.
+        Seed of the random choices.
     show : callable, optional
-        Makes pictures of the stages.
+        Function that makes the images of the stages.
     progress : callable, optional
-        Called with the stage and the share of it that is done.
+        Called with the stage and its completed share.
 
     Returns
     -------
     Grown
-        Its places are those of the atlas.
+        The result, whose places are coordinates of the atlas.
 
     """
     windows = Windows(tuple(level.appearance for level in atlas.levels), settings, seed)

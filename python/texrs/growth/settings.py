@@ -1,4 +1,4 @@
-"""How much work the engine does, and what it weighs."""
+"""Settings of the engine: amounts of work, and weights."""
 
 from __future__ import annotations
 
@@ -9,36 +9,37 @@ __all__ = ["Settings", "Step"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """The numbers of the engine. Three of a kind are for the coarsest level, those between, and the finest.
+    """Settings of the engine. Triples are for the coarsest level, the levels between, and the finest level.
 
     Attributes
     ----------
     passes : (int, int, int)
-        Most passes of the corrector; each corrects every other point, as on a chess board.
+        Maximum number of passes of the corrector. Each pass corrects every other point, as on a chess board.
     reaches : (int, int, int)
-        How far the neighbours are whose matches are tried, 1 or 2.
+        Distance of the neighbours whose matches are tried, 1 or 2 points.
     votes : (int, int, int)
-        Radius within which windows vote on a point; at 0 each takes its own match.
+        Radius within which windows vote on a point. At 0 each point takes its own match.
     weights : (float, float, float)
-        How much the scales that are asked for count beside looking like the exemplar.
+        Weight of the requested scales compared with similarity to the exemplar.
     radii : sequence of int
-        Of the exemplar's windows, from the coarsest level on; the last one serves all that follow.
+        Radii of the exemplar's windows, from the coarsest level on. The last one is used for all later levels.
     coarsest : int
-        Least side of the exemplar at the coarsest level.
+        Minimum side of the exemplar at the coarsest level, in samples.
     cell, rounds, candidates : int
-        Of the patch-based initialisation: the side of a cell, the half-rounds of choosing, and what each tries.
+        Patch-based initialisation: side of a cell, number of half-rounds of choosing, and candidates of each choice.
     contrast, continuation, repetition : float
-        Of the same: how far misfits are divided by the contrast of the pieces, and what it costs to go on exactly
-        where a neighbour ends, and to show what a neighbour shows.
+        Patch-based initialisation. Share of the contrast by which misfits are divided; cost of continuing exactly where a
+        neighbour ends; cost of showing the same samples as a neighbour.
     acceptance : float
-        The acceptance threshold: how much better than the present a drawn match must be.
+        Acceptance threshold: the required improvement of a drawn match over the present one.
     coherence : float
-        The coherence penalty: what each neighbour costs that does not go on in the same piece of the exemplar.
+        Coherence penalty: cost of each neighbour that does not continue the same piece of the exemplar.
     settled : float
-        A level is done when two passes change less than this share of its points; what a point becomes then hangs on
-        all.
+        Share of points. A level is finished when two passes change fewer points, because later changes depend on all
+        points.
     exhaustive : int
-        Most pairs of windows that are compared, each with each, in a pass of the coarsest level; beyond that none are.
+        Maximum number of pairs of windows that a pass of the coarsest level compares exhaustively. Above it no pass is
+        exhaustive.
 
     """
 
@@ -60,14 +61,14 @@ class Settings:
     exhaustive: int = 0
 
     def at(self, level: int, levels: int) -> Step:
-        """Return what is done at a level, counted from the coarsest."""
+        """Return the settings of a level, counted from the coarsest."""
         which = 2 if level == levels - 1 else 1 if level else 0
         return Step(self.passes[which], self.reaches[which], self.votes[which], self.weights[which])
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What is done at one level."""
+    """Settings of one level."""
 
     passes: int
     reach: int

@@ -1,4 +1,4 @@
-"""Growth from a sheet: patches of the sizes that a map asks for, stitched along minimum cuts, around what is held."""
+"""Synthesis from a sheet: patches of the sizes in a scale map, stitched along minimum cuts, around fixed points."""
 
 from __future__ import annotations
 
@@ -18,38 +18,41 @@ from texrs.exemplar.sheet import Sheet, code
 __all__ = ["FromSheet", "stitch_sheet"]
 
 LEAST, MOST = 8.0, 160.0
-"""Side of a patch, in samples of the sheet."""
+"""Minimum and maximum side of a patch, in samples of the sheet."""
 FITS = 0.7
-"""Of a sheet's shorter side: a patch must have somewhere to lie."""
+"""Maximum side of a patch, as a share of the sheet's shorter side, so that a patch has several positions."""
 OVERLAP = 0.33
-"""Share of a patch by which neighbours overlap."""
+"""Overlap of neighbouring patches, as a share of the patch side."""
 CANDIDATES = 4
-"""Places that are tried for each patch, of which the best stays."""
+"""Number of positions tried for each patch. The best is used."""
 COLOUR, SURPRISE = 0.4, 0.5
-"""Weights of seams: edges meet edges of the same size only here and there, so colours count more than where all is one size."""
+"""Weights of seams. Colours count more than in textures of one scale, because edges rarely meet edges of the same
+size.
+"""
 UNIT = 512
-"""Weight of a demand, in 1/256 of the square of a unit of its logarithms, at which a factor of e costs as much as windows that
-have nothing to do with each other."""
+"""Weight of a scale error. At this weight an error by a factor of e costs as much as two unrelated windows. Unit:
+1/256 of a squared unit of log scale.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FromSheet:
-    """What has been stitched from a sheet.
+    """Result of stitching from a sheet.
 
     Attributes
     ----------
     coordinates : (rows, columns, 2) float32
-        Where in the exemplar each pixel looks.
+        Source coordinates of each pixel in the exemplar.
     patches : (rows, columns) uint32
-        The patch that each shows; one beyond the last for what was given.
+        Patch of each pixel. Given pixels have the number after the last patch.
     frames : (rows, columns, 2, 2) float32
-        How the exemplar is seen there: dS/dp.
+        Jacobian dS/dp of each pixel.
     error : float
-        Median of how far the logarithms of the scales are from the target's.
+        Median absolute difference of log scale from the target.
     side : float
-        Of the patches, in samples of the sheet.
+        Side of the patches, in samples of the sheet.
     stitched : Stitched
-        What the stitcher says of it.
+        Report of the stitcher.
 
     """
 
@@ -75,32 +78,32 @@ def stitch_sheet(
     frames: NDArray[np.int16] | None = None,
     progress: Progress | None = None,
 ) -> FromSheet:
-    """Stitch an output whose elements are as large as a map says.
+    """Stitch an output whose elements have the sizes of a scale map.
 
     Parameters
     ----------
     sheet : Sheet
-        What patches are cut from.
+        Sheet that patches are cut from.
     region : Region
-        What to fill, of the size of the target.
+        Region to fill, of the size of the target.
     target : (rows, columns) float32
-        The scales that are wanted.
+        Requested scales.
     strength : float
-        How much scales count; 1 is the usual amount.
+        Weight of the scales. The usual weight is 1.
     side : float, optional
-        Of a patch, in samples of the sheet; None goes by how much there is.
+        Side of a patch, in samples of the sheet. By default chosen from the available area.
     seed : int
-        Chooses the texture.
+        Seed of the random choices.
     held : (rows, columns) bool, optional
-        Pixels that keep their places.
+        Pixels whose coordinates are fixed.
     given : (rows, columns, 2) int32, optional
-        The places of those in the sheet, in fixed point.
+        Coordinates of the fixed pixels in the sheet, in fixed point.
     loose : (rows, columns) bool, optional
-        Which of those patches may take all the same, where seams show less then.
+        Fixed pixels that patches may still replace if this makes seams less visible.
     frames : (N, 2, 2) int16, optional
-        How the sheet is to be seen, in all or at each pixel, in fixed point; None goes by the target.
+        Jacobians of the sheet, one for all pixels or one a pixel, in fixed point. By default derived from the target.
     progress : callable, optional
-        Called with the stage and the share of it that is done.
+        Called with the stage and its completed share.
 
     Returns
     -------
@@ -133,7 +136,7 @@ def stitch_sheet(
     )
     places = made.places.reshape(*region.shape, 2)
     coordinates, seen = sheet.locate(places.reshape(-1, 2))
-    # In double precision and in one order, for matrix products differ in the last bit from processor to processor.
+    # Sum in double precision and in one order, because matrix products differ in the last bit between processors.
     jacobians = np.einsum("...ij,...jk->...ik", seen, frames / np.float64(ONE), dtype=np.float64).astype(np.float32)
     return FromSheet(
         coordinates.reshape(places.shape),

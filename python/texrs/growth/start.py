@@ -1,4 +1,4 @@
-"""The starts of the engine, one of which is handed to it: how an output gets its first places.
+"""Starts of the engine: how an output gets its first places. The caller passes one of them.
 
 The engine's own is the patch-based initialisation by hashed blocks at the coarsest level (`texrs.growth.windows`).
 """
@@ -22,21 +22,23 @@ from texrs.growth.engine import Patches, Places, Start
 __all__ = ["bends_with", "from_draft", "from_patches", "patch_side", "weights_of"]
 
 PATCH = {2: 0.45, 3: 0.68}
-"""Side of a patch, as a share of the exemplar's shorter side: larger ones copy too much of it in one piece."""
+"""Side of a patch, as a share of the exemplar's shorter side. Larger patches copy too much of it in one piece."""
 MOST = {2: 256.0, 3: 64.0}
-"""Side of a patch at most: cuts of larger ones take long, and gain nothing."""
+"""Maximum side of a patch, in samples. Cuts of larger ones take longer and gain nothing."""
 OVERLAP = {2: 0.33, 3: 0.4}
-"""Share of it by which neighbours overlap."""
+"""Overlap of neighbouring patches, as a share of the patch side."""
 GUIDED = 0.4
-"""How much smaller patches are that follow a map or values: within one the exemplar's own trend goes on."""
+"""Factor on the patch side if a guide or values are followed. Within a patch the exemplar's own trend continues."""
 DIRECTED = 0.3
-"""Textures whose edges agree in direction so much go on along it: their patches bend with a field."""
+"""Minimum agreement in direction of the edges for patches to bend with a field: such textures continue along it."""
 SEPARATE, ANY = Weights(surprise=0.5), Weights()
-"""What seams cost where the elements are known, and where they are not."""
+"""Costs of seams if the elements are known, and if they are not."""
 GUESSED = Weights(surprise=0.5, contact=0.0, joint=0.0, jump=0.0, depth=0.15, presence=0.0)
-"""And where they are guessed: things in a heap touch and lie on each other, so seams are charged for running inside alone."""
+"""Costs of seams if the elements are guessed. Objects in a heap touch and overlap, so only seams inside elements are
+charged.
+"""
 PLAIN = replace(GUESSED, depth=0.0)
-"""And where elements are to play no part."""
+"""Costs of seams if elements are ignored."""
 
 
 def from_patches(
@@ -49,24 +51,25 @@ def from_patches(
     larger: float = 1.0,
     plain: bool = False,
 ) -> Start:
-    """Return the start from patches stitched along minimum cuts: cuts keep elements whole.
+    """Return the start from patches stitched along minimum cuts, which keep elements whole.
 
     Parameters
     ----------
     exemplar : Exemplar
-        What patches are cut from.
+        Exemplar that patches are cut from.
     level : int
-        Of full resolution, where it starts.
+        First level, counted from full resolution.
     seed : int
-        Chooses the patches.
+        Seed that chooses the patches.
     candidates : int
-        Places that are tried for each, of which the best stays.
+        Number of positions tried for each patch. The best is used.
     bend : bool, optional
-        Whether patches bend with a field; None: where the exemplar's edges have a direction, and no separate elements.
+        If True, patches bend with a field. By default they bend if the exemplar's edges have a direction and its
+        elements are not separate.
     larger : float
-        Side of the patches, in usual ones.
+        Factor on the usual side of the patches.
     plain : bool
-        Whether elements play no part in what seams cost.
+        If True, elements do not change the costs of seams.
     """
     axes, side = exemplar.axes, larger * patch_side(exemplar.shape)
 
@@ -90,7 +93,7 @@ def from_patches(
             demand=asked.demand,
             progress=stage(progress, "patches"),
         )
-        # Points that were given are a patch of their own.
+        # Given points form a patch of their own.
         jacobians = np.concatenate([made.frames, np.eye(axes)[np.newaxis] * ONE]) / ONE
         labels = np.minimum(made.patches, np.uint32(len(made.frames)))
         patches = Patches(labels, jacobians.astype(np.float32), bent, made.seams, made.healed)
@@ -100,14 +103,17 @@ def from_patches(
 
 
 def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bool:
-    """Return whether patches bend with a field: as asked, or where edges have a direction and elements are not separate."""
+    """Return whether patches bend with a field.
+
+    They bend as requested, or if edges have a direction and elements are not separate.
+    """
     if bend is not None or not varies:
         return varies and bool(bend)
     return not exemplar.stitcher.separate and exemplar.directedness >= DIRECTED
 
 
 def weights_of(exemplar: Exemplar) -> Weights:
-    """Return what seams cost in what is made from an exemplar."""
+    """Return the seam costs for an exemplar."""
     stitcher = exemplar.stitcher
     return SEPARATE if stitcher.separate else GUESSED if stitcher.guessed else ANY
 
@@ -118,5 +124,5 @@ def patch_side(shape: tuple[int, ...]) -> float:
 
 
 def from_draft(level: int, draft: Callable[[Region], Places]) -> Start:
-    """Return the start from places that are there already: of the region of a level, which may be overwritten."""
+    """Return the start from existing places of the level's region, which may be overwritten."""
     return Start(level, lambda region, frames, asked, progress: (draft(region), None))

@@ -1,4 +1,4 @@
-"""The engine's own start and corrector: windows of the output made like those of the exemplar, by settings."""
+"""The engine's own start and corrector: they make windows of the output resemble windows of the exemplar."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ __all__ = ["Windows"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """Grows places from an analysed exemplar by its windows.
+    """Start and corrector that compare windows of an analysed exemplar.
 
     Attributes
     ----------
     levels : tuple of Appearance
-        The exemplar, from the coarsest level on.
+        Levels of the exemplar, from the coarsest on.
     settings : Settings
-        How much work is done.
+        Settings of the engine.
     seed : int
-        Chooses the texture.
+        Seed of the random choices.
     field : Frames, optional
-        How the texture is turned and scaled; none leaves it as it is.
+        Frame field: rotation and scale of the texture. None leaves the texture as it is.
 
     """
 
@@ -50,18 +50,18 @@ class Windows:
         show: Show | None = None,
         progress: Progress | None = None,
     ) -> Grown:
-        """Grow a bounded region, whose borders are free, from a start: `initialise` unless another is given."""
+        """Synthesise a bounded region with free borders from a start, by default from `initialise`."""
         first = start or Start(0, lambda *given: (self.initialise(*given), None), "blocks")
         frames = partial(to_fixed, self.field)
         return grow(region, len(self.levels), first, self.correct, frames, ask=ask, show=show, progress=progress)
 
     def step(self, level: int) -> Step:
-        """Return what is done at a level."""
+        """Return the settings of a level."""
         return self.settings.at(level, len(self.levels))
 
     def frames(self, level: int, region: Region) -> NDArray[np.int16]:
         """Return the Jacobians at the points of a level."""
-        # Those of their places in the world: averages of turned frames would shrink.
+        # Take the field at the points themselves, because averages of rotated frames would shrink.
         return to_fixed(self.field, region, 1 << (len(self.levels) - 1 - level))
 
     def initialise(
@@ -73,7 +73,10 @@ class Windows:
         *,
         margin: int = 0,
     ) -> Places:
-        """Return patch-based places of the coarsest level, of hashed blocks that fit each other; a margin will be cut off."""
+        """Return patch-based places of the coarsest level: hashed blocks that fit each other.
+
+        A margin will be cut off.
+        """
         s = self.settings
         return self.levels[0].blocks(
             region,
@@ -104,7 +107,7 @@ class Windows:
         first: int = 0,
         passes: int | None = None,
     ) -> Corrected:
-        """Return places corrected by windows, matches and votes: in so many passes, counted from a first one."""
+        """Return places corrected by windows, matches and votes, in a number of passes from a first one on."""
         here, step, s = self.levels[level], self.step(level), self.settings
         wanted = step.passes if passes is None else passes
         advance = stage(progress, f"level {level + 1} of {len(self.levels)}")
@@ -120,7 +123,7 @@ class Windows:
             coherence=s.coherence,
             vote=min(step.vote, here.radius),
             settled=s.settled,
-            # The noise of a level is its own.
+            # Each level has its own random numbers.
             seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
             held=asked.held,
             demand=asked.demand,
@@ -129,7 +132,7 @@ class Windows:
         )
 
     def _count_pairs(self, region: Region, asked: Asked) -> int:
-        """Return how many pairs of windows of the coarsest level there are to compare."""
+        """Return the number of pairs of windows of the coarsest level that can be compared."""
         demand = asked.demand
         drawn = 0 if demand is None else demand.order.size
         return region.points * (drawn or int(np.prod(self.levels[0].shape)))

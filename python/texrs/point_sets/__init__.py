@@ -1,8 +1,9 @@
-"""Point sets brought into register: one texture's layout for the elements of another.
+"""Registration of point sets: the layout of one texture for the elements of another.
 
-Y. Liu et al., "Texture splicing", 2009, section 4.1: scales are normalised by the mean distance to the nearest points,
-orientations by the directions in which points line up, and points are matched one to one at the least total cost (Eq. 4).
-Here also: what the paper is silent about, namely how both point sets go on beyond the borders of their pictures.
+Y. Liu et al., "Texture splicing", 2009, section 4.1. Scales are normalised by the mean distance to the nearest points,
+and orientations by the directions in which points are aligned. Points are matched one to one at the minimum total cost
+(Eq. 4). The paper does not state how both point sets continue beyond the borders of their images; this package defines
+it.
 """
 
 from __future__ import annotations

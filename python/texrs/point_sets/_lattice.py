@@ -1,4 +1,4 @@
-"""Lattices that points lie on."""
+"""Lattices of points."""
 
 from __future__ import annotations
 
@@ -10,20 +10,24 @@ from texrs.point_sets._measures import Points, spacing
 __all__ = ["continue_on_lattice", "find_courses", "find_lattice", "fit_lattice"]
 
 VOTERS = 400
-"""Points in the middle of a layout that say which lattice it lies on."""
+"""Number of points in the middle of a layout that determine its lattice."""
 REGULAR = 0.12
-"""Root mean square distance of points from their places on a lattice, in spacings, up to which they are continued on it."""
+"""Maximum root mean square distance of points from their lattice sites, in spacings, for a layout to be continued on
+the lattice.
+"""
 FEWEST, SHARE, STEP, STRAIGHT = 3, 0.8, 0.2, 0.06
-"""Courses, and points in courses of two or more, that make a wall; distance of rows, in spacings, that parts two courses; root
-mean square distance of points from their course, in steps from one to the next: random points lie .07 apart or more."""
+"""Properties of a wall: minimum number of courses, minimum share of points in courses of two or more, minimum row
+distance between two courses in spacings. The last is the maximum root mean square distance of points from their course,
+in steps between courses. Random points are 0.07 steps apart or more.
+"""
 AREAS = (0.6, 1.6)
-"""Least and greatest area of a lattice's cell, in squared spacings, for it to be of the points."""
+"""Minimum and maximum area of a lattice cell, in squared spacings, for the lattice to describe the points."""
 
 
 def fit_lattice(points: Points) -> tuple[Points, Points]:
-    """Fit a lattice by least squares: its origin, and two vectors as rows.
+    """Fit a lattice by least squares; return its origin, and two vectors as rows.
 
-    The vectors are those differences of near points that most pairs repeat; where none is repeated they make a square
+    The vectors are the differences of near points that most pairs repeat. If none is repeated, the result is a square
     lattice of the same density.
     """
     scale = spacing(points)
@@ -32,7 +36,7 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
     difference = voters[:, None] - voters[None]
     length = np.hypot(*difference.reshape(-1, 2).T)
     near = difference.reshape(-1, 2)[(length > 0) & (length < 2.2 * scale)]
-    # Votes within a sixth of a spacing, of one half of the plane.
+    # Votes within a sixth of a spacing, from one half of the plane.
     half = near[(near[:, 0] > 1e-9) | ((np.abs(near[:, 0]) <= 1e-9) & (near[:, 1] > 0))]
     basis = np.zeros((0, 2))
     if len(half):
@@ -64,9 +68,11 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
 
 
 def find_lattice(points: Points, unit: float) -> tuple[Points, Points, NDArray[np.intp]] | None:
-    """Return the lattice that points lie on, one a site: its origin, vectors as rows and their sites; None where on none.
+    """Return the lattice of points with one point a site, or None.
 
-    ``unit`` is their spacing.
+    The lattice is its origin, its vectors as rows, and the sites of the points.
+
+    ``unit`` is the spacing of the points.
     """
     origin, basis = fit_lattice(points)
     index = np.rint((points - origin) @ np.linalg.inv(basis)).astype(np.intp)
@@ -78,9 +84,9 @@ def find_lattice(points: Points, unit: float) -> tuple[Points, Points, NDArray[n
 
 
 def find_courses(points: Points, unit: float) -> Points | None:
-    """Return the rows (n,) of the courses that points lie in, in pixels; None where they lie in none.
+    """Return the rows (n,) of the courses that points form, in pixels. None if they form no courses.
 
-    ``unit`` is their spacing.
+    ``unit`` is the spacing of the points.
 
     Examples
     --------
@@ -107,9 +113,9 @@ def find_courses(points: Points, unit: float) -> Points | None:
 def continue_on_lattice(
     points: Points, unit: float, low: Points, high: Points
 ) -> tuple[Points, NDArray[np.intp]] | None:
-    """Return places in a box on the lattice that points lie on, and what point each stands for; None where they lie on none.
+    """Return lattice places in a box and the point that each repeats. None if the points have no lattice.
 
-    Points lie a little beside their sites: those that stand for others do so too.
+    Points are a little off their sites, and their copies have the same offsets.
     """
     found = find_lattice(points, unit)
     if found is None:
@@ -122,10 +128,10 @@ def continue_on_lattice(
     sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij"), -1)
     sites = sites.reshape(-1, 2)
     own = {tuple(k): n for n, k in enumerate(index.tolist())}
-    # A site without a point of its own takes one by its place, so that the same site always takes the same one.
+    # A site without a point repeats a point chosen from the site's position, so that the choice is always the same.
     of = np.array([own.get((i, j), (7919 * i + 104729 * j) % len(points)) for i, j in sites.tolist()])
     mine = np.array([(i, j) in own for i, j in sites.tolist()])
-    # Least squares and products of matrices differ by processors in their last digits.
+    # Round, because least squares and matrix products differ in their last digits between processors.
     places = np.where(mine[:, None], points[of], np.round(sites @ basis + origin + beside[of], 6))
     inside = ((places >= low) & (places <= high)).all(axis=1)
     return places[inside], of[inside].astype(np.intp)

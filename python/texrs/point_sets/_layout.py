@@ -1,4 +1,4 @@
-"""How a layout goes on beyond its picture: on its lattice, around, or reflected where that shows least."""
+"""Continuation of a layout beyond its image: on its lattice, periodically, or by reflection where it is least visible."""
 
 from __future__ import annotations
 
@@ -16,23 +16,25 @@ from texrs.point_sets._measures import Points, mark_inner, nearest_distances, sp
 __all__ = ["Fold", "PointLayout", "find_fold"]
 
 AROUND = 6
-"""Neighbours that tell how a layout goes on: fewer do not tell rows that are shifted from rows that are not."""
+"""Number of neighbours that determine how a layout continues. Fewer do not distinguish shifted rows from unshifted
+rows.
+"""
 FEWEST = 9
-"""Points that may tell a lattice."""
+"""Minimum number of points that can determine a lattice."""
 MERGE = 0.6
-"""Points nearer than this, in spacings, that meet where a point set is folded are one."""
+"""Distance in spacings below which two points are merged where a point set is folded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fold:
-    """How an axis goes on beyond its ends: around, or reflected at two lines.
+    """Continuation of an axis beyond its ends: periodic, or reflected at two lines.
 
     Attributes
     ----------
     low, high : float
-        The lines: of what lies between them the rest is made. An axis that wraps has the period ``high - low``.
+        The two lines. The points between them determine all others. A periodic axis has the period ``high - low``.
     wrap : bool
-        Around, not reflected.
+        If True, the axis is periodic and not reflected.
 
     """
 
@@ -43,7 +45,7 @@ class Fold:
     __repr__ = brief
 
     def apply(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return what coordinates stand for, between the lines, and whether they are mirrored.
+        """Return the equivalent coordinates between the lines, and whether they are mirrored.
 
         Examples
         --------
@@ -61,9 +63,11 @@ class Fold:
     def copies(
         self, x: NDArray[np.float64], low: float, high: float
     ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the places that stand for each coordinate, (n, turns), the turns, and which places lie in [low, high].
+        """Return the equivalents of each coordinate, the turns, and a mask.
 
-        An odd turn is mirrored, if any is.
+        The equivalents are (n, turns), and the mask marks those in [low, high].
+
+        Odd turns are mirrored if the axis is reflected.
         """
         side = self.high - self.low
         turns = np.arange(math.floor((low - self.low) / side) - 1, math.floor((high - self.low) / side) + 2)
@@ -73,23 +77,24 @@ class Fold:
 
 
 def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
-    """Find the lines at which a layout is reflected along an axis, so that it goes on as it is.
+    """Find the lines at which a layout is reflected along an axis so that it continues naturally.
 
-    Each line is tried at several places around the outermost points; the one is taken where those near it have neighbours
-    as far away as points inside have. In a row of a lattice that is on or midway between its points.
+    Several positions around the outermost points are tried for each line. The best is the one where points near the
+    line have neighbours as far away as points inside. In a row of a lattice this is on a point or midway between two
+    points.
 
     Parameters
     ----------
     points : (n, 2) array
         The layout.
     axis : int
-        Which axis.
+        Number of the axis.
     ends : (float, float)
-        First and last coordinate of the picture.
+        First and last coordinate of the image.
     wrap : bool
-        Whether the picture goes around: then its ends are the lines.
+        If True, the image is periodic and its ends are the lines.
     beyond : bool
-        Whether lines may lie beyond the picture's ends: so for points alone, for whose pixels nobody asks.
+        If True, lines may lie beyond the ends of the image. This is useful for points alone, without pixels.
 
     """
     if wrap:
@@ -104,7 +109,7 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
         outermost, end = float(x.max()), sign * (ends[0] if sign < 0 else ends[1])
         steps = outermost + np.linspace(-0.2, 0.8, 21) * scale
         if not beyond:
-            # The last pixel itself is a line too: reflected there, no pixel is lost.
+            # Try the last pixel as a line too: a reflection there loses no pixel.
             steps = np.append(steps[steps <= end], end)
         costs = [_measure_misfit(points, axis, sign, float(at), scale, inner) for at in steps]
         lines.append(sign * float(steps[int(np.argmin(costs))]))
@@ -117,7 +122,7 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
 
 
 def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: float, inner: Points) -> float:
-    """Return how far the neighbours of points near a line differ from those of points inside."""
+    """Return the difference between the neighbours of points near a line and those of points inside."""
     x = sign * points[:, axis]
     kept = points[x <= line + 0.25 * scale]
     if len(kept) < 3:
@@ -130,7 +135,7 @@ def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: fl
     near = np.flatnonzero(x > line - scale)
     if len(near) == 0:
         return math.inf
-    # Those at the sides lack neighbours wherever the line is.
+    # Leave out points at the sides, because they lack neighbours at any line.
     aside = kept[near, 1 - axis]
     middle = (aside > aside.min() + 0.25 * scale) & (aside < aside.max() - 0.25 * scale)
     near = near[middle] if middle.any() else near
@@ -140,16 +145,16 @@ def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLayout:
-    """A layout that goes on without end.
+    """Layout that continues without end.
 
     Attributes
     ----------
     points : (n, 2) float64
-        The points of the picture.
+        Points of the image.
     folds : (Fold, Fold)
-        How they go on along rows and columns.
+        Continuation along rows and along columns.
     scale : float
-        Their spacing.
+        Spacing of the points.
 
     """
 
@@ -161,19 +166,22 @@ class PointLayout:
 
     @classmethod
     def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> PointLayout:
-        """Find how the layout of a picture goes on."""
+        """Return the layout of an image with its continuation."""
         folds = [find_fold(points, a, (0.0, shape[a] - 1.0), wrap=wrap[a], beyond=beyond) for a in range(2)]
         return cls(points, (folds[0], folds[1]), spacing(points))
 
     def within(self, low: Points, high: Points) -> tuple[Points, NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the points in a box, which of ``points`` each stands for, and along which axes it is mirrored."""
+        """Return the points in a box, and what each repeats.
+
+        This is the index of the repeated point, and the axes along which it is mirrored.
+        """
         along = [self.folds[a].copies(self.points[:, a], float(low[a]), float(high[a])) for a in range(2)]
         which, up, aside = np.nonzero(along[0][2][:, :, None] & along[1][2][:, None])
         if not len(which):
             return np.zeros((0, 2)), np.zeros(0, np.intp), np.zeros((0, 2), bool)
         found = np.stack([along[0][0][which, up], along[1][0][which, aside]], axis=-1)
         turned = np.stack([along[0][1][up], along[1][1][aside]], axis=-1)
-        # Those of the picture itself come first, then by place: who is merged must not hang on the box.
+        # Sort points of the image first, then by position, so that merging does not depend on the box.
         order = np.lexsort((found[:, 1], found[:, 0], turned.any(axis=1)))
         found, which, turned = found[order], which[order], turned[order]
         kept = drop_duplicates(found, turned, MERGE * float(np.median(nearest_distances(self.points, 1))))
@@ -181,9 +189,11 @@ class PointLayout:
         return found[kept], which[kept], mirrored[kept]
 
     def cover(self, low: Points, high: Points) -> tuple[Points, str]:
-        """Return the points in a box, and how the layout goes on there: "lattice", "wrap", "reflected", or "" if it need not.
+        """Return the points in a box, and how the layout continues there.
 
-        What lies on a lattice goes on on it, and not by reflection, which would turn it around where it is oblique.
+        It continues by "lattice", "wrap", "reflected", or "" (not at all).
+
+        A lattice is continued as a lattice, because a reflection would turn an oblique one around.
 
         Examples
         --------
@@ -207,13 +217,13 @@ class PointLayout:
 
 
 def drop_duplicates(points: Points, turn: NDArray[np.intp], apart: float) -> NDArray[np.intp]:
-    """Return which points no earlier one of another turn is nearer to than ``apart``."""
+    """Return a mask of the points that have no earlier point of another turn within ``apart``."""
     from scipy.spatial import cKDTree
 
     dropped = np.zeros(len(points), bool)
     pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
     for first, second in sorted(map(tuple, np.sort(pairs, axis=1).tolist())):
-        # What lies so near within one picture is so in the layout itself.
+        # Points that are this close within one turn are so in the layout itself.
         if not dropped[first] and (turn[first] != turn[second]).any():
             dropped[second] = True
     return np.flatnonzero(~dropped)

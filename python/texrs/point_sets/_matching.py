@@ -1,4 +1,4 @@
-"""Points matched one to one at the least total cost (Eq. 4)."""
+"""One-to-one matching of points at the minimum total cost (Eq. 4)."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from texrs.point_sets._measures import Points
 __all__ = ["match_points"]
 
 DENSE = 1 << 20
-"""Pairs of a source and a target of which all are looked at."""
+"""Maximum number of pairs of a source and a target for which all pairs are considered."""
 NEAR = 64
-"""Of more pairs, so many sources a target, those nearest to it."""
+"""Number of nearest sources that are considered for each target above this limit."""
 TIE = 1e-9
-"""What a later source costs more than the one before: of equal ones the first is taken."""
+"""Additional cost of a source over the one before it, so that the first of equal sources is used."""
 
 
 def match_points(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
-    """Match each target with a source of its own at the least total squared distance (Eq. 4).
+    """Match each target with its own source at the minimum total squared distance (Eq. 4).
 
-    Squared, for the best matching then has no crossings; of equal ones the first is taken.
+    Distances are squared, because the best matching then has no crossings. The first of equal sources is used.
 
     Returns
     -------
     of : (targets) int
-        The source of each target.
+        Source of each target.
     cost : float
         Mean squared distance.
 
     Raises
     ------
     InvalidInput
-        Fewer sources than targets.
+        If there are fewer sources than targets.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def match_points(source: Points, target: Points) -> tuple[NDArray[np.intp], floa
 
 
 def _assign(square: Points) -> NDArray[np.intp]:
-    """Match rows with columns, every pair of which has a cost."""
+    """Match rows with columns. Every pair has a cost."""
     from scipy.optimize import linear_sum_assignment
 
     rows, columns = linear_sum_assignment(square + TIE * np.arange(square.shape[1]))
@@ -66,9 +66,9 @@ def _assign(square: Points) -> NDArray[np.intp]:
 def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
     """Match many targets, each with one of the sources near it.
 
-    A matching whose every pair is among the first half of the near ones is taken: a better one would have to send a target
-    beyond the other half, which pays only where many others gain by it. All pairs would take memory and time as the square
-    and the cube of their number.
+    A matching is accepted if each of its pairs is in the nearer half of the considered ones. A better one would send a
+    target beyond the other half, which only pays if many other targets gain by it. Considering all pairs would need
+    memory quadratic and time cubic in their number.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import min_weight_full_bipartite_matching
@@ -77,7 +77,7 @@ def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
     tree, count = cKDTree(source), NEAR
     while count < len(source):
         far, near = tree.query(target, k=count)
-        # A cost of nothing would be no pair.
+        # The sparse solver takes a zero cost for a missing pair.
         cost = 1 + far**2 + TIE * near
         pairs = csr_array(
             (cost.ravel(), near.ravel(), np.arange(len(target) + 1) * count), shape=(len(target), len(source))
@@ -85,7 +85,7 @@ def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
         try:
             of = min_weight_full_bipartite_matching(pairs)[1]
         except ValueError:
-            count *= 4  # Too few sources near some of them.
+            count *= 4  # Some targets have too few sources near them.
             continue
         if not (near[:, count // 2 :] == of[:, None]).any():
             return np.asarray(of, np.intp)

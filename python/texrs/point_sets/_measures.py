@@ -1,4 +1,4 @@
-"""How far apart points lie, and in which directions they line up."""
+"""Distances between points, and the directions in which they are aligned."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ __all__ = ["Points", "directions", "mark_inner", "nearest_distances", "spacing"]
 Points = NDArray[np.float64]
 
 NEIGHBOURS = 5
-"""k of the scale normalisation: the paper says between 4 and 6."""
+"""Number k of neighbours of the scale normalisation. The paper says 4 to 6."""
 INSIDE = 0.5
-"""Points farther from the outermost one along every axis than so many distances to the nearest are inner ones."""
+"""Minimum distance of an inner point from the outermost ones along every axis, in nearest-point distances."""
 PEAK, CLEAR = 1.3, 6.0
-"""How far a direction must stand out: from the median one, and in spreads of all directions."""
+"""Minimum prominence of a direction: above the median direction, and in standard deviations of all directions."""
 FINE, COARSE = 0.15, 0.8
-"""Widths, in spacings, of the Gaussians that points are drawn as: lines show at the first, outlines at both."""
+"""Widths in spacings of the Gaussians that draw the points. Lines are visible at the first width, outlines at both."""
 FEW = 4096
-"""Pairs of points whose distances are worked out, all of them."""
+"""Maximum number of pairs of points for which all distances are computed."""
 WIDE_BINS = 64
-"""Room at the ends for the wider ones."""
+"""Additional bins at the ends for the wider Gaussians."""
 
 
 def nearest_distances(points: Points, count: int, among: Points | None = None) -> Points:
-    """Return the distances to the ``count`` nearest points, (n, count); to others of ``points`` itself by default."""
+    """Return the distances to the ``count`` nearest points, (n, count), by default within ``points``."""
     from scipy.spatial import cKDTree
 
     own = among is None
     if among is not None and count <= len(among) and len(points) * len(among) <= FEW:
-        # The same distances, without the time that a tree takes to grow.
+        # Compute all distances of few points directly, which is faster than building a tree.
         rows, columns = (points[:, None, axis] - among[None, :, axis] for axis in range(2))
         squared = np.partition(rows * rows + columns * columns, count - 1, axis=1)[:, :count]
         squared.sort(axis=1)
@@ -43,7 +43,7 @@ def nearest_distances(points: Points, count: int, among: Points | None = None) -
 
 
 def spacing(points: Points, count: int = NEIGHBOURS) -> float:
-    """Return the median over inner points of the mean distance to the nearest ones: borders bias it less than the mean.
+    """Return the median over inner points of the mean distance to the nearest points.
 
     Examples
     --------
@@ -60,17 +60,18 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
 
 
 def mark_inner(points: Points, far: Points) -> NDArray[np.bool_]:
-    """Mark the points that are not the outermost, or all if there is no other: half of the neighbours of these are missing."""
+    """Return a mask of the points that are not outermost, or of all if there are no others."""
     edge = INSIDE * float(np.median(far[:, 0]))
     found: NDArray[np.bool_] = ((points > points.min(axis=0) + edge) & (points < points.max(axis=0) - edge)).all(axis=1)
     return found if found.any() else ~found
 
 
 def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
-    """Return the directions in which points line up: degrees in [0, 180) from the columns' axis to the rows', strongest first.
+    """Return the directions in which points are aligned, in degrees in [0, 180), strongest first.
 
-    A Radon transform of the points, drawn as Gaussians of .15 spacings: where lines of points are seen end on, it varies
-    most [1]_. Empty where no direction stands out.
+    Angles go from the axis of the columns to the axis of the rows. The method is a Radon transform of the points,
+    drawn as Gaussians of 0.15 spacings. It varies most where lines of points are seen end on [1]_. The result is empty
+    if no direction is prominent.
 
     References
     ----------
@@ -87,7 +88,7 @@ def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
     """
     scale = spacing(points)
     away = points - points.mean(axis=0)
-    # Points within a disc: the outline of any other shape has directions of its own.
+    # Use the points within a disc, because other outlines have directions of their own.
     radius = np.hypot(*away.T)
     disc = away[radius <= max(float(np.abs(away).max(axis=0).min()), 2.5 * scale)]
     if len(disc) < 8:
@@ -101,7 +102,7 @@ def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
     fine, coarse = (
         s * (smooth(counts.astype(np.float64), (0, s / 0.05), mode="constant") ** 2).sum(axis=1) for s in (FINE, COARSE)
     )
-    # Against the outline of the whole: a cloud without lines varies as much at both widths.
+    # Compare with the outline of the whole: a cloud without lines varies equally at both widths.
     power = fine / coarse
     usual = float(np.median(power))
     spread = 1.4826 * float(np.median(np.abs(power - usual)))

@@ -1,26 +1,29 @@
-"""Patches of pictures stitched into a texture of any size.
+"""Quilting: patches of images stitched into a texture of any size.
 
-Raster order after Efros and Freeman, "Image quilting", SIGGRAPH 2001: each patch is cut into what lies there along the
-least seam. On a cyclic axis the last patch meets the first one again, so it is chosen and cut to fit both
-its neighbours.
+Patches are placed in raster order after Efros and Freeman, "Image quilting", SIGGRAPH 2001. Each patch is cut into the
+existing texture along the minimum seam. On a periodic axis the last patch meets the first one, so it is chosen and cut
+to fit both neighbours.
 
 Departures, with their reasons:
 
-- A patch is cut into all that it overlaps at once, by the minimum cut of the stitcher (`texrs._engine.stitcher`), not into one
-  strip for each neighbour and row by row. What the seams cost that it covers is known: they are covered where that pays.
-- Costs are squared differences, which keep seams out of edges that do not meet. Divided by the local gradient, as Kwatra et al.
-  have it, they lead the seams along strong edges, and what is left of the seams shows there.
-- A seam also costs the depth inside of elements of the two pixels that meet. With that, differences at seams are 1.12 times the
-  usual over 22 textures, and .8 % beyond the 99th percentile; with plain differences in strips 1.32 and 2 %. With the
-  stitcher's cost for colours seldom side by side they are least (.94), but things that look alike are fused: coins, olives.
-- On a lattice a patch also pays for what it does not fit: a seam through plain ground does not show that it is out of step.
-- A patch is charged for showing what others show already, and for going on where a neighbour ends. A charge that
-  multiplies the match would let the exact continuation of a neighbour, whose match costs nothing, win for ever.
-- What lies in courses is quilted along them alone: its pictures are laid so that their joints lie at the same places.
-- In large textures rows of patches follow each other at a distance of two patches, so that several are cut in side by side;
-  each is charged for what was repeated before all of these.
-- A patch that shows the mirror image of what it overlaps is refused: along the axis of a mirror the two meet without a
-  seam, and the eye sees nothing else.
+- A patch is cut into everything that it overlaps at once, by the minimum cut of the stitcher
+  (`texrs._engine.stitcher`), instead of one strip for each neighbour and row by row. The costs of the seams that it
+  covers are known: a patch covers them where this lowers the total cost.
+- Costs are squared differences, which keep seams away from edges that do not meet. Division by the local gradient, as
+  in Kwatra et al., leads seams along strong edges, where the rest of the seams is visible.
+- A seam also costs the depth of its two pixels inside elements. With this cost the differences at seams are 1.12 times
+  the usual ones over 22 textures, and 0.8 % are beyond the 99th percentile; with plain differences in strips the
+  figures are 1.32 and 2 %. The stitcher's cost for rarely adjacent colours gives the lowest figure (0.94), but it
+  fuses similar elements such as coins and olives.
+- On a lattice a patch also pays for pixels that do not fit, because a seam through plain background does not show that
+  it is out of step.
+- A patch pays for repeating samples that other patches show, and for continuing exactly where a neighbour ends. A
+  charge that multiplied the match would be zero for the exact continuation, which would always win.
+- A texture with courses is quilted along them only: its images are placed so that their joints coincide.
+- In large textures rows of patches follow each other at a distance of two patches, so that several are cut in
+  parallel. Each pays for repetitions of patches that precede all of these.
+- A patch that shows the mirror image of its overlap is refused. At a mirror axis the two meet without a seam, but the
+  mirror is conspicuous.
 """
 
 from __future__ import annotations
@@ -35,7 +38,9 @@ from texrs.source_map import SourceMap
 __all__ = ["Picture", "quilt"]
 
 LARGE, AT_ONCE = 2**22, 4
-"""Pixels of a texture from which on patches of so many rows are cut in side by side: it takes half the time on two cores."""
+"""Minimum pixels of a texture for cutting several rows of patches in parallel, and the number of rows. It takes half
+the time on two cores.
+"""
 
 
 def quilt(
@@ -49,31 +54,31 @@ def quilt(
     seed: int,
     progress: Callable[[float], object],
 ) -> SourceMap:
-    """Stitch patches of pictures into a texture.
+    """Stitch patches of images into a texture.
 
     Parameters
     ----------
     pictures : sequence of Picture
-        What patches are taken from: pictures that fit each other, made from one exemplar.
+        Images that patches are taken from. They are made from one exemplar and fit each other.
     size : (rows, columns)
         Size of the texture.
     patch, overlap : int
-        Side of a patch and overlap of neighbours, in pixels, the overlap at most half the patch; it grows so that
+        Side of a patch and overlap of neighbours, in pixels. The overlap is at most half the patch, and grows so that
         patches divide the texture evenly.
     wrap : (bool, bool)
-        Axes along which the texture is cyclic.
+        Axes along which the texture is periodic.
     fixed : int, optional
-        Axis along which patches keep the places that they have in the pictures, which then reach as far as the texture, and on
-        by a patch where it is cyclic.
+        Axis along which patches keep their positions in the images. The images must then be as long as the texture,
+        plus a patch if the axis is periodic.
     seed : int
-        Chooses the first patch, and where a cyclic texture begins.
+        Seed that chooses the first patch and the origin of a periodic texture.
     progress : callable
-        Called with the share that is done.
+        Called with the completed share.
 
     Returns
     -------
     SourceMap
-        It looks into the exemplars.
+        Source map into the exemplars.
 
     """
     sides = [min(p.colours.shape[axis] for p in pictures) for axis in range(2)]
@@ -86,9 +91,9 @@ def quilt(
         first.corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
         for axis, n in enumerate(free)
     )
-    progress(0.0)  # A small texture is done before the kernel first asks.
+    progress(0.0)  # A small texture is finished before the kernel first reports.
     place, label = stitch(pictures, size, wrap, fixed, (first, which, (row, column)), waves, progress)
     progress(1.0)
-    # A cyclic texture may begin anywhere.
+    # A periodic texture may begin anywhere.
     rolled = {axis: uniform(seed, axis, 0, 0, 6) for axis in range(2) if wrap[axis]}
     return finish(pictures, place, label, rolled)

@@ -1,4 +1,4 @@
-"""What a quilt is made from, and what becomes of it: the patches themselves are chosen and cut in by compiled code."""
+"""Input and result of a quilt. Compiled code chooses and cuts the patches."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from texrs.source_map import SourceMap
 from texrs.source_map._pixels import Pixels
 
 COLOUR, DEPTH = 1.0, 1.0
-"""What a seam costs: squared differences of the colours, and the depth inside of elements of the pixels that meet there."""
+"""Weights of a seam: of squared colour differences, and of the depth of its pixels inside elements."""
 CELL = 8
-"""Use is counted in cells of so many pixels a side."""
+"""Side of the cells in which use is counted, in pixels."""
 CALM, RUN = 64, 9
-"""Lines that are looked at for a calm one; pixels of a line that make a visible piece of an edge."""
+"""Number of lines that are searched for a calm one, and length in pixels of a visible piece of an edge."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """What patches are taken from: a picture made from one exemplar."""
+    """Image that patches are taken from, made from one exemplar."""
 
     colours: Floats
     """(h, w, C)"""
     source: SourceMap
     depth: Floats
-    """(h, w): how deep inside an element each pixel is, 0 between elements, where seams are cheap."""
+    """(h, w): depth of each pixel inside an element; 0 between elements, where seams are cheap."""
     regular: bool = False
-    """Whether it repeats on a lattice."""
+    """Whether the texture repeats on a lattice."""
     lattice: NDArray[np.float64] | None = None
-    """(2, 2): the lattice, a shift (row, column) in each column, where the texture has it too."""
+    """(2, 2): the lattice, a shift (row, column) in each column, if the texture has one."""
 
 
 def stitch(
@@ -47,25 +47,25 @@ def stitch(
     waves: Sequence[Sequence[Window]],
     progress: Callable[[float], object],
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Fill a texture with patches: one laid whole, then one cut into each window.
+    """Fill a texture with patches: one is placed whole, then one is cut into each window.
 
-    The pixels of all pictures stand in one row; what a texture shows at a pixel is a place in that row.
+    The pixels of all images are in one row. The source of an output pixel is its position in this row.
 
     Parameters
     ----------
     pictures, size, wrap, fixed
-        As for `texrs.quilting.quilt`.
+        As in `texrs.quilting.quilt`.
     first : (Window, int, (int, int))
-        A window, and the picture and the place in it whose patch it shows.
+        A window, and the image and the position in it of the window's patch.
     waves : sequence of sequences of Window
-        The others: those of a wave lie apart, and are chosen side by side.
+        The other windows. Those of a wave are apart from each other and are chosen in parallel.
     progress : callable
-        Called with the share that is done.
+        Called with the completed share.
 
     Returns
     -------
     place, label : (H, W) uint32
-        The place in the row that each pixel shows, and the number of its patch.
+        Position in the row of each pixel, and the number of its patch.
 
     """
     channels = pictures[0].colours.shape[2]
@@ -100,10 +100,10 @@ def finish(
     label: NDArray[np.uint32],
     rolled: Mapping[int, float],
 ) -> SourceMap:
-    """Return the map into the exemplars; the arrays are used up.
+    """Return the source map into the exemplars. The arrays are consumed.
 
-    The axes in ``rolled`` begin at one of the calm lines, so that the border of the texture does not follow an edge: at
-    the first one for 0, and at the last for 1.
+    Axes in ``rolled`` begin at a calm line, so that the border of the texture does not follow an edge. They begin at the
+    first calm line for 0, and at the last one for 1.
     """
     channels = pictures[0].colours.shape[2]
     colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
@@ -111,14 +111,14 @@ def finish(
         lines = np.moveaxis(place, axis, 0)
         found = find_calm_lines(colours[lines[: CALM + 1]])
         start = found[int(chance * len(found))]
-        # One after the other, so that no more than one is there twice.
+        # Process one array after the other, so that at most one exists twice.
         place = np.roll(place, -start, axis)
         label = np.roll(label, -start, axis)
     return SourceMap.pick([p.source for p in pictures], place, label, overwrite=True)
 
 
 def number_cells(source: SourceMap) -> NDArray[np.int64]:
-    """Return the number of the cell of the exemplars that each pixel shows."""
+    """Return the number of the exemplar cell that each pixel shows."""
     which = int(source.exemplar[0, 0])
     first = sum((h // CELL + 1) * (w // CELL + 1) for h, w in source.shapes[:which])
     cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // CELL
@@ -127,7 +127,7 @@ def number_cells(source: SourceMap) -> NDArray[np.int64]:
 
 
 def mark_hands(source: SourceMap) -> Bools:
-    """Mark the pixels that show an exemplar, and not its mirror image."""
+    """Return a mask of the pixels that show an exemplar and not its mirror image."""
     frame = source.jacobian_array()
     if frame is None:
         return np.ones(source.shape, np.bool_)
@@ -136,7 +136,7 @@ def mark_hands(source: SourceMap) -> Bools:
 
 
 def find_calm_lines(lines: Floats) -> list[int]:
-    """Return the lines that differ from the one before them as usual, rather less than more, and no more at their worst."""
+    """Return the lines whose difference from the previous line is at most usual, on average and at the maximum."""
     from scipy.ndimage import uniform_filter1d
 
     jumps = np.abs(np.diff(lines, axis=0)).mean(axis=-1)

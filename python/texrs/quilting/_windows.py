@@ -1,4 +1,4 @@
-"""Where the patches of a quilt lie."""
+"""Windows of the patches of a quilt."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from itertools import pairwise
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """The part of an axis that a patch covers, and its overlaps with patches that lie there already."""
+    """The part of an axis that a patch covers, and its overlaps with patches that are already there."""
 
     start: int
     extent: int
     before: int
-    """Overlap in pixels at its beginning."""
+    """Overlap at the beginning, in pixels."""
     after: int
-    """Overlap at its end: not 0 only for the last one of a cyclic axis."""
+    """Overlap at the end. Not 0 only for the last patch of a periodic axis."""
 
 
 def divide_axis(length: int, side: int, patch: int, overlap: int, wrap: bool) -> list[Span]:
-    """Divide an axis evenly into overlapping patches, none longer than ``side``; what one patch covers is one."""
+    """Divide an axis evenly into overlapping patches, none longer than ``side``. A short axis has one patch."""
     if not wrap and length <= patch:
         return [Span(0, length, 0, 0)]
     step = max(1, patch - overlap)
@@ -42,7 +42,7 @@ def divide_axis(length: int, side: int, patch: int, overlap: int, wrap: bool) ->
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Where a patch lies."""
+    """Window of a patch."""
 
     rows: Span
     columns: Span
@@ -54,19 +54,19 @@ class Window:
 
     @property
     def corner(self) -> tuple[int, int]:
-        """Its first row and column."""
+        """First row and column of the patch."""
         return self.rows.start, self.columns.start
 
     def pack(self) -> tuple[tuple[int, int, int, int], tuple[int, int, int, int]]:
-        """Return its spans as plain numbers."""
+        """Return the spans as plain numbers."""
         return astuple(self.rows), astuple(self.columns)
 
 
 def plan_waves(rows: Sequence[Span], columns: Sequence[Span], at_once: int) -> list[list[Window]]:
-    """Return the windows of a texture in the order in which patches are cut into them: those of a wave lie apart.
+    """Return the windows of a texture in the order of cutting. Windows of one wave are apart from each other.
 
-    One after the other in raster order; or so many rows at once, each two patches behind the one above it, so that what
-    a patch overlaps, but for what a cyclic axis has beyond its end, lies there already.
+    The order is raster order, or several rows at once, each two patches behind the row above. Then all patches that a
+    window overlaps exist already, except those beyond the end of a periodic axis.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def plan_waves(rows: Sequence[Span], columns: Sequence[Span], at_once: int) -> l
     [[(0, 0)], [(0, 1)], [(0, 2), (1, 0)], [(0, 3), (1, 1)]]
 
     """
-    # With a pixel beside each: where every second one meets, patches are too near to each other.
+    # Add a pixel around each window: at half a patch of distance windows are too close to each other.
     apart = all(b.start - a.start >= a.extent + 2 for a, b in zip(columns, columns[2:], strict=False))
     if at_once == 1 or not apart or len(columns) < 2 * at_once + 2:
         return [[Window(r, c)] for r in rows for c in columns]
