@@ -156,7 +156,7 @@ def test_engines_read_what_is_saved(stones: texrs.TileSet, tmp_path: Path) -> No
 def test_wrong_arguments(tiles: texrs.TileSet) -> None:
     for call, message in (
         (lambda: texrs.TileSet(DOTS, 30), "tile_size: needs an integer from 32"),
-        (lambda: texrs.TileSet(DOTS, 50), "side: needs a multiple of 4"),
+        (lambda: texrs.TileSet(DOTS, 50), "tile_size: needs a multiple of 4"),
         (lambda: texrs.TileSet(DOTS, 48, variants=0), "variants"),
         (lambda: texrs.TileSet(DOTS, 48, wrap=True), "wrap: is given by tile_size"),
         (lambda: tiles.window((0, 10**16), 5), "origin"),

@@ -20,7 +20,7 @@ def samples_of_each_kind() -> Parts:
     made = {
         name: sample(name, *((32, 36, 40) if name in solid else (56, 72)), seed=7) for name in texrs.samples.names()
     }
-    answers = ("image", "centres", "labels", "mask", "scale_map", "frames")
+    answers = ("image", "centres", "labels", "mask", "scale_map", "jacobians")
     return {f"{name} {part}": getattr(each, part) for name, each in made.items() for part in answers}
 
 
