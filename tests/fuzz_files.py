@@ -84,7 +84,7 @@ def make_files(folder: Path) -> Iterator[tuple[Path, list[Reader]]]:
         (folder / name).write_bytes(content)
         yield folder / name, either
     sample = texrs.samples.dots((64, 64))
-    source = texrs.synthesize(sample.image, 32).source_map.finished((True, False), screening=0.1)
+    source = texrs.synthesize(sample.image, 32).source_map.with_finish((True, False), screening=0.1)
     source.save(folder / "map.npz")
     yield folder / "map.npz", [texrs.SourceMap.load, limited(tio.read_arrays)]
     texrs.elements.analyse(sample.image, mask=sample.mask, layout="disjoint").save(folder / "entry.npz")

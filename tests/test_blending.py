@@ -51,7 +51,7 @@ def twin(source, image, wrap, screening):
     """The least squares problem written out: one row an edge, one row a pixel."""
     height, width = source.shape
     values = view(source, image)
-    joined = [source.continues(a, wrap=wrap[a]) for a in range(2)]
+    joined = [source.is_coherent(a, wrap=wrap[a]) for a in range(2)]
     frames = source.jacobians()
     fixed = np.zeros(source.shape, bool)
     for axis in range(2):
@@ -165,7 +165,7 @@ def test_seams_of_a_design_are_as_sharp_as_the_example():
     result = texrs.design(image, 160, seed=1, copies=2, motion="keep")
     parted = np.zeros((160, 160), bool)
     for axis in range(2):
-        crosses = ~result.source_map.continues(axis, wrap=True)
+        crosses = ~result.source_map.is_coherent(axis, wrap=True)
         parted |= crosses | np.roll(crosses, 1, axis)
     band = distance_transform_edt(~parted) < 3
 

@@ -170,14 +170,22 @@ def test_maps_of_no_shape_are_refused(shape):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: texrs.SourceMap.pick([], np.zeros((1, 2), np.uint8), np.zeros((1, 2), np.uint32)), "maps: "),
+        (lambda: texrs.SourceMap.from_selection([], np.zeros((1, 2), np.uint8), np.zeros((1, 2), np.uint32)), "maps: "),
         (
-            lambda: texrs.SourceMap.pick([MAP], np.full((1, 2), 6, np.uint8), np.zeros((1, 2), np.uint32)),
+            lambda: texrs.SourceMap.from_selection([MAP], np.full((1, 2), 6, np.uint8), np.zeros((1, 2), np.uint32)),
             "place: 6 is none",
         ),
-        (lambda: texrs.SourceMap.pick([MAP], np.zeros((1, 2)), np.zeros((1, 2), np.uint32)), "place: "),
-        (lambda: texrs.SourceMap.pick([MAP], np.zeros((1, 2), np.uint8), np.zeros((2, 1), np.uint32)), "label: "),
-        (lambda: texrs.SourceMap.pick([MAP, OTHER], np.zeros((1, 2), np.uint8), np.zeros((1, 2), np.uint32)), "maps: "),
+        (lambda: texrs.SourceMap.from_selection([MAP], np.zeros((1, 2)), np.zeros((1, 2), np.uint32)), "place: "),
+        (
+            lambda: texrs.SourceMap.from_selection([MAP], np.zeros((1, 2), np.uint8), np.zeros((2, 1), np.uint32)),
+            "label: ",
+        ),
+        (
+            lambda: texrs.SourceMap.from_selection(
+                [MAP, OTHER], np.zeros((1, 2), np.uint8), np.zeros((1, 2), np.uint32)
+            ),
+            "maps: ",
+        ),
         (lambda: MAP.compose(range(2**60)), "inner: "),
         (lambda: texrs.fields.identity(axes=np.zeros((2, 2))), "axes: "),
         (

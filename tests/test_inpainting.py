@@ -188,7 +188,7 @@ def test_mirrored_patches_turn_normals():
     plain = texrs.inpaint(PEBBLES, HOLE, allow_mirror=False).source_map
     assert (plain.jacobians() == np.eye(2)).all()
     # Along a patch coordinates run as its frame says.
-    joined = result.source_map.continues(1)[:, :-1]
+    joined = result.source_map.is_coherent(1)[:, :-1]
     same = result.source_map.label[:, 1:] == result.source_map.label[:, :-1]
     assert joined[same].all()
 

@@ -100,7 +100,7 @@ def test_crisp_seams_are_ranked_over_fogged_ones(name):
     soft = ndimage.gaussian_filter(crisp, (2, 2) + (0,) * (crisp.ndim - 2))
     at_seam = np.zeros((160, 160), bool)
     for axis in range(2):
-        at_seam |= ~made.source_map.continues(axis)
+        at_seam |= ~made.source_map.is_coherent(axis)
     near = ndimage.binary_dilation(at_seam, iterations=4)
     near = near if crisp.ndim == 2 else near[..., np.newaxis]
     fogged = np.rint(np.where(near, soft, crisp)).astype(np.uint8)

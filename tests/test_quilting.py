@@ -120,7 +120,7 @@ def test_seams_run_between_elements() -> None:
     for known in (np.zeros_like(depth), depth):
         plain = picture(image)
         source = made([Picture(plain.colours, plain.source, known)], size=(192, 192))
-        beside = [~source.continues(axis, wrap=True) for axis in range(2)]
+        beside = [~source.is_coherent(axis, wrap=True) for axis in range(2)]
         crossed.append(np.mean([source.render(depth)[seam].mean() for seam in beside]))
     assert crossed[1] < 0.6 * crossed[0]
 

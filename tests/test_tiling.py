@@ -279,7 +279,7 @@ def test_every_pixel_of_the_result_keeps_its_neighbours_but_at_the_cut():
     made = texrs.tile(picture("pebbles", 128), overlap=(30, 24))
     pieces = made.stages["source_regions"]
     for axis in (0, 1):
-        torn = ~made.source_map.continues(axis)
+        torn = ~made.source_map.is_coherent(axis)
         change = pieces != np.roll(pieces, -1, axis)
         np.testing.assert_array_equal(torn.swapaxes(0, axis)[:-1], change.swapaxes(0, axis)[:-1])
 

@@ -15,7 +15,7 @@ pebbles = texrs.samples.pebbles((160, 160)).image
 result = texrs.design(pebbles, (200, 260), seed=9)
 rows, columns = np.moveaxis(result.source_map.coordinates, -1, 0) / 160
 where = np.stack([rows, columns, 0.7 - 0.5 * (rows + columns) / 2], axis=-1)
-seams = ~(result.source_map.continues(0, wrap=True) & result.source_map.continues(1, wrap=True))
+seams = ~(result.source_map.is_coherent(0, wrap=True) & result.source_map.is_coherent(1, wrap=True))
 drawn = np.where(seams[..., np.newaxis], [255, 255, 255], result.image // 2)
 ramp = np.stack([*np.mgrid[:1:160j, :1:160j], np.zeros((160, 160))], axis=-1)
 ramp[..., 2] = 0.7 - 0.25 * ramp[..., :2].sum(axis=-1)

@@ -164,7 +164,7 @@ def extend(
     places = np.moveaxis(np.indices(sides), 0, -1) - first
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
-    source = source.finished((False, False), antialias=True, **made.finish(screening, lit))
+    source = source.with_finish((False, False), antialias=True, **made.finish(screening, lit))
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
     stages = made.show(canvas, hole) | {"before_blending": source.render(pixels, antialias=True)}

@@ -283,7 +283,7 @@ def list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[np
 
 def find_seam(source: SourceMap, axis: int, wrap: bool) -> Seam:
     """Find the seams that cross an axis."""
-    parted = ~source.continues(axis, wrap=wrap)
+    parted = ~source.is_coherent(axis, wrap=wrap)
     if not wrap:
         np.moveaxis(parted, axis, 0)[-1] = False
     at = np.nonzero(parted)

@@ -137,7 +137,7 @@ def rectify(
     laid, grown = grow(texture, asked, cyclic, number, watch)
     # Seams of a texture that is grown are made to disappear as those of any other.
     rest = {} if laid.finish is None else {"screening": laid.finish.screening, "across": laid.finish.across}
-    source = laid.compose(known).finished(cyclic, interpolation=interpolation, antialias=True, **rest)
+    source = laid.compose(known).with_finish(cyclic, interpolation=interpolation, antialias=True, **rest)
     as_it_is = source.shape == known.shape and not any(cyclic)
     composite = texture if as_it_is else source.render(pixels, interpolation=interpolation, antialias=True)
     squeeze = image.ndim == 2

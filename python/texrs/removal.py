@@ -149,7 +149,7 @@ def remove(
     how = made.finish(screening, (0, 0) if follow else None)
     how |= {"known": (~hole,)} if how else {}
     how |= {"fade": np.rint(255 * fade(inner, asked.feather)).astype(np.uint8)} if asked.feather else {}
-    source = made.source.finished((False, False), **how)
+    source = made.source.with_finish((False, False), **how)
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
     stages = made.show(pixels, hole) | {"before_blending": source.render(pixels)}

@@ -250,7 +250,7 @@ def source_maps() -> Parts:
         "linear": source.render(channels(*args, seed=8), interpolation="linear"),
         "cubic": source.render(clear(*args, seed=8)),
         "normals": source.render(normals(*args, seed=8), map_type="normal"),
-        "continues": source.continues(1, wrap=True),
+        "continues": source.is_coherent(1, wrap=True),
         "jacobians": source.jacobians(),
         "composed coordinates": tiled.coordinates,
         "composed label": tiled.label,

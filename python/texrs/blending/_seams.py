@@ -122,7 +122,7 @@ def measure_outlines(
 
 def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Return the pixels before the seams that cross an axis, and those after them, each as (rows, columns)."""
-    parted = ~source.continues(axis, wrap=wrap)
+    parted = ~source.is_coherent(axis, wrap=wrap)
     if not wrap:
         np.moveaxis(parted, axis, 0)[-1] = False
     at = np.nonzero(parted)

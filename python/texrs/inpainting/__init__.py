@@ -254,7 +254,7 @@ def inpaint(
         how = {"screening": screening, "within": places.label > 0, "known": known}
     if mask.feather:
         how["fade"] = np.rint(255 * fade(marked, mask.feather, cyclic)).astype(np.uint8)
-    places = places.finished(cyclic, **how)
+    places = places.with_finish(cyclic, **how)
     if how:
         result = apply(places, pictures, progress=progress)
     watch("done", 1.0)

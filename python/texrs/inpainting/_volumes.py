@@ -128,7 +128,7 @@ def inpaint_volume(
         "screening": weight or 0.0,
     }
     stages = {"known": bare, "patches": shades, "before_blending": composite}
-    finished = source.finished((False,) * 3, interpolation="nearest")
+    finished = source.with_finish((False,) * 3, interpolation="nearest")
     return Synthesis(result, finished, stages, report)
 
 

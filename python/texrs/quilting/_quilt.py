@@ -114,7 +114,7 @@ def finish(
         # Process one array after the other, so that at most one exists twice.
         place = np.roll(place, -start, axis)
         label = np.roll(label, -start, axis)
-    return SourceMap.pick([p.source for p in pictures], place, label, overwrite=True)
+    return SourceMap.from_selection([p.source for p in pictures], place, label, overwrite=True)
 
 
 def number_cells(source: SourceMap) -> NDArray[np.int64]:

@@ -168,7 +168,7 @@ class SourceMap(Parted):
         patches = np.zeros(sides, np.uint32) if label is None else label
         return cls(coordinates, np.zeros(sides, np.uint16), patches, jacobian, (shape,))
 
-    def finished(self, wrap: Sequence[bool], **how: Any) -> SourceMap:
+    def with_finish(self, wrap: Sequence[bool], **how: Any) -> SourceMap:
         """Return the map of a picture that is finished in a way.
 
         Parameters
@@ -190,7 +190,7 @@ class SourceMap(Parted):
         Examples
         --------
         >>> from texrs import SourceMap
-        >>> SourceMap.identity((2, 3)).finished((True, True), screening=0.15).finish.screening
+        >>> SourceMap.identity((2, 3)).with_finish((True, True), screening=0.15).finish.screening
         0.15
 
         """
@@ -338,7 +338,7 @@ class SourceMap(Parted):
         return SourceMap(*parts, maps[0].shapes)
 
     @classmethod
-    def pick(
+    def from_selection(
         cls,
         maps: Sequence[SourceMap],
         place: NDArray[np.unsignedinteger],
@@ -375,7 +375,7 @@ class SourceMap(Parted):
         >>> from texrs import SourceMap
         >>> picture = SourceMap.identity((2, 3))
         >>> place = np.array([[5, 0]], np.uint32)  # its last pixel and its first
-        >>> SourceMap.pick([picture], place, np.zeros((1, 2), np.uint32)).coordinates.tolist()
+        >>> SourceMap.from_selection([picture], place, np.zeros((1, 2), np.uint32)).coordinates.tolist()
         [[[1.0, 2.0], [0.0, 0.0]]]
 
         """
@@ -400,7 +400,7 @@ class SourceMap(Parted):
             raise InvalidInput(f"place: {int(place.max())} is none of the {count} pixels of all pictures")
         return cls(*Pixels.chain(several).pick(place, label, out=label if overwrite else None), several[0].shapes)
 
-    def continues(self, axis: int, *, wrap: bool = False) -> Bools:
+    def is_coherent(self, axis: int, *, wrap: bool = False) -> Bools:
         """Return where a pixel and the next one along ``axis`` come from one piece of the exemplar.
 
         True where S(p + e) = S(p) + J(p) e within a tenth of a sample, in one exemplar. Along an axis that does not
@@ -426,7 +426,7 @@ class SourceMap(Parted):
         Examples
         --------
         >>> from texrs import SourceMap
-        >>> SourceMap.identity((2, 3)).continues(1)
+        >>> SourceMap.identity((2, 3)).is_coherent(1)
         array([[ True,  True, False],
                [ True,  True, False]])
 

@@ -204,7 +204,7 @@ def join_edges(
     else:
         source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, watch)
     weight = screening if found or larger else 0.0
-    source = source.finished(wrap, screening=weight or None, flatten_lighting=flatten_lighting)
+    source = source.with_finish(wrap, screening=weight or None, flatten_lighting=flatten_lighting)
     composite = source.render(exemplar.image)
     # The picture is in even light already.
     finish = None if source.finish is None else replace(source.finish, flatten_lighting=False)

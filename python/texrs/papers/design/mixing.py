@@ -86,7 +86,7 @@ def mix(
     wanted = draw_territories(shares, size, territory, seed)
     chosen = cut_borders(layers, wanted, extent, wrap)
     place = chosen.astype(np.uint32) * np.uint32(wanted.size) + np.arange(wanted.size, dtype=np.uint32).reshape(size)
-    return SourceMap.pick([layer.source for layer in layers], place, chosen.astype(np.uint32))
+    return SourceMap.from_selection([layer.source for layer in layers], place, chosen.astype(np.uint32))
 
 
 def draw_territories(

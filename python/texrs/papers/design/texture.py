@@ -165,12 +165,12 @@ def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
     """Say how the colours of a texture are corrected so that its seams disappear (section 3.6)."""
     wrap, literal = arguments.wrap, arguments.literal
     if arguments.exemplars[0].labels:
-        return composite.finished(wrap, interpolation="nearest")
+        return composite.with_finish(wrap, interpolation="nearest")
     if not arguments.screening:
-        return composite.finished(wrap)
+        return composite.with_finish(wrap)
     if literal:
-        return composite.finished((False, False), screening=0.0, outlines=False)
-    return composite.finished(wrap, screening=arguments.screening, across=False)
+        return composite.with_finish((False, False), screening=0.0, outlines=False)
+    return composite.with_finish(wrap, screening=arguments.screening, across=False)
 
 
 def look_up(composite: SourceMap, arguments: Arguments) -> Array:

@@ -220,7 +220,7 @@ def perspective(
     )
     source = SourceMap.from_coordinates(
         found.coordinates, asked.exemplar.shape, label=found.patches, jacobian=found.frames
-    ).finished(asked.wrap, interpolation=asked.interpolation, antialias=True)
+    ).with_finish(asked.wrap, interpolation=asked.interpolation, antialias=True)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation, antialias=True)
     stages = {"sheet": laid.sheet.show(asked.exemplar.image), "target": laid.wanted, "before_blending": composite}
     return Synthesis(composite, source, stages, describe(asked, laid, found))

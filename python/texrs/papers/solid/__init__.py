@@ -331,7 +331,7 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
         grown = windows.grow(asked.region, ask=asked.conditions.at, show=show, progress=progress)
     else:
         grown, said = stitch(asked, show, progress)
-    source = as_source(asked, grown).finished(asked.region.wrap, interpolation=asked.interpolation)
+    source = as_source(asked, grown).with_finish(asked.region.wrap, interpolation=asked.interpolation)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
     last = {} if grown.patches else {f"level {len(grown.levels)}": show(grown.places, asked.region, 1)}
     stages = {**grown.stages, **last, "before_blending": composite}

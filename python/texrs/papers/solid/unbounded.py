@@ -192,7 +192,7 @@ class Texture(Endless):
         region = Region(as_size(size, axes=self.axes, way=LARGER[self.axes]), start, (False,) * self.axes)
         self._check(region)
         places, source = self._look(region, progress)
-        source = source.finished(region.wrap, interpolation=self._how)
+        source = source.with_finish(region.wrap, interpolation=self._how)
         image = self._show(places)
         report = {
             "quality": self._quality,
@@ -337,7 +337,7 @@ class Texture(Endless):
 
         """
         source = self._trace(as_points(points, self.axes), listen(progress))
-        return source.finished((False,) * self.axes, interpolation=self._how)
+        return source.with_finish((False,) * self.axes, interpolation=self._how)
 
     def estimate_memory(self, size: int | Sequence[int]) -> int:
         """Return the bytes that a process takes at most, about, that makes windows of a size; beside those of Python itself.
@@ -370,7 +370,7 @@ class Texture(Endless):
         assert self._material is not None
         region = Region(tuple(size), tuple(origin), (False,) * self.axes)
         self._check(region)
-        source = self._look(region, progress)[1].finished(region.wrap, interpolation=self._how)
+        source = self._look(region, progress)[1].with_finish(region.wrap, interpolation=self._how)
         some = Material({name: self._material[name] for name in names}, weights={}, axes=self.axes)
         return apply_materials([some], source, progress)
 
@@ -387,7 +387,7 @@ class Texture(Endless):
         source = self._trace(at, progress)
         name, whole = self._material.base_name, self._material
         used = Material({name: whole[name]}, axes=self.axes) if only_base else whole
-        made = apply_materials([used], source.finished((False,) * self.axes, interpolation=how), progress)
+        made = apply_materials([used], source.with_finish((False,) * self.axes, interpolation=how), progress)
         return {n: m.pixels.reshape((*at.shape[:-1], *m.pixels.shape[self.axes :])) for n, m in made.items()}
 
     def _trace(self, at: NDArray[np.float64], progress: Progress | None) -> SourceMap:

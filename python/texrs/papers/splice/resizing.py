@@ -30,7 +30,7 @@ def crop(a: Elements, size: Sequence[int]) -> Synthesis:
     first = [(n - m) // 2 for n, m in zip(shape, size, strict=True)]
     places = np.moveaxis(np.indices(tuple(size)), 0, -1) + first
     source = SourceMap.from_coordinates(places.astype(np.float32), (shape[0], shape[1]))
-    source = source.finished((False, False), interpolation="nearest")
+    source = source.with_finish((False, False), interpolation="nearest")
     image = source.render(a.image, interpolation="nearest")
     matches = [
         {"target": place, "found": place, "displacement_reached": None, "element": k, "point": list_place(point)}

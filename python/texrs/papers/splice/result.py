@@ -103,9 +103,9 @@ def compose_edit(a: Elements, laid: Rearrangement, *, seed: int, screening: floa
 def say_finish(source: SourceMap, screening: float, within: Bools | None = None) -> SourceMap:
     """Say how the seams of a picture are made to disappear."""
     if not screening:
-        return source.finished((False, False), interpolation="nearest")
+        return source.with_finish((False, False), interpolation="nearest")
     # Between whole pixels nothing is looked up: "linear" is "nearest" that may be corrected.
-    return source.finished((False, False), interpolation="linear", screening=screening, within=within)
+    return source.with_finish((False, False), interpolation="linear", screening=screening, within=within)
 
 
 def correct_colours(a: Elements, source: SourceMap, light: Light | None, field: NDArray[np.float32] | None) -> Array:

@@ -121,7 +121,7 @@ def splice_cells(
         places, frames = refine_charts(a, cells, charts, joined, places, frames, seed, watch)
     source = SourceMap.from_coordinates(
         places, (a.mask.shape[0], a.mask.shape[1]), label=(joined.chart + 1).astype(np.uint32), jacobian=frames
-    ).finished((False, False))
+    ).with_finish((False, False))
     image = source.render(a.image)
     report = {
         "method": "cells",

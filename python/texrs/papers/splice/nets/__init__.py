@@ -123,7 +123,7 @@ def splice_nets(
     number[shown] = np.arange(1, len(shown) + 1)
     label = number[np.minimum(laid.target, np.uint32(len(wanted.points)))]
     source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label)
-    source = source.finished((False, False), interpolation="nearest")
+    source = source.with_finish((False, False), interpolation="nearest")
     image = source.render(a.image, interpolation="nearest")
     report = {
         "method": "nets",
