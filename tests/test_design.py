@@ -219,7 +219,7 @@ def test_a_suspected_light_is_enough_not_to_mirror(monkeypatch):
     noise = np.random.default_rng(3).random((96, 96, 3)).astype(np.float32)
     for sure, count in ((4.4, 4), (4.6, 2), (5.1, 2)):
         monkeypatch.setattr(symmetry, "measure_polarity", lambda guide, sure=sure: (sure, 0.0, 0.0))
-        assert len(texrs.Exemplar(noise + np.float32(sure)).mirrors) == count
+        assert len(texrs.Exemplar(noise + np.float32(sure)).mirror_symmetries) == count
 
 
 def test_elements_at_the_border_slide_along_it():

@@ -18,7 +18,7 @@ def test_pixels_are_kept_as_they_were_given():
     exemplar = texrs.Exemplar(given)
     given[...] = 0
     np.testing.assert_array_equal(exemplar.image, WEAVE)
-    np.testing.assert_array_equal(exemplar.unit, (WEAVE / np.float32(255)).astype(np.float32))
+    np.testing.assert_array_equal(exemplar.normalized, (WEAVE / np.float32(255)).astype(np.float32))
     assert not exemplar.pixels.flags.writeable
     grey = texrs.Exemplar(WEAVE[..., 0])
     assert (grey.image.shape, grey.pixels.shape, grey.shape) == ((48, 48), (48, 48, 1), (48, 48))
@@ -55,10 +55,10 @@ def test_a_fact_of_any_kind_is_remembered():
         made.append(1)
         return None
 
-    assert exemplar.remember(("nothing", 1), make) is None
-    exemplar.remember(("nothing", 1), make)
+    assert exemplar.cached(("nothing", 1), make) is None
+    exemplar.cached(("nothing", 1), make)
     assert made == [1]
-    exemplar.remember(("nothing", 2), make)
+    exemplar.cached(("nothing", 2), make)
     assert made == [1, 1]
 
 

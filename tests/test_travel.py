@@ -33,7 +33,7 @@ def used() -> texrs.Exemplar:
     exemplar.analyse()
     exemplar.segment()
     assert exemplar.stitcher
-    assert exemplar.directedness > 0
+    assert exemplar.anisotropy > 0
     return exemplar
 
 
@@ -80,7 +80,7 @@ def test_it_travels_small_and_is_the_same(name: str, how: Any, monkeypatch: pyte
 def test_small_facts_travel_and_large_ones_do_not() -> None:
     there = used()
     back = pickle.loads(pickle.dumps(there))
-    assert back._facts["directedness"] == there.directedness
+    assert back._facts["anisotropy"] == there.anisotropy
     assert not any(isinstance(fact, tuple) and fact[0] == "analysis" for fact in back._facts)
 
 

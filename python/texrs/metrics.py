@@ -160,7 +160,7 @@ def evaluate(
     if known.axes != 2 or source.shapes != (known.shape,):
         raise InvalidInput(f"source: needs one into a picture of {known.shape}, got one into {source.shapes}")
     cyclic = as_wrap(wrap)
-    traits = known.remember(("traits", elements.key), lambda: measure_traits(known, elements))
+    traits = known.cached(("traits", elements.key), lambda: measure_traits(known, elements))
     seams = [find_seam(source, axis, cyclic[axis]) for axis in range(2)]
     seam_blur = 0.0
     if image is not None:

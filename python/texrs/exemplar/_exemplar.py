@@ -88,7 +88,7 @@ class Exemplar:
 
     See Also
     --------
-    remember : How a further fact is added.
+    cached : How a further fact is added.
 
     Examples
     --------
@@ -152,7 +152,7 @@ class Exemplar:
         return self._pixels.shape[: self._axes]
 
     @cached_property
-    def unit(self) -> Floats:
+    def normalized(self) -> Floats:
         """The pixels in [0, 1], (..., C) float32: integers by the range of their dtype, floats beyond it by their own."""
         return to_unit(self._pixels)
 
@@ -171,12 +171,12 @@ class Exemplar:
     @property
     def labels(self) -> bool:
         """Whether the values are classes without an order."""
-        return self.remember("labels", lambda: are_labels(self._pixels, self._labels))
+        return self.cached("labels", lambda: are_labels(self._pixels, self._labels))
 
     @property
     def repeat(self) -> tuple[bool, ...]:
         """Axes along which the example repeats: as given, or measured at each level of its pyramid."""
-        return self.remember("repeat", lambda: self._measure(count_levels(self.shape, COARSEST)))
+        return self.cached("repeat", lambda: self._measure(count_levels(self.shape, COARSEST)))
 
     def analyse(self, radii: Sequence[int] = (2,), coarsest: int = COARSEST) -> Analysis:
         """Return the pyramid, with the appearance vector of each sample's window at each level.
@@ -211,7 +211,7 @@ class Exemplar:
             raise InvalidInput("radii: needs at least one")
         least = as_int(coarsest, "coarsest", 2 * max(near) + 2, 1 << 16)
         count = count_levels(self.shape, least)
-        return self.remember(
+        return self.cached(
             ("analysis", near, least), lambda: analyse_colours(self.colours, self._measure(count), near, count)
         )
 
@@ -263,7 +263,7 @@ class Exemplar:
         levels = self.analyse(coarsest=coarsest).levels
         number = as_int(level, "level", -len(levels), len(levels) - 1) % len(levels)
         k, n, numbers = as_int(k, "k", 1, 16), as_int(n, "n", 1, 1 << 16), as_int(numbers, "numbers", 1, 1 << 16)
-        return self.remember(
+        return self.cached(
             ("similarity", coarsest, number, k, n, numbers),
             lambda: find_similar(levels[number], k=k, n=n, numbers=numbers, progress=progress),
         )
@@ -272,8 +272,8 @@ class Exemplar:
     def instances(self) -> Instances | None:
         """The separate elements, in two or three axes; None where nothing says for sure that there are any."""
         if self.labels:
-            return self.remember("instances", lambda: as_instances(self._pixels[..., 0], self.repeat))
-        return self.remember("instances", lambda: find_instances(self.colours, self.repeat))
+            return self.cached("instances", lambda: as_instances(self._pixels[..., 0], self.repeat))
+        return self.cached("instances", lambda: find_instances(self.colours, self.repeat))
 
     @property
     def stitcher(self) -> Stitcher:
@@ -281,23 +281,23 @@ class Exemplar:
 
         Where elements are not found for sure, those that `segment` finds in a picture are cut less.
         """
-        return self.remember("stitcher", self._make_stitcher)
+        return self.cached("stitcher", self._make_stitcher)
 
     @property
-    def mirrors(self) -> tuple[Flip, ...]:
+    def mirror_symmetries(self) -> tuple[Flip, ...]:
         """The mirror images that a picture is like, itself first: (rows mirrored, columns mirrored) of each."""
-        return self.remember("mirrors", lambda: find_mirrors(self.guidance, SUSPECT))
+        return self.cached("mirror_symmetries", lambda: find_mirrors(self.guidance, SUSPECT))
 
     @property
-    def directedness(self) -> float:
+    def anisotropy(self) -> float:
         """How much edges agree in direction, or in two at right angles: 0 not at all, 1 wholly.
 
         Of a volume: of that of its three middle planes where they agree most.
         """
         if self._axes == 2:
-            return self.remember("directedness", lambda: measure_direction(self.guidance))
+            return self.cached("anisotropy", lambda: measure_direction(self.guidance))
         planes = (np.take(self.guidance, n // 2, axis) for axis, n in enumerate(self.shape))
-        return self.remember("directedness", lambda: max(measure_direction(plane) for plane in planes))
+        return self.cached("anisotropy", lambda: max(measure_direction(plane) for plane in planes))
 
     def segment(
         self, options: ElementOptions = ElementOptions(), *, progress: Progress | bool | None = None
@@ -330,7 +330,7 @@ class Exemplar:
         """
         progress = listen(progress)
         as_instance(options, "options", ElementOptions)
-        return self.remember(
+        return self.cached(
             ("segmentation", options.key), lambda: segment(self._pixels, options, progress=progress).freeze()
         )
 
@@ -346,11 +346,11 @@ class Exemplar:
         """Digest of the pixels and of what was said of them: the same key, the same facts."""
         return content_hash(self._pixels, self._axes, self._labels, self._repeat).hex()
 
-    def remember(self, fact: Hashable, make: Callable[[], T]) -> T:
+    def cached(self, fact: Hashable, make: Callable[[], T]) -> T:
         """Return a fact about the exemplar, worked out when it is first asked for.
 
         It stays with the exemplar, and is kept for any other of the same content as long as there is room. To add a
-        fact, write a method that returns ``self.remember((name, *options), make)``: whatever the fact depends on, but
+        fact, write a method that returns ``self.cached((name, *options), make)``: whatever the fact depends on, but
         for the pixels and what the exemplar was made with, must be among the options. A fact is never changed.
 
         Parameters
@@ -374,7 +374,7 @@ class Exemplar:
         --------
         >>> from texrs import Exemplar, samples
         >>> known = Exemplar(samples.dots((64, 64)).image)
-        >>> known.remember(("brightest",), lambda: int(known.image.max())) <= 255
+        >>> known.cached(("brightest",), lambda: int(known.image.max())) <= 255
         True
 
         """

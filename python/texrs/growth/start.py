@@ -109,7 +109,7 @@ def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bo
     """
     if bend is not None or not varies:
         return varies and bool(bend)
-    return not exemplar.stitcher.separate and exemplar.directedness >= DIRECTED
+    return not exemplar.stitcher.separate and exemplar.anisotropy >= DIRECTED
 
 
 def weights_of(exemplar: Exemplar) -> Weights:

@@ -167,7 +167,7 @@ class TextureAugment:
         labels = None if mask is None else as_ndarray(mask, "mask")
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
             raise InvalidInput(f"mask: needs the size of the image, {known.shape}, got {labels.shape[:2]}")
-        things = known.remember("things of an augmented picture", lambda: find_things(known))
+        things = known.cached("things of an augmented picture", lambda: find_things(known))
         source = design(known, known.shape, seed=number, wrap=False, motion="keep", elements=things).source_map
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")

@@ -20,7 +20,7 @@ from texrs.papers.design.options import DeformationOptions
 __all__ = ["Plan", "make_plan"]
 
 ROTATE, DIRECTED = 60.0, 0.25
-"""Largest rotation by default, in degrees, and the directedness from which on nothing is turned."""
+"""Largest rotation by default, in degrees, and the anisotropy from which on nothing is turned."""
 BACKGROUND_PLACES = 64
 """Places for a patch of pure background from which on holes are filled with background alone."""
 
@@ -83,7 +83,7 @@ def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Fli
     """Return the mirror images that may be used: those asked for, else those that nothing tells from the exemplar."""
     if options.allow_mirror is None:
         # Who forbids turning knows of an upper side, light or letters, that the statistics may not show.
-        return (NONE,) if options.rotate == 0 else exemplar.mirrors
+        return (NONE,) if options.rotate == 0 else exemplar.mirror_symmetries
     return ALL if options.allow_mirror else (NONE,)
 
 
@@ -100,7 +100,7 @@ def settle_moves(
         # image of what they show.
         return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), allow_mirror=False), (), axes)
     if options.rotate is None:
-        options = replace(options, rotate=ROTATE if exemplar.directedness < DIRECTED else 0.0)
+        options = replace(options, rotate=ROTATE if exemplar.anisotropy < DIRECTED else 0.0)
     return Moves(options, (), axes)
 
 

@@ -83,7 +83,7 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
             made[name], figures[name] = try_plan(way, exemplar, elements, arguments)
         return figures
 
-    tried = exemplar.remember(key, judge_each)
+    tried = exemplar.cached(key, judge_each)
     best = "keep" if tried["keep"]["score"] < CLEARLY * tried["move"]["score"] else "move"
     return replace(ways[best], tried=tried, tiles=made.get(best, ()))
 

@@ -94,7 +94,7 @@ def choose_plan(
         return ("default" if patches == "auto" else patches), None
     stitcher = exemplar.stitcher
     names = [name for name in PLANS if stitcher.separate or stitcher.guessed or not PLANS[name].plain]
-    tried = exemplar.remember(
+    tried = exemplar.cached(
         ("synthesis trials", quality),
         lambda: {name: average([evaluate(exemplar, make(PLANS[name], seed)) for seed in TRIALS]) for name in names},
     )
