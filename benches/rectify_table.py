@@ -38,7 +38,7 @@ from planes_table import floors, told
 def measure(made: texrs.Synthesis, true: texrs.Plane) -> tuple[float, float]:
     """Return the spread of sizes of a flat texture, and by how much things are stretched in the median."""
     at = made.source_map.coordinates[::4, ::4].astype(np.float64)
-    shown = np.linalg.inv(true.unfold(true.flatten(at))) @ made.source_map.jacobians()[::4, ::4]
+    shown = np.linalg.inv(true.projection_jacobians(true.flatten(at))) @ made.source_map.jacobians()[::4, ::4]
     values = np.linalg.svd(shown, compute_uv=False)
     return float(np.log(values).mean(axis=-1).std()), float(np.median(values[..., 0] / values[..., 1]))
 

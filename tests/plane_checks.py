@@ -58,7 +58,7 @@ def look(
     grid = np.moveaxis(np.indices((rows * OVER, columns * OVER)), 0, -1) / OVER + (1 / OVER - 1) / 2
     rng = np.random.default_rng(seed)
     at = plane.flatten(grid)
-    frames = np.linalg.inv(plane.unfold(at)) / OVER
+    frames = np.linalg.inv(plane.projection_jacobians(at)) / OVER
     # What the sample does not wrap is a line that the checks do not see.
     places = np.clip((at + rng.uniform(0, SIDE, 2)) % SIDE, 0, SIDE - 1).astype(np.float32)
     shown = SourceMap.from_coordinates(places, (SIDE, SIDE), jacobian=frames.astype(np.float32)).render(

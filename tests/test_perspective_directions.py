@@ -87,7 +87,7 @@ def test_on_a_plane_it_turns_there():
     flat = {}
     for name, source in (("straight", straight), ("turned", turned)):
         at, frames = source.coordinates.astype(float), source.jacobians().astype(float)
-        away, wide = at - own.middle, own.width(at)[..., None, None]
+        away, wide = at - own.principal_point, own.width(at)[..., None, None]
         fold = own._affine / wide - (away @ own._affine.T)[..., :, None] * own._rise / wide**2
         flat[name] = fold @ frames
     c, s = np.cos(np.radians(30)), np.sin(np.radians(30))

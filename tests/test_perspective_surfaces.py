@@ -31,14 +31,16 @@ def derive(values):
 
 
 def test_a_plane_s_jacobians_are_the_derivatives():
-    plane = Plane((40, 56), 48, 30, 50, turn=20)
+    plane = Plane((40, 56), 48, 30, 50, rotation=20)
     grid = np.moveaxis(np.indices((40, 56)), 0, -1).astype(float)
     step = 1e-5
     by = [(plane.flatten(grid + step * e) - plane.flatten(grid - step * e)) / (2 * step) for e in EYE]
     np.testing.assert_allclose(plane.jacobians(), np.stack(by, axis=-1), rtol=1e-6, atol=1e-7)
     # And those of `project` undo them.
     np.testing.assert_allclose(
-        plane.unfold(plane.flatten(grid)) @ plane.jacobians(), np.broadcast_to(EYE, (40, 56, 2, 2)), atol=1e-9
+        plane.projection_jacobians(plane.flatten(grid)) @ plane.jacobians(),
+        np.broadcast_to(EYE, (40, 56, 2, 2)),
+        atol=1e-9,
     )
 
 
@@ -188,7 +190,7 @@ def test_one_floor_laid_on_another():
     # From the texture of the one to that of the other: what the frames undo on the exemplar's plane is what the target asks.
     at, frames = made.source_map.coordinates.astype(float), made.source_map.jacobians().astype(float)
     flat = Plane((128, 128), own.slant, own.tilt, own.fov)
-    away = at - flat.middle
+    away = at - flat.principal_point
     wide = flat.width(at)[..., None, None]
     fold = flat._affine / wide - (away @ flat._affine.T)[..., :, None] * flat._rise / wide**2
     np.testing.assert_allclose(fold @ frames, other.jacobians(), atol=0.03, rtol=0.03)
@@ -203,7 +205,7 @@ def test_a_plane_laid_on_itself_is_seen_as_it_was():
     sheet = Flattened.of(texrs.Exemplar(floor).guidance, slope, plane.scale_map())
     bent = sheet.bend(plane.jacobians(), plane.scale_map()).reshape(128, 128, 2, 2) / ONE
     grid = np.moveaxis(np.indices((128, 128)), 0, -1).astype(float)
-    seen = slope.unfold(slope.flatten(grid)) / sheet.resolution
+    seen = slope.projection_jacobians(slope.flatten(grid)) / sheet.resolution
     together = (seen @ bent)[plane.scale_map() > 0.4]
     np.testing.assert_allclose(together, np.broadcast_to(EYE, together.shape), atol=0.01)
 

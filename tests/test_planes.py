@@ -12,7 +12,7 @@ from texrs.planes._find import trust
 from texrs.planes._lines import Lines, find_lines, lean
 
 FLOOR = Plane((240, 320), slant=50, tilt=70, fov=55)
-TURNED = Plane((240, 320), slant=50, tilt=70, fov=55, turn=20)
+TURNED = Plane((240, 320), slant=50, tilt=70, fov=55, rotation=20)
 POINTS = np.random.default_rng(0).uniform((60, 0), (239, 319), (40, 2))
 
 
@@ -25,9 +25,9 @@ def test_there_and_back(plane: Plane) -> None:
     np.testing.assert_allclose(lifted[:, :2] / lifted[:, 2:], there, atol=1e-8)
     step = 1e-5
     slopes = [(plane.project(there + step * way) - plane.project(there - step * way)) / (2 * step) for way in np.eye(2)]
-    np.testing.assert_allclose(plane.unfold(there), np.stack(slopes, axis=-1), atol=1e-6)
+    np.testing.assert_allclose(plane.projection_jacobians(there), np.stack(slopes, axis=-1), atol=1e-6)
     # Areas are seen as the frames say: as the power 3/2 of widths.
-    areas = np.sqrt(np.abs(np.linalg.det(plane.unfold(there))))
+    areas = np.sqrt(np.abs(np.linalg.det(plane.projection_jacobians(there))))
     np.testing.assert_allclose(areas / plane.width(points) ** 1.5, np.cos(np.radians(plane.slant)) ** 0.5)
 
 
@@ -55,7 +55,7 @@ def test_all_ways_to_say_it_are_one_plane() -> None:
 
 @pytest.mark.parametrize("turn", [-40.0, 0.0, 45.0])
 def test_a_rectangle_lies_level(turn: float) -> None:
-    plane = Plane((240, 320), slant=50, tilt=70, fov=55, turn=turn)
+    plane = Plane((240, 320), slant=50, tilt=70, fov=55, rotation=turn)
     corners = plane.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])
     found = Plane.of_corners(plane.shape, corners)
     flat = found.flatten(corners)

@@ -62,7 +62,7 @@ def test_normals_turn_with_the_plane() -> None:
     right = np.empty((*PLANE.shape, 3), np.uint8)
     right[...] = np.rint((np.array([0.6, 0.0, 0.8]) + 1) * 127.5)
     for turn, leans in ((0, (0.6, 0.0)), (90, (0.0, 0.6)), (180, (-0.6, 0.0))):
-        source = texrs.rectify(FLOOR, view=Plane(PLANE.shape, 0, 90, turn=turn)).source_map
+        source = texrs.rectify(FLOOR, view=Plane(PLANE.shape, 0, 90, rotation=turn)).source_map
         found = texrs.apply(source, right, map_type="normal") / 127.5 - 1
         np.testing.assert_allclose(found.reshape(-1, 3).mean(axis=0), (*leans, 0.8), atol=0.02)
         # Heights are numbers, and only move.

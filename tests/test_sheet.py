@@ -8,7 +8,7 @@ import texrs
 from texrs import SourceMap, samples, scale_maps
 from texrs._engine.pyramid import ONE
 from texrs.exemplar.sheet import Copies, Flattened, find_plane
-from texrs.scale_maps._plane import Plane
+from texrs.scale_maps._slope import Slope
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def disc_floor():
 @pytest.mark.parametrize("tilt", [90, 35, -112])
 def test_a_plane_is_recovered_and_its_projection_undone(tilt):
     scale = scale_maps.from_angles((60, 90), 55, tilt)
-    plane = Plane.fit(scale)
+    plane = Slope.fit(scale)
     assert plane is not None
     assert plane.residual < 1e-4
     grid = np.moveaxis(np.indices(scale.shape), 0, -1)
@@ -34,25 +34,25 @@ def test_a_plane_is_recovered_and_its_projection_undone(tilt):
 
 
 def test_the_jacobians_are_the_derivatives():
-    plane = Plane.fit(scale_maps.from_angles((40, 50), 50, 60))
+    plane = Slope.fit(scale_maps.from_angles((40, 50), 50, 60))
     points = plane.flatten(np.moveaxis(np.indices((40, 50)), 0, -1)[5:-5:7, 5:-5:7])
     step = 1e-6
     by = [(plane.project(points + step * e) - plane.project(points - step * e)) / (2 * step) for e in np.eye(2)]
-    np.testing.assert_allclose(plane.unfold(points), np.stack(by, axis=-1), rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(plane.projection_jacobians(points), np.stack(by, axis=-1), rtol=1e-4, atol=1e-4)
 
 
 def test_a_plane_seen_as_it_is_stays_as_it_is():
     scale = scale_maps.from_angles((40, 50), 50, 60)
-    plane = Plane.fit(scale)
+    plane = Slope.fit(scale)
     grid = np.moveaxis(np.indices((40, 50)), 0, -1)
-    together = plane.unfold(plane.flatten(grid)) @ plane.jacobians(scale, plane)
+    together = plane.projection_jacobians(plane.flatten(grid)) @ plane.jacobians(scale, plane)
     np.testing.assert_allclose(together, np.broadcast_to(np.eye(2), together.shape), atol=2e-3)
 
 
 def test_what_is_seen_along_a_ramp_fits_together_and_stands_as_it_stood():
-    plane = Plane.fit(scale_maps.from_angles((40, 50), 50, 60))
+    plane = Slope.fit(scale_maps.from_angles((40, 50), 50, 60))
     turned = scale_maps.from_angles((40, 50), 50, 80)
-    other = Plane.fit(turned)
+    other = Slope.fit(turned)
     frames = plane.jacobians(turned, other)
     # Derivatives of one map: along rows of what is along columns, and the other way round.
     curl = np.gradient(frames[..., 1], axis=0) - np.gradient(frames[..., 0], axis=1)
@@ -63,14 +63,14 @@ def test_what_is_seen_along_a_ramp_fits_together_and_stands_as_it_stood():
 
 def test_round_things_are_no_plane_however_well_a_map_fits():
     image, scale = checks.floor((160, 160))
-    fitted = Plane.fit(scale)
+    fitted = Slope.fit(scale)
     exact = np.asarray(fitted.scales(np.moveaxis(np.indices(scale.shape), 0, -1)), np.float32)
     assert find_plane(texrs.Exemplar(image).guidance, exact) is None
 
 
 def test_a_map_that_hardly_varies_is_no_plane():
-    assert Plane.fit(np.ones((20, 20), np.float32)) is None
-    assert Plane.fit(scale_maps.from_angles((20, 20), 5, 90)) is None
+    assert Slope.fit(np.ones((20, 20), np.float32)) is None
+    assert Slope.fit(scale_maps.from_angles((20, 20), 5, 90)) is None
 
 
 def test_round_things_that_get_smaller_are_no_plane(disc_floor):
@@ -82,7 +82,7 @@ def test_round_things_that_get_smaller_are_no_plane(disc_floor):
     assert areas.slope == pytest.approx(find_plane(texrs.Exemplar(image).guidance, scale).slope, rel=1e-3)
     # A measured map strays, but edges tell.
     rough = scale * np.exp(0.05 * np.sin(np.arange(128) / 3))[:, np.newaxis].astype(np.float32)
-    assert Plane.fit(rough).residual > 0.03
+    assert Slope.fit(rough).residual > 0.03
     assert find_plane(texrs.Exemplar(image).guidance, rough) is not None
     round_, theirs = checks.floor((128, 128))
     assert find_plane(texrs.Exemplar(round_).guidance, theirs) is None

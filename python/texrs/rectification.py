@@ -247,7 +247,7 @@ def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resoluti
     most = np.array(plane.shape) - 1
     flat = low + np.moveaxis(np.indices(sides), 0, -1) / resolution
     with np.errstate(invalid="ignore", divide="ignore"):
-        at, frames = plane.project(flat), plane.unfold(flat) / resolution
+        at, frames = plane.project(flat), plane.projection_jacobians(flat) / resolution
         inside: Bools = np.asarray(((at >= 0) & (at <= most)).all(axis=-1))
     at[~inside], frames[~inside] = 0, np.eye(2)
     return SourceMap.from_coordinates(at.astype(np.float32), plane.shape, jacobian=frames.astype(np.float32)), inside
@@ -267,7 +267,7 @@ def level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
     fourth = complex((slope**4 / np.maximum(energy, 1e-300)).sum()) / total
     if abs(fourth) < COURSES:
         return plane
-    return replace(plane, turn=float(f"{plane.turn - np.degrees(np.angle(fourth)) / 4:.5g}"))
+    return replace(plane, rotation=float(f"{plane.rotation - np.degrees(np.angle(fourth)) / 4:.5g}"))
 
 
 def find_rectangle(mask: Bools) -> tuple[int, int, int, int]:

@@ -26,7 +26,7 @@ from texrs.exemplar.instances import Instances, find_instances, label_components
 from texrs.exemplar.stitching import make_stitcher
 from texrs.kernels.gather import gather
 from texrs.scale_maps._kinds import AREAS, Kind, find_kind
-from texrs.scale_maps._plane import Plane
+from texrs.scale_maps._slope import Slope
 
 __all__ = ["OPEN", "Copies", "Flattened", "Sheet", "code", "find_plane", "measure_seen", "multiply", "round_frames"]
 
@@ -177,14 +177,14 @@ class Flattened(Sheet):
 
     """
 
-    plane: Plane
+    plane: Slope
     origin: tuple[float, float]
     resolution: float
 
     weight, guide, excess, heal = 1.0, 0.1, EXCESS, False
 
     @classmethod
-    def of(cls, colours: Floats, plane: Plane, target: Floats, known: Bools | None = None) -> Flattened:
+    def of(cls, colours: Floats, plane: Slope, target: Floats, known: Bools | None = None) -> Flattened:
         """Flatten an exemplar, as finely as a target needs; all of it where only part is known."""
         shape = (colours.shape[0], colours.shape[1])
         resolution = min(float(np.sqrt(np.prod(np.quantile(target, [FINE, 1 - FINE])))), plane.largest)
@@ -245,7 +245,7 @@ class Flattened(Sheet):
         self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
     ) -> NDArray[np.int16]:
         """Return the Jacobians of the plane, seen as large as a map says."""
-        other = None if any(wrap) or min(target.shape) < 2 else Plane.fit(target)
+        other = None if any(wrap) or min(target.shape) < 2 else Slope.fit(target)
         if other is None or other.order(target) > PLANAR:
             frames = self.plane.jacobians(target, foreshortened=HALF)
         else:
@@ -270,7 +270,7 @@ class Flattened(Sheet):
         """Return the coordinates, and how the plane is seen there."""
         points = places / (ONE * self.resolution) + np.array(self.origin)
         at = np.clip(self.plane.project(points), 0, np.array(self.shape) - 1)
-        seen = self.plane.unfold(points) / self.resolution
+        seen = self.plane.projection_jacobians(points) / self.resolution
         return at.astype(np.float32), seen.astype(np.float32)
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
@@ -398,7 +398,7 @@ def lay_out(copy: Copy) -> Floats:
     return np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
 
 
-def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -> Plane | None:
+def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -> Slope | None:
     """Return the plane that an exemplar is a picture of, if the evidence is good enough.
 
     A map may hold the widths of elements, or the square roots of their areas, which are the 3/2 power of those; the plane is
@@ -408,8 +408,8 @@ def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -
     been fitted to what is none.
     """
     holds = find_kind(scale) if scale_kind is None else scale_kind
-    plane = Plane.fit(scale, AREAS if holds == "area" else 1.0)
-    other = Plane.fit(scale, AREAS) if holds is None else None
+    plane = Slope.fit(scale, AREAS if holds == "area" else 1.0)
+    other = Slope.fit(scale, AREAS) if holds is None else None
     if plane is not None and other is not None and other.residual < BETTER * AREAS * plane.residual - SURE:
         plane = other
     if plane is None or plane.residual > FAIR:
@@ -418,7 +418,7 @@ def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -
     return plane if _measure_foreshortening(colours, plane) >= least else None
 
 
-def _measure_foreshortening(colours: Floats, plane: Plane) -> float:
+def _measure_foreshortening(colours: Floats, plane: Slope) -> float:
     """Return by how much steeper edges get along the slope than across it where scales fall: 1 where they lie that way."""
     from scipy import ndimage
 

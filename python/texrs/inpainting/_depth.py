@@ -17,7 +17,7 @@ from texrs.exemplar.sheet import Flattened, find_plane
 from texrs.growth import stitch_sheet
 from texrs.inpainting._holes import look_around, paint_over
 from texrs.scale_maps._kinds import find_kind
-from texrs.scale_maps._plane import Plane
+from texrs.scale_maps._slope import Slope
 from texrs.source_map import SourceMap
 
 __all__ = ["fill_in_depth", "see_plane"]
@@ -30,7 +30,7 @@ AROUND = 2.0
 """Known pixels around a hole that patches are to fit, in sides of the largest."""
 
 
-def see_plane(picture: Array, open_: Bools, scale: Floats) -> Plane | None:
+def see_plane(picture: Array, open_: Bools, scale: Floats) -> Slope | None:
     """Return the plane whose scale map that of a picture with holes is, if it is one's."""
     return find_plane(guidance(as_image(paint_over(picture, open_))), np.ascontiguousarray(scale), find_kind(scale))
 
@@ -38,7 +38,7 @@ def see_plane(picture: Array, open_: Bools, scale: Floats) -> Plane | None:
 def fill_in_depth(
     picture: Array,
     open_: Bools,
-    plane: Plane,
+    plane: Slope,
     wide: Bools,
     *,
     far: Bools | None = None,
@@ -58,7 +58,7 @@ def fill_in_depth(
         The hole, and what may be replaced.
     far : (H, W) bool, optional
         What may be replaced where things lie apart.
-    plane : texrs.scale_maps._plane.Plane
+    plane : texrs.scale_maps._slope.Slope
         The plane that it shows.
     usable : (H, W) bool
         What may be copied.

@@ -24,8 +24,7 @@ from texrs.inpainting._holes import paint_over
 from texrs.inpainting._patches import choose_mirrors
 from texrs.inpainting._sides import share_out
 from texrs.planes import Plane
-from texrs.scale_maps._plane import LEVEL
-from texrs.scale_maps._plane import Plane as Slope
+from texrs.scale_maps._slope import LEVEL, Slope
 from texrs.source_map import SourceMap
 
 LEAST = 0.05
@@ -69,13 +68,13 @@ def lay(plane: Plane, shape: Sequence[int], origin: Sequence[int] = (0, 0)) -> S
 
     None where it is seen from the front. What lies beyond its horizon does not count.
     """
-    middle = np.array(plane.middle) - origin
+    middle = np.array(plane.principal_point) - origin
     corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], np.float64)
     widths = plane.width(corners + np.asarray(origin))
     least, largest = max(float(widths.min()), LEAST), float(widths.max())
     if largest < LEVEL * least:
         return None
-    row, column = plane.middle
+    row, column = plane.principal_point
     one, *beside = plane.width([[row, column], [row + 1, column], [row, column + 1]]).tolist()
     rise = [round(w - one, 12) for w in beside]
     steep = hypot(*rise)

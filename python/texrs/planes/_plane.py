@@ -16,7 +16,7 @@ from texrs.errors import InvalidInput
 from texrs.planes._projective import along, as_places, find_focal, lift, to_digits, to_grid, transform
 from texrs.scale_maps._kinds import AREAS, ScaleMap, as_kind, find_kind
 from texrs.scale_maps._maps import LEAST, as_map
-from texrs.scale_maps._plane import Plane as Slope
+from texrs.scale_maps._slope import Slope
 
 __all__ = ["FOV", "STEEPEST", "Plane"]
 
@@ -50,7 +50,7 @@ class Plane:
     fov : float, optional
         Degrees that the longer side of the picture spans, 1 to 170. `FOV` where nothing is known: what is far is then
         as small as it should be only if that is about right.
-    turn : float
+    rotation : float
         Degrees by which the flattened plane is turned, counter-clockwise: for courses that are to lie level.
     confidence : float
         How sure the plane is, 0 to 1; of one that is given, 1.
@@ -79,7 +79,7 @@ class Plane:
     slant: float
     tilt: float = 90.0
     fov: float = FOV
-    turn: float = 0.0
+    rotation: float = 0.0
     confidence: float = 1.0
 
     def __post_init__(self) -> None:
@@ -89,7 +89,7 @@ class Plane:
             "slant": as_float(self.slant, "slant", 0, STEEPEST),
             "tilt": as_float(self.tilt, "tilt", -1e6, 1e6) % 360,
             "fov": as_float(self.fov, "fov", 1, 170),
-            "turn": (as_float(self.turn, "turn", -1e6, 1e6) + 180) % 360 - 180,
+            "rotation": (as_float(self.rotation, "rotation", -1e6, 1e6) + 180) % 360 - 180,
             "confidence": as_float(self.confidence, "confidence", 0, 1),
         }
         for name, value in values.items():
@@ -277,7 +277,7 @@ class Plane:
         ----------
         given : mapping
             ``shape`` (rows, columns) in pixels and ``slant`` in degrees; where they are not the usual ones, ``tilt``, ``fov``
-            and ``turn`` in degrees, and ``confidence``, 0 to 1.
+            and ``rotation`` in degrees, and ``confidence``, 0 to 1.
 
         Returns
         -------
@@ -298,7 +298,7 @@ class Plane:
         """
         if not isinstance(given, Mapping) or not {"shape", "slant"} <= set(given) <= set(cls.__dataclass_fields__):
             raise InvalidInput(
-                f"plane: needs a mapping with shape, slant, tilt, fov, turn and confidence, got {given!r}"
+                f"plane: needs a mapping with shape, slant, tilt, fov, rotation and confidence, got {given!r}"
             )
         return cls(**given)
 
@@ -348,7 +348,7 @@ class Plane:
     # --- what it says -----------------------------------------------------------------------------------------------
 
     @property
-    def middle(self) -> Pair:
+    def principal_point(self) -> Pair:
         """Row and column of the picture's middle."""
         return (self.shape[0] - 1) / 2, (self.shape[1] - 1) / 2
 
@@ -361,7 +361,7 @@ class Plane:
     def homography(self) -> NDArray[np.float64]:
         """The matrix (3, 3) that takes (row, column, 1) of the picture to multiples of (row, column, 1) of the flat plane."""
         move = np.eye(3)
-        move[:2, 2] = np.negative(self.middle)
+        move[:2, 2] = np.negative(self.principal_point)
         matrix = np.eye(3)
         matrix[:2, :2], matrix[2, :2] = self._affine, self._rise
         return np.asarray(matrix @ move, np.float64)
@@ -373,7 +373,7 @@ class Plane:
         steep = float(rise @ rise)
         if steep < (FLAT / max(self.shape)) ** 2:
             return None
-        foot = np.array(self.middle) - rise / steep
+        foot = np.array(self.principal_point) - rise / steep
         along = np.array([-rise[1], rise[0]]) / steep**0.5 * max(self.shape) / 2
         ends = foot - along, foot + along
         first, second = sorted(ends, key=lambda p: (p[1], p[0]))
@@ -411,7 +411,7 @@ class Plane:
         1.0
 
         """
-        return 1 + along(as_places(points) - self.middle, self._rise)
+        return 1 + along(as_places(points) - self.principal_point, self._rise)
 
     def scale_map(self, scale_kind: Literal["width", "area"] = "width") -> ScaleMap:
         """Return how large things are at each pixel.
@@ -470,7 +470,7 @@ class Plane:
         """
         given = as_places(points)
         wide = np.maximum(self.width(given), LEAST)
-        return transform(self._affine, given - self.middle) / wide[..., np.newaxis]
+        return transform(self._affine, given - self.principal_point) / wide[..., np.newaxis]
 
     def project(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
         """Return where points of the flat plane are seen.
@@ -502,9 +502,9 @@ class Plane:
         nearness = 1 - along(given, self._rise)
         with np.errstate(divide="ignore", invalid="ignore"):
             seen = given / np.where(nearness > 0, nearness, np.nan)[..., np.newaxis]
-        return np.asarray(seen + self.middle, np.float64)
+        return np.asarray(seen + self.principal_point, np.float64)
 
-    def unfold(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
+    def projection_jacobians(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
         """Return the Jacobians of `project` at points of the flat plane.
 
         Parameters
@@ -525,7 +525,7 @@ class Plane:
         Examples
         --------
         >>> from texrs import Plane
-        >>> Plane((65, 97), slant=60).unfold([0, 0]).round(3).tolist()
+        >>> Plane((65, 97), slant=60).projection_jacobians([0, 0]).round(3).tolist()
         [[0.5, 0.0], [0.0, 1.0]]
 
         """
@@ -550,7 +550,7 @@ class Plane:
         [[2.0, 0.0], [0.0, 1.0]]
 
         """
-        away = np.moveaxis(np.indices(self.shape, np.float64), 0, -1) - self.middle
+        away = np.moveaxis(np.indices(self.shape, np.float64), 0, -1) - self.principal_point
         wide = np.maximum(1 + along(away, self._rise), LEAST)[..., np.newaxis, np.newaxis]
         flat = transform(self._affine, away)
         return np.asarray(self._affine / wide - flat[..., :, np.newaxis] * self._rise / (wide * wide), np.float64)
@@ -571,7 +571,7 @@ class Plane:
 
         """
         found = Slope.fit(self.scale_map())
-        return None if found is None else replace(found, lean=cos(radians(self.slant)), turn=self.turn)
+        return None if found is None else replace(found, lean=cos(radians(self.slant)), rotation=self.rotation)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what makes it anew, as JSON types: `Plane.of` takes it.
@@ -579,7 +579,7 @@ class Plane:
         Returns
         -------
         dict
-            ``shape`` in pixels, ``slant``, ``tilt``, ``fov`` and ``turn`` in degrees, ``confidence`` from 0 to 1.
+            ``shape`` in pixels, ``slant``, ``tilt``, ``fov`` and ``rotation`` in degrees, ``confidence`` from 0 to 1.
 
         Examples
         --------
@@ -613,7 +613,7 @@ class Plane:
     @property
     def _turned(self) -> NDArray[np.float64]:
         """Counter-clockwise as it is seen: rows grow downwards."""
-        angle = radians(self.turn)
+        angle = radians(self.rotation)
         return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
 
     def _stretched(self, factor: float) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane, multiply
 from texrs.papers.perspective.request import Request
 from texrs.papers.perspective.sizes import Outside, bring_within, choose_sizes
 from texrs.planes._projective import find_focal
-from texrs.scale_maps._plane import LEVEL, Plane
+from texrs.scale_maps._slope import LEVEL, Slope
 
 __all__ = ["Laid", "lay_out"]
 
@@ -74,7 +74,7 @@ def lay_out(asked: Request) -> Laid:
     return Laid(sheet, target, wanted, frames, outside, sizes)
 
 
-def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Plane | None) -> Laid:
+def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Slope | None) -> Laid:
     """Lay an exemplar out under a surface: the plane that it shows flattened, as it is from the front, or in copies."""
     areas = asked.target.astype(np.float64)
     front = plane is None and is_frontal(asked)
@@ -110,7 +110,7 @@ def is_frontal(asked: Request) -> bool:
     return free and float(asked.scale.max()) < LEVEL * float(asked.scale.min())
 
 
-def find_slope(asked: Request, colours: Floats) -> Plane | None:
+def find_slope(asked: Request, colours: Floats) -> Slope | None:
     """Return the plane that an exemplar shows: the one that was given, or the one that its scale map is of."""
     if asked.strength == 0 or asked.sizes not in (True, "auto"):
         return None

@@ -12,7 +12,7 @@ from texrs._arrays import as_float, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar.atlas import LARGEST, SMALLEST, extend_sizes
-from texrs.scale_maps._plane import Plane
+from texrs.scale_maps._slope import Slope
 
 __all__ = ["Outside", "Sizes", "bring_within", "check_sizes", "choose_sizes", "count_samples"]
 
@@ -26,7 +26,7 @@ ALIKE = 0.1
 """Natural logarithm of a ratio of scales that are about the same."""
 
 
-def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Plane | None) -> tuple[float, ...]:
+def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Slope | None) -> tuple[float, ...]:
     """Return the sizes of the copies, the exemplar's own first; those that a plane can be seen in."""
     if plane is not None:
         return (1.0, SMALLEST, LARGEST)

@@ -26,7 +26,7 @@ __all__ = ["Surface", "as_surface", "as_target", "find_size", "is_map", "is_word
 
 PREFIX = "plane:"
 """Before the words that say how a plane lies."""
-WORDS = ("slant", "tilt", "fov", "turn")
+WORDS = ("slant", "tilt", "fov", "rotation")
 NEAREST = 0.02
 """Of the middle's scale: nearer to its horizon nothing of a plane is shown."""
 
@@ -80,7 +80,7 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
     if not isinstance(target, Plane):
         bent = np.asarray(target, np.float64)
         return bent if bent.shape[:2] == size else as_jacobians(stretch(bent, size), "target")
-    seen = Plane(size, target.slant, target.tilt, target.fov, target.turn)
+    seen = Plane(size, target.slant, target.tilt, target.fov, target.rotation)
     rows, columns = size[0] - 1, size[1] - 1
     near = float(seen.width([[0, 0], [0, columns], [rows, 0], [rows, columns]]).min())
     if near < NEAREST:
@@ -93,7 +93,9 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
 
 def read_plane(words: str, shape: Sequence[int], name: str) -> Plane:
     """Return the plane that words describe: ``plane:slant=50,tilt=90,fov=60``."""
-    form = f"{name}: needs plane:slant=DEGREES and, if they are known, tilt=, fov= and turn=, with commas between them"
+    form = (
+        f"{name}: needs plane:slant=DEGREES and, if they are known, tilt=, fov= and rotation=, with commas between them"
+    )
     if not words.startswith(PREFIX):
         raise InvalidInput(f"{form}; got {words!r}")
     values: dict[str, float] = {}

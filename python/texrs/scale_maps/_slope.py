@@ -12,7 +12,7 @@ from texrs._arrays import log_single
 from texrs._typing import Array, Floats
 from texrs.scale_maps._trend import follow
 
-__all__ = ["Plane"]
+__all__ = ["Slope"]
 
 LEVEL = 1.1
 """Ratio of the largest to the least scale below which a plane is seen from the front."""
@@ -21,7 +21,7 @@ HORIZON = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Plane:
+class Slope:
     """A plane whose elements are as wide in its picture as a scale map says: S is linear in the picture.
 
     With d the direction in which S grows, e that across it and x_0 the picture's middle, a point x of the picture lies at
@@ -45,7 +45,7 @@ class Plane:
         S is this power of the scale map.
     lean : float
         Cosine of the slant, where it is known: the plane is so many times as long as it is seen in the middle.
-    turn : float
+    rotation : float
         Degrees by which its texture is turned on it, counter-clockwise, to lie level.
 
     """
@@ -60,10 +60,10 @@ class Plane:
     residual: float
     power: float = 1.0
     lean: float = 1.0
-    turn: float = 0.0
+    rotation: float = 0.0
 
     @classmethod
-    def fit(cls, scale: Floats, power: float = 1.0) -> Plane | None:
+    def fit(cls, scale: Floats, power: float = 1.0) -> Slope | None:
         """Return the plane that a power of a scale map, (rows, columns), says; none where it is seen from the front."""
         logs = log_single(scale) * np.float32(power)
         surface = np.exp(follow(logs, "plane"), dtype=np.float64)
@@ -100,7 +100,7 @@ class Plane:
     @property
     def upright(self) -> NDArray[np.float64]:
         """The matrix (2, 2) that takes a step (row, column) on the flat texture, upright, to a step (v, u)."""
-        angle = radians(self.turn)
+        angle = radians(self.rotation)
         c, s = cos(angle), sin(angle)
         level = np.array([[c, s], [-s, c]])
         rows = np.array([[self.lean * self.down[0], self.lean * self.down[1]], self.across])
@@ -129,7 +129,7 @@ class Plane:
         """Return S at points (v, u) of the plane."""
         return np.asarray(-self.kappa / np.minimum(points[..., 0], -self.kappa / (1e3 * self.largest)), np.float64)
 
-    def unfold(self, points: Array) -> NDArray[np.float64]:
+    def projection_jacobians(self, points: Array) -> NDArray[np.float64]:
         """Return the Jacobians of `project` at points (v, u): (..., 2, 2)."""
         scale = self.scales_of(points)
         grown = (scale * scale / self.kappa)[..., np.newaxis]
@@ -152,7 +152,7 @@ class Plane:
         found = logs.ravel()[np.argsort(along, axis=None, kind="stable")]
         return float(np.sqrt(np.mean((found - np.sort(logs, axis=None)) ** 2)))
 
-    def jacobians(self, scales: Floats, other: Plane | None = None, foreshortened: float = 1.0) -> NDArray[np.float64]:
+    def jacobians(self, scales: Floats, other: Slope | None = None, foreshortened: float = 1.0) -> NDArray[np.float64]:
         """Return dS/dp of a picture whose elements are to be as large as a map (rows, columns) says: (..., 2, 2).
 
         Parameters
