@@ -83,7 +83,7 @@ def main(folder: Path, pictures: Path | None) -> None:
     print_reliability("single elements", single)
 
 
-def measure_overlap(found: elements.Elements, cells: list[list[list[float]]]) -> float:
+def measure_overlap(found: elements.ElementAnalysis, cells: list[list[list[float]]]) -> float:
     """Return the mean intersection over union of drawn cells and the elements that cover most of each."""
     from skimage.draw import polygon2mask
 
@@ -98,7 +98,7 @@ def measure_overlap(found: elements.Elements, cells: list[list[list[float]]]) ->
     return float(np.mean(shares))
 
 
-def judge_elements(found: elements.Elements, texture: Annotated) -> Stated:
+def judge_elements(found: elements.ElementAnalysis, texture: Annotated) -> Stated:
     """Return how sure each element is said to be, and whether one is there; of those that are not all listed, none.
 
     Those of a wrong layout count, those within half a box of the border do not.

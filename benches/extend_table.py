@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import texrs
-from texrs import Plane, View, io, planes
+from texrs import Plane, PlaneView, io, planes
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from plane_checks import turn_between
@@ -101,7 +101,7 @@ def main() -> None:
             flat = plane.flatten(np.array([[rows / 2, columns / 2]]))[0]
             ways = min(rows, columns) / 8 * np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]])
             corners = plane.project(flat + ways) + np.array([top, left])
-            larger = View(corners=corners).settle(new.shape)[0]
+            larger = PlaneView(corners=corners).settle(new.shape)[0]
             cells = [f"{plane.slant:.1f}", f"{plane.tilt:.0f}", f"{plane.confidence:.2f}"]
             cells.append("-" if larger is None else find_again(made.image, new, larger))
         sharp = measure_gradient(made.image, new) / measure_gradient(image, np.ones((rows, columns), np.bool_))

@@ -36,7 +36,7 @@ SIZES: dict[str, list[tuple[int, int]]] = {
     "rectify": [(512, 512), (1024, 1024), (1536, 1536)],
     "remove": [(256, 256), (512, 512), (1024, 1024)],
     "analyse": [(256, 256), (512, 512), (768, 768)],
-    "TileSet": [(256, 576), (256, 1152), (512, 1152)],
+    "CornerTiles": [(256, 576), (256, 1152), (512, 1152)],
 }
 """Sides of the example and of the result; of tiles it is the atlas of 81."""
 
@@ -56,10 +56,10 @@ def make_call(verb: str, picture: np.ndarray[Any, Any], size: int) -> Callable[[
         "tile": lambda: texrs.tile(picture, size=size if size != side else None),
         "inpaint": lambda: texrs.inpaint(picture, hole),
         "extend": lambda: texrs.extend(picture, right=size - side, bottom=size - side),
-        "rectify": lambda: texrs.rectify(picture, view=texrs.View(slant=40)),
+        "rectify": lambda: texrs.rectify(picture, view=texrs.PlaneView(slant=40)),
         "remove": lambda: texrs.remove(picture, hole),
         "analyse": lambda: texrs.elements.analyse(picture),
-        "TileSet": lambda: texrs.TileSet(picture, size // 9),
+        "CornerTiles": lambda: texrs.CornerTiles(picture, size // 9),
     }
     return calls[verb]
 
@@ -81,7 +81,7 @@ def run(verb: str, side: int, size: int) -> None:
     """Measure one, and print its line."""
     warnings.simplefilter("ignore")
     # Another picture, for what is known of one is kept.
-    small, larger = {"solid": (36, 40), "TileSet": (96, 288)}.get(verb, (96, 128))
+    small, larger = {"solid": (36, 40), "CornerTiles": (96, 288)}.get(verb, (96, 128))
     make_call(verb, make_picture(verb, small), larger)()
     picture = make_picture(verb, side)
     call, result = make_call(verb, picture, size), (size,) * (3 if verb == "solid" else 2)

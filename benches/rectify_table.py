@@ -86,7 +86,7 @@ def main() -> None:
     print("| " + " | ".join(names) + " |\n" + "|---" * len(names) + "|", flush=True)
     spreads, fails, rng = [], [], np.random.default_rng(0)
     for number, (name, plane, picture) in enumerate(chain(floors(1), told(os.environ.get("TEXRS_TEXTURES")))):
-        view = texrs.View(fov=plane.fov)
+        view = texrs.PlaneView(fov=plane.fov)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             made = texrs.rectify(picture, view=view)

@@ -21,7 +21,7 @@ from scipy.ndimage import binary_erosion
 
 import texrs
 from texrs import samples
-from texrs.elements import Elements, analyse
+from texrs.elements import ElementAnalysis, analyse
 from texrs.kernels.warp import mesh
 from texrs.papers.splice import factors
 from texrs.papers.splice.entry import CACHES
@@ -29,8 +29,8 @@ from texrs.papers.splice.entry import CACHES
 ROUNDS = 5
 
 
-def entry(name: str, side: int) -> Elements:
-    return Elements.of_sample(samples.load(name, size=(side, side)))
+def entry(name: str, side: int) -> ElementAnalysis:
+    return ElementAnalysis.of_sample(samples.load(name, size=(side, side)))
 
 
 def best(
@@ -61,7 +61,7 @@ def splices(sides: list[int]) -> None:
                 continue
             mine, theirs = entry(a, side), entry(b, side)
 
-            def work(mine: Elements = mine, theirs: Elements = theirs) -> texrs.Synthesis:
+            def work(mine: ElementAnalysis = mine, theirs: ElementAnalysis = theirs) -> texrs.Synthesis:
                 return texrs.splice(mine, theirs, seed=1)
 
             # What is put together from cells or knots has no system to solve.

@@ -27,7 +27,7 @@ from scipy.ndimage import binary_dilation
 import evaluators
 import texrs
 from texrs import elements, io, metrics, samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import TexrsError
 from texrs.papers.splice.pictures import to_picture
 
@@ -37,7 +37,7 @@ HEAD = "| texture | method | present | realised | sharpness | ground | broken | 
 SAMPLES = ("dots", "pebbles", "leaves_and_flowers", "net", "bricks", "scales", "weave")
 
 
-def read(path: Path, *, auto: bool) -> Elements:
+def read(path: Path, *, auto: bool) -> ElementAnalysis:
     """Analyse a picture, as its JSON says or all by itself."""
     image = io.read(path)
     told = json.loads(path.with_suffix(".json").read_text())
@@ -50,14 +50,14 @@ def read(path: Path, *, auto: bool) -> Elements:
     return elements.analyse(image, box=(y, x, height, width), background=background, layout=told["tag"])
 
 
-def entries(folder: str | None, *, auto: bool) -> dict[str, Elements]:
+def entries(folder: str | None, *, auto: bool) -> dict[str, ElementAnalysis]:
     """Return the textures by name, disjoint foregrounds first."""
     if folder is None:
-        return {name: Elements.of_sample(samples.load(name, size=(256, 256))) for name in SAMPLES}
+        return {name: ElementAnalysis.of_sample(samples.load(name, size=(256, 256))) for name in SAMPLES}
     told = [
         p for kind in ("b-disjoint", "c-connected", "d-background") for p in sorted(Path(folder, kind).glob("*.json"))
     ]
-    found: dict[str, Elements] = {}
+    found: dict[str, ElementAnalysis] = {}
     for path in told:
         picture = next(p for p in path.parent.glob(f"{path.stem}.*") if p.suffix != ".json")
         try:
@@ -73,7 +73,7 @@ def measure_sharpness(image: np.ndarray) -> float:
     return float(np.hypot(*np.gradient(grey)).mean())
 
 
-def measure_ground(a: Elements, result: texrs.Synthesis) -> float:
+def measure_ground(a: ElementAnalysis, result: texrs.Synthesis) -> float:
     """Return the mean gradient of the ground between separate elements, over the texture's own; nan where that is flat."""
 
     def steep(image: np.ndarray, elements: np.ndarray) -> float:

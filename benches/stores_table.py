@@ -200,7 +200,7 @@ def matrix(given: argparse.Namespace, folder: str) -> None:
 def tiles(given: argparse.Namespace, folder: str) -> None:
     """Windows of corner tiles far away."""
     with measure() as spent:
-        made = texrs.TileSet(samples.pebbles((192, 192)).image, seed=1)
+        made = texrs.CornerTiles(samples.pebbles((192, 192)).image, seed=1)
     print(f"{made}: made in {spent.processor:.0f} processor seconds")
     for far in (0, 10**12):
         start, busy = time.perf_counter(), time.process_time()

@@ -3,7 +3,7 @@
     python benches/synthesize_table.py OUT --evaluator FILE.py ... [--verb synthesize] [--seeds 3] [--whole] [--size 768]
         [--shown 768] [--quality preserve] [--only NAME] [--resynthesizer PROGRAM] PICTURE ...
 
-The verbs: `texrs.synthesize`, `texrs.design`, and windows of `texrs.TileSet`. The exemplar is the middle 256 a side of each
+The verbs: `texrs.synthesize`, `texrs.design`, and windows of `texrs.CornerTiles`. The exemplar is the middle 256 a side of each
 picture, or the whole of it; results are twice as large, or of the size that is asked for, and kept in OUT. Evaluators are shown
 the middle of them where they are larger than `--shown`. A result is fine where every score of every evaluator is in its bounds,
 or no worse than 1.1 times that of a second crop of the same photograph, as far from the exemplar as can be. Quilting is
@@ -68,7 +68,7 @@ def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[st
         if options.verb == "design":
             made = texrs.design(image, size, seed=seed).image
         elif options.verb == "tiles":
-            made = texrs.TileSet(image, seed=seed)[0 : size[0], 0 : size[1]]
+            made = texrs.CornerTiles(image, seed=seed)[0 : size[0], 0 : size[1]]
         else:
             made = texrs.synthesize(image, size, seed=seed, quality=options.quality).image
         yield "texrs", seed, made

@@ -92,7 +92,7 @@ def element() -> Any:
         for label in np.unique(sample.labels[sample.labels > 0]):
             panel.contour(sample.labels == label, [0.5], colors=ACCENT, linewidths=1.2)
         panel.plot(*sample.centres.T[::-1], "+", color="white", ms=7, mew=1.6)
-    dots = texrs.Elements.of_sample(samples.dots((128, 128)))
+    dots = texrs.ElementAnalysis.of_sample(samples.dots((128, 128)))
     one = min(dots.instances, key=lambda i: np.hypot(i.centre[0] - 64, i.centre[1] - 64))
     row, column = one.centre
     show(panels[3], dots.image, "one: its mask, box and surroundings")
@@ -255,7 +255,7 @@ def design() -> tuple[Any, Measured]:
 
 
 def splice() -> tuple[Any, Measured]:
-    a, b = (texrs.Elements.of_sample(samples.load(n, size=(160, 160))) for n in ("dots", "net"))
+    a, b = (texrs.ElementAnalysis.of_sample(samples.load(n, size=(160, 160))) for n in ("dots", "net"))
     made = {PRINTED: texrs.splice(a, b, method="paper", seed=1), OURS: texrs.splice(a, b, seed=1)}
     figures = {name: evaluate(a.image, each.source_map) for name, each in made.items()}
     given = [("elements", a.image), ("layout", b.image)]

@@ -108,7 +108,7 @@ def inpaint() -> Iterator[Strip]:
 
 
 def splice() -> Iterator[Strip]:
-    dots = texrs.Elements.of_sample(samples.dots((192, 192)))
+    dots = texrs.ElementAnalysis.of_sample(samples.dots((192, 192)))
     net = samples.net((192, 192)).image
 
     def part(strength: float) -> Picture:
@@ -165,7 +165,7 @@ def rectify() -> Iterator[Strip]:
     floor = samples.tilted_discs((224, 224)).image
 
     def flatten(**angles: float) -> Picture:
-        plane = texrs.View(**{"slant": 50, "tilt": 90, "fov": 50, **angles})
+        plane = texrs.PlaneView(**{"slant": 50, "tilt": 90, "fov": 50, **angles})
         return texrs.rectify(floor, view=plane, size=192, seed=1).image
 
     yield (

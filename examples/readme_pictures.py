@@ -5,7 +5,7 @@ import numpy as np
 import texrs
 from layout import FOLDER, below, beside, label
 from texrs import fields, samples, volume
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 
 HEIGHT = 200
 
@@ -13,7 +13,7 @@ HEIGHT = 200
 def four() -> np.ndarray:
     """Show each system once: its inputs, labelled as such, and its result."""
     stones = samples.pebbles((192, 192)).image
-    dots, net = (Elements.of_sample(samples.load(name, size=(192, 192))) for name in ("dots", "net"))
+    dots, net = (ElementAnalysis.of_sample(samples.load(name, size=(192, 192))) for name in ("dots", "net"))
     floor = samples.tilted_discs((192, 192))
     wave = np.exp(0.6 * np.cos(np.linspace(0, 2 * np.pi, 288)))[np.newaxis].repeat(192, axis=0).astype(np.float32)
     scale = np.asarray(floor.scale_map, np.float32)

@@ -11,15 +11,15 @@ import numpy as np
 import texrs
 from layout import below, beside
 from texrs import samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 
 SIDE = 192
 NAMES = ("dots", "leaves_and_flowers", "pebbles", "net", "bricks")
 
 
-def entry(name: str) -> Elements:
+def entry(name: str) -> ElementAnalysis:
     """Return a sample with the elements that it is known to have."""
-    return Elements.of_sample(samples.load(name, size=(SIDE, SIDE)))
+    return ElementAnalysis.of_sample(samples.load(name, size=(SIDE, SIDE)))
 
 
 def draw_overview() -> np.ndarray:
@@ -39,7 +39,7 @@ def draw_decoupling() -> np.ndarray:
     and as printed.
     """
     wall, layout = entry("bricks"), entry("pebbles")
-    net = Elements(wall.image, wall.points, ~wall.mask, wall.box, Layout.CONNECTED, wall.scores)
+    net = ElementAnalysis(wall.image, wall.points, ~wall.mask, wall.box, Layout.CONNECTED, wall.scores)
     bent = [texrs.splice(a, layout, seed=1, use_cells=False, use_nets=False).image for a in (wall, net)]
     made = [texrs.splice(wall, layout, seed=1, method=method).image for method in (None, "paper")]
     return beside([wall.image, *bent, *made])

@@ -5,7 +5,7 @@ import numpy as np
 import texrs
 from layout import FOLDER, below, beside
 from texrs import samples
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 
 SIDE = 192
 
@@ -17,9 +17,9 @@ EDITS = (
 )
 
 
-def entry(name: str) -> Elements:
+def entry(name: str) -> ElementAnalysis:
     """Return a sample with the elements that it is known to have."""
-    return Elements.of_sample(samples.load(name, size=(SIDE, SIDE)))
+    return ElementAnalysis.of_sample(samples.load(name, size=(SIDE, SIDE)))
 
 
 def to_colours(image: np.ndarray) -> np.ndarray:

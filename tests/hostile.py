@@ -198,7 +198,7 @@ def list_hostile(valid: object) -> Iterator[object]:
 # --- calls that are right ----------------------------------------------------------------------------------------------
 
 SOLID = "texrs.SolidTexture(texrs.samples.stripes((32, 32, 32)).image, quality='fast')"
-TILES = "texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32)"
+TILES = "texrs.CornerTiles(texrs.samples.pebbles((96, 96)).image, 32)"
 MAPS = "texrs.Material({'albedo': texrs.samples.stripes((32, 32, 32)).image}, axes=3)"
 EXAMPLES = {
     "texrs.SolidTexture.window": f"{SOLID}.window((-3, 4, 5), (6, 7, 8))",
@@ -209,9 +209,9 @@ EXAMPLES = {
     "texrs.SolidTexture.to_dask": f"{SOLID}.to_dask((6, 7, 8), 16, origin=(-3, 4, 5))",
     "texrs.SolidTexture.to_zarr": f"{SOLID}.to_zarr('solid.zarr', (6, 7, 8), 16, origin=(-3, 4, 5))",
     "texrs.SolidTexture.to_file": f"{SOLID}.to_file('solid.npy', (6, 7, 8), 16, origin=(-3, 4, 5))",
-    "texrs.TileSet.to_dask": f"{TILES}.to_dask((40, 50), 32, origin=(-3, 5))",
-    "texrs.TileSet.to_zarr": f"{TILES}.to_zarr('tiles.zarr', (40, 50), 32, origin=(-3, 5))",
-    "texrs.TileSet.to_file": f"{TILES}.to_file('tiles.npy', (40, 50), 32, origin=(-3, 5))",
+    "texrs.CornerTiles.to_dask": f"{TILES}.to_dask((40, 50), 32, origin=(-3, 5))",
+    "texrs.CornerTiles.to_zarr": f"{TILES}.to_zarr('tiles.zarr', (40, 50), 32, origin=(-3, 5))",
+    "texrs.CornerTiles.to_file": f"{TILES}.to_file('tiles.npy', (40, 50), 32, origin=(-3, 5))",
     "texrs.Material.get": f"{MAPS}.get('height', None)",
     "texrs.Material.__contains__": f"'height' in {MAPS}",
     "texrs.TextureDatabase.__getitem__": "texrs.TextureDatabase('base')['rock']",

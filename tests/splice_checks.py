@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import wasserstein_distance
 
 from texrs import Synthesis
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 
 Points = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ def colours(image: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def windows(
-    a: Elements, result: Synthesis, share: float = 0.75
+    a: ElementAnalysis, result: Synthesis, share: float = 0.75
 ) -> list[tuple[Points, Points, Points, tuple[int, int]]]:
     """Targets whose windows lie inside the output and the texture: target, source, the rest of both, half sizes."""
     half = tuple(max(2, int(share * n / 2)) for n in a.box)
@@ -49,7 +49,7 @@ def correlation(a: NDArray[Any], b: NDArray[Any]) -> float:
     return float((x * y).sum()) / power if power > 1e-9 else 0.0
 
 
-def presence(a: Elements, result: Synthesis) -> tuple[float, float]:
+def presence(a: ElementAnalysis, result: Synthesis) -> tuple[float, float]:
     """S2 and S3: the share of targets that show their element, and how far from them, in pixels."""
     one, other = grey(a.image), grey(result.image)
     hits, away = [], []
@@ -80,7 +80,7 @@ def component(mask: NDArray[np.bool_], at: Points, h: int, w: int) -> NDArray[np
     return number == number[tuple(nearest)]
 
 
-def shapes(a: Elements, result: Synthesis) -> tuple[float, float]:
+def shapes(a: ElementAnalysis, result: Synthesis) -> tuple[float, float]:
     """S4: overlap of the foreground of an element before and after, 5th percentile and median."""
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = a.mask[rows, columns]
@@ -96,7 +96,7 @@ def shapes(a: Elements, result: Synthesis) -> tuple[float, float]:
     return float(np.percentile(overlaps, 5)), float(np.median(overlaps))
 
 
-def copied(a: Elements, result: Synthesis) -> tuple[float, float | None]:
+def copied(a: ElementAnalysis, result: Synthesis) -> tuple[float, float | None]:
     """S5: share of colours that the texture has, and of rigid pixels that show the element that was matched, if any are."""
     flat = colours(a.image).reshape(-1, colours(a.image).shape[-1])
     known = {c.tobytes() for c in flat}
@@ -114,7 +114,7 @@ def copied(a: Elements, result: Synthesis) -> tuple[float, float | None]:
     return share, float((np.abs(away) <= 1.01).all(axis=1).mean())
 
 
-def coherence(a: Elements, result: Synthesis, seed: int = 0) -> tuple[float, float] | None:
+def coherence(a: ElementAnalysis, result: Synthesis, seed: int = 0) -> tuple[float, float] | None:
     """S8: RMS distance of 9 x 9 patches of ground to the texture's, p95, and over that of the texture to itself."""
     side = 9
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
@@ -145,7 +145,7 @@ def coherence(a: Elements, result: Synthesis, seed: int = 0) -> tuple[float, flo
     return found / max(1e-9, float(np.percentile(theirs[np.isfinite(theirs)], 95))), found
 
 
-def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
+def layout(result: Synthesis, a: ElementAnalysis, b: ElementAnalysis) -> dict[str, float]:
     """S10: the arrangement of rigid pixels against the targets and against A's own layout, in spacings; colours against B's.
 
     Colours in standard deviations of B's.
@@ -187,7 +187,7 @@ def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
     }
 
 
-def doubled(a: Elements, result: Synthesis) -> float:
+def doubled(a: ElementAnalysis, result: Synthesis) -> float:
     """S12: the largest rigid region of the output over the largest element of the texture."""
     areas = np.bincount(label(a.mask)[0].ravel())[1:]
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
@@ -195,7 +195,7 @@ def doubled(a: Elements, result: Synthesis) -> float:
     return float(np.bincount(number.ravel())[1:].max() / areas.max())
 
 
-def share(a: Elements, result: Synthesis) -> float:
+def share(a: ElementAnalysis, result: Synthesis) -> float:
     """S13: the foreground's share of the output over that of as many mean elements as have targets in it."""
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = float(a.mask[rows, columns].mean())

@@ -39,7 +39,7 @@ LAYERS = (
     ("tiling",),
     ("inpainting",),
     ("papers",),
-    ("database", "extension", "stores", "painting", "rectification", "removal", "tile_set", "transforms"),
+    ("database", "extension", "stores", "painting", "rectification", "removal", "corner_tiles", "transforms"),
     ("_napari", "comparison", "demo"),
     ("cli",),
 )

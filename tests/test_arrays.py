@@ -20,7 +20,7 @@ PEBBLES = texrs.samples.pebbles((64, 64)).image
 DISCS = texrs.samples.tilted_discs((96, 96)).image
 HOLE = np.zeros((64, 64), bool)
 HOLE[20:34, 24:40] = True
-VIEW = texrs.View(slant=35, fov=60)
+VIEW = texrs.PlaneView(slant=35, fov=60)
 NEAR = np.zeros((96, 96), bool)
 NEAR[50:60, 40:50] = True
 

@@ -19,7 +19,7 @@ from reference.look_up import view
 from texrs import SourceMap, samples
 from texrs.cli import main
 from texrs.cli._console import Stopped
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 
 # --- design ----------------------------------------------------------------------------------------------------------
 
@@ -150,7 +150,7 @@ def test_labels_by_hand(here: Path, capsys: Capture) -> None:
 
 
 def test_analysed_elements_as_example(here: Path, capsys: Capture) -> None:
-    entry = Elements.of_sample(samples.load("dots", size=(96, 96)))
+    entry = ElementAnalysis.of_sample(samples.load("dots", size=(96, 96)))
     entry.save("dots.npz")
     iio.imwrite("dots.png", entry.image)
     made = []

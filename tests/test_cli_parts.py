@@ -152,7 +152,7 @@ def test_what_has_no_room_is_said_before_the_work(
 
 
 def test_what_no_file_can_hold_is_said_before_the_work(files: Path) -> None:
-    tiles = texrs.TileSet(WEAVE, 32)
+    tiles = texrs.CornerTiles(WEAVE, 32)
     before = sorted(files.iterdir())
     with pytest.raises(texrs.errors.FileError, match="the disk has no room for its 12884901888.00 GiB"):
         tiles.to_file(files / "out.npy", 2**31)
@@ -235,8 +235,8 @@ def test_what_is_too_large_is_told_how_it_is_made(
 
 def test_python_is_told_in_its_own_words() -> None:
     for verb, words in (
-        (texrs.design, "texrs.TileSet makes"),
-        (texrs.tile, "texrs.TileSet makes"),
+        (texrs.design, "texrs.CornerTiles makes"),
+        (texrs.tile, "texrs.CornerTiles makes"),
         (texrs.synthesize, "texrs.PlaneTexture.to_zarr and to_dask make it in parts"),
     ):
         with pytest.raises(LimitExceeded, match=words):

@@ -42,7 +42,7 @@ def test_no_command_asks_for_rows_first() -> None:
 def test_corners_are_x_and_y(here: Path) -> None:
     words = " ".join(f"{column},{row}" for row, column in CORNERS)
     assert main(["rectify", "wall.png", "-o", "flat.png", "--corners", words, "-q"]) == 0
-    expected = texrs.rectify(WALL.image, view=texrs.View(corners=CORNERS)).image
+    expected = texrs.rectify(WALL.image, view=texrs.PlaneView(corners=CORNERS)).image
     np.testing.assert_array_equal(io.read("flat.png"), expected)
 
 

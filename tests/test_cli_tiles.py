@@ -22,11 +22,11 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture(scope="module")
-def tiles() -> texrs.TileSet:
-    return texrs.TileSet(DOTS, 48, variants=1, motion="keep")
+def tiles() -> texrs.CornerTiles:
+    return texrs.CornerTiles(DOTS, 48, variants=1, motion="keep")
 
 
-def test_the_set_is_what_engines_read(here: Path, tiles: texrs.TileSet, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_set_is_what_engines_read(here: Path, tiles: texrs.CornerTiles, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["tiles", "dots.png", "-o", "set", "--index", "12x8", *OPTIONS]
     assert main(words) == 0
     assert np.array_equal(io.read("set/image.png"), tiles.atlas)
@@ -40,18 +40,18 @@ def test_the_set_is_what_engines_read(here: Path, tiles: texrs.TileSet, capsys: 
     assert "tiles.glsl was changed since" in capsys.readouterr().err
 
 
-def test_windows_of_pictures_and_of_materials(here: Path, tiles: texrs.TileSet) -> None:
+def test_windows_of_pictures_and_of_materials(here: Path, tiles: texrs.CornerTiles) -> None:
     assert main(["tiles", "dots.png", "-o", "w.png", "--size", "50x40", "--origin", f"{FAR},-7", *OPTIONS]) == 0
     assert np.array_equal(io.read("w.png"), tiles[-7:33, FAR : FAR + 50])
     texrs.Material({"albedo": DOTS, "height": DOTS[..., 0]}).save("stones")
     assert main(["tiles", "stones", "-o", "out", "--size", "50x40", *OPTIONS]) == 0
-    made = texrs.TileSet(texrs.Material.read("stones"), 48, variants=1, motion="keep").window(0, (40, 50))
+    made = texrs.CornerTiles(texrs.Material.read("stones"), 48, variants=1, motion="keep").window(0, (40, 50))
     assert made.material is not None
     for name in ("albedo", "height"):
         assert np.array_equal(io.read(f"out/{name}.png"), made.material[name].pixels)
 
 
-def test_windows_larger_than_memory(here: Path, tiles: texrs.TileSet) -> None:
+def test_windows_larger_than_memory(here: Path, tiles: texrs.CornerTiles) -> None:
     stores = pytest.importorskip("texrs.stores")
     pytest.importorskip("zarr")
     words = ["--size", "90x70", "--chunks", "64", "--origin", f"5,{FAR}", *OPTIONS]

@@ -6,7 +6,7 @@ from scipy.ndimage import binary_dilation
 
 import texrs
 from texrs import samples
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.exemplar.segmentation import Segmentation
 from texrs.papers.design.elements import measure_elements
@@ -28,7 +28,7 @@ def flowers():
 
 @pytest.fixture(scope="module")
 def pebbles():
-    return Elements.of_sample(samples.pebbles((112, 112)))
+    return ElementAnalysis.of_sample(samples.pebbles((112, 112)))
 
 
 def covered(result, which):

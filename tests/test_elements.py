@@ -11,7 +11,7 @@ import texrs
 from element_checks import passes, score
 from texrs import elements, samples
 from texrs._arrays import to_lab
-from texrs.elements import Elements, ElementSearch, Layout, _proposal, analyse
+from texrs.elements import ElementAnalysis, ElementSearch, Layout, _proposal, analyse
 from texrs.elements._consensus import extend_mask
 from texrs.elements._mask import cut_foreground
 from texrs.elements._mixture import Mixture
@@ -47,14 +47,14 @@ GROUND = [(c[0], c[1] + SPACING / 2) for c in CENTRES[[0, 7, 14, 21, 28]]]
 
 
 @pytest.fixture(scope="module")
-def entry() -> Elements:
+def entry() -> ElementAnalysis:
     return analyse(IMAGE, box=BOX, background=GROUND, layout="disjoint")
 
 
 # --- what is found ---------------------------------------------------------------------------------------------------
 
 
-def test_elements_mask_and_places(entry: Elements) -> None:
+def test_elements_mask_and_places(entry: ElementAnalysis) -> None:
     found = score(entry.points, CENTRES, BOX[2:], IMAGE.shape)
     assert found.recall == 1
     assert found.precision == 1
@@ -174,7 +174,7 @@ def test_the_letter_of_the_paper() -> None:
 
 
 @pytest.mark.parametrize("kind", ["grey", "float", "sixteen", "alpha"])
-def test_any_array(kind: str, entry: Elements) -> None:
+def test_any_array(kind: str, entry: ElementAnalysis) -> None:
     given = {
         "grey": IMAGE[..., 0],
         "float": IMAGE.astype(np.float32) / 255,
@@ -283,7 +283,7 @@ def test_bad_input_gets_a_sentence(change: dict, message: str) -> None:
 def test_layouts_go_by_two_names(paper: str, layout: str) -> None:
     assert Layout(paper) is Layout(layout)
     assert str(Layout(paper)) == layout
-    assert Elements(IMAGE, CENTRES, MASK, (19, 19), paper, np.ones(len(CENTRES))).layout is Layout(layout)
+    assert ElementAnalysis(IMAGE, CENTRES, MASK, (19, 19), paper, np.ones(len(CENTRES))).layout is Layout(layout)
 
 
 def test_options_are_checked_where_they_are_made() -> None:
@@ -323,7 +323,7 @@ def test_what_is_found_in_noise_lies_in_it() -> None:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
-def test_an_entry_comes_back(tmp_path: Path, entry: Elements) -> None:
+def test_an_entry_comes_back(tmp_path: Path, entry: ElementAnalysis) -> None:
     kept = entry.with_similarity(k=2)
     kept.save(tmp_path / "e.npz")
     back = elements.load(tmp_path / "e.npz")
@@ -340,7 +340,7 @@ def test_an_entry_comes_back(tmp_path: Path, entry: Elements) -> None:
     np.testing.assert_array_equal(back.similarity(k=2).sets, entry.similarity(k=2).sets)
 
 
-def test_entries_that_cannot_be_read(tmp_path: Path, entry: Elements) -> None:
+def test_entries_that_cannot_be_read(tmp_path: Path, entry: ElementAnalysis) -> None:
     path = tmp_path / "e.npz"
     entry.save(path)
     parts = dict(np.load(path))
@@ -373,7 +373,7 @@ def test_entries_that_cannot_be_read(tmp_path: Path, entry: Elements) -> None:
             elements.load(path)
 
 
-def test_pictures(entry: Elements) -> None:
+def test_pictures(entry: ElementAnalysis) -> None:
     made = elements.pictures(entry)
     assert all(p.dtype == np.uint8 for p in made.values())
     assert made["points"].shape == made["mask"].shape == IMAGE.shape

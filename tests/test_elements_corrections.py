@@ -11,18 +11,18 @@ import pytest
 import texrs
 from texrs import elements, samples
 from texrs.cli import main
-from texrs.elements import Elements, correct
+from texrs.elements import ElementAnalysis, correct
 from texrs.errors import InvalidInput
 
 DOTS = samples.load("dots", size=(96, 96))
 
 
 @pytest.fixture(scope="module")
-def found() -> Elements:
+def found() -> ElementAnalysis:
     return elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint")
 
 
-def test_an_element_that_is_dropped_is_no_foreground(found: Elements) -> None:
+def test_an_element_that_is_dropped_is_no_foreground(found: ElementAnalysis) -> None:
     row, column = np.rint(found.points[1]).astype(int)
     fewer = correct(found, [{"op": "drop", "elements": [1]}])
     np.testing.assert_array_equal(fewer.points, np.delete(found.points, 1, axis=0))
@@ -31,7 +31,7 @@ def test_an_element_that_is_dropped_is_no_foreground(found: Elements) -> None:
     assert 0.5 < (found.mask & ~fewer.mask).sum() / (found.mask.sum() / len(found.points)) < 2
 
 
-def test_one_that_is_added_back_is_foreground_again(found: Elements) -> None:
+def test_one_that_is_added_back_is_foreground_again(found: ElementAnalysis) -> None:
     steps = [{"op": "drop", "elements": 1}, {"op": "add", "points": found.points[1:2]}]
     again = correct(found, steps)
     assert sorted(map(tuple, again.points)) == sorted(map(tuple, found.points))
@@ -41,7 +41,7 @@ def test_one_that_is_added_back_is_foreground_again(found: Elements) -> None:
     assert len(again.report["corrections"]) == 2
 
 
-def test_the_rest_is_moved_named_and_painted(found: Elements) -> None:
+def test_the_rest_is_moved_named_and_painted(found: ElementAnalysis) -> None:
     place = found.points[0] + 1
     made = correct(
         found,
@@ -60,7 +60,7 @@ def test_the_rest_is_moved_named_and_painted(found: Elements) -> None:
     assert "connected means" in made.report["warnings"][0]
 
 
-def test_corrections_are_made_again_with_the_analysis(found: Elements, tmp_path: Path) -> None:
+def test_corrections_are_made_again_with_the_analysis(found: ElementAnalysis, tmp_path: Path) -> None:
     steps = [{"op": "drop", "elements": [0, 2]}]
     wanted = correct(found, steps)
     again = elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint", corrections=steps)
@@ -76,7 +76,7 @@ def test_corrections_are_made_again_with_the_analysis(found: Elements, tmp_path:
 
 
 def test_the_command_writes_the_page_and_reads_the_list(
-    found: Elements, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    found: ElementAnalysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     texrs.io.write("in.png", DOTS.image)
@@ -107,11 +107,11 @@ def test_what_is_doubtful_is_said_and_what_to_give() -> None:
     assert not [d for d in given.report["warnings"] if "proposed" in d]
 
 
-def test_names_do_not_leave_their_place(found: Elements) -> None:
+def test_names_do_not_leave_their_place(found: ElementAnalysis) -> None:
     assert "<script>alert" not in elements.page(found, "<script>alert(1)</script>")
 
 
-def test_numbers_are_seen_on_their_elements(found: Elements) -> None:
+def test_numbers_are_seen_on_their_elements(found: ElementAnalysis) -> None:
     picture = elements.pictures(found)["numbers"]
     assert picture.shape == (192, 192, 3)
     for row, column in np.rint(2 * found.points).astype(int):
@@ -138,12 +138,12 @@ def test_numbers_are_seen_on_their_elements(found: Elements) -> None:
         ([{"op": "foreground", "points": [[48, 48]], "radius": -1}], "radius: needs a number"),
     ],
 )
-def test_bad_corrections(found: Elements, steps: object, message: str) -> None:
+def test_bad_corrections(found: ElementAnalysis, steps: object, message: str) -> None:
     with pytest.raises(InvalidInput, match=message):
         correct(found, steps)
 
 
-def test_elements_must_be_left(found: Elements) -> None:
+def test_elements_must_be_left(found: ElementAnalysis) -> None:
     drop: Callable[[int], dict[str, object]] = lambda n: {"op": "drop", "elements": list(range(n))}  # noqa: E731
     with pytest.raises(InvalidInput, match="leave 2 elements"):
         correct(found, [drop(len(found.points) - 2)])

@@ -10,7 +10,7 @@ import pytest
 
 import texrs
 from texrs import elements, layouts, samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions
 from texrs.papers.splice.foreground import split_foreground
@@ -28,9 +28,9 @@ def draw_discs(centres: np.ndarray, radii: np.ndarray, *, wrap: bool = False) ->
     return (np.linalg.norm(away, axis=-1) <= radii).any(axis=-1)
 
 
-def make_entry(points: np.ndarray, mask: np.ndarray, **given: object) -> Elements:
+def make_entry(points: np.ndarray, mask: np.ndarray, **given: object) -> ElementAnalysis:
     image = np.where(mask, 200, 60).astype(np.uint8)
-    return Elements(image, points, mask, (17, 17), Layout.DISJOINT, np.linspace(1, 0.5, len(points)), **given)
+    return ElementAnalysis(image, points, mask, (17, 17), Layout.DISJOINT, np.linspace(1, 0.5, len(points)), **given)
 
 
 MASK = draw_discs(np.concatenate([CENTRES, [ALONE]]), np.array([RADIUS] * 6))
@@ -120,7 +120,7 @@ def test_around_cyclic_borders_elements_are_whole() -> None:
 
 def test_bricks_are_cells() -> None:
     sample = samples.bricks((128, 128))
-    entry = Elements.of_sample(sample)
+    entry = ElementAnalysis.of_sample(sample)
     truth, shares = sample.labels, []
     for number in range(1, len(entry.points) + 1):
         mine = entry.labels == number
@@ -133,7 +133,7 @@ def test_bricks_are_cells() -> None:
 
 def test_cells_that_the_mask_missed_are_there() -> None:
     sample = samples.bricks((128, 128))
-    whole = Elements.of_sample(sample)
+    whole = ElementAnalysis.of_sample(sample)
     mask = sample.mask.copy()
     one = whole.labels == 1
     mask[one] = False
@@ -225,7 +225,7 @@ def test_cells_are_the_elements_where_joints_part_all() -> None:
     ("name", "regular", "rows"), [("net", True, True), ("bricks", True, True), ("dots", False, False)]
 )
 def test_the_arrangement_is_known(name: str, regular: bool, rows: bool) -> None:
-    entry = Elements.of_sample(samples.load(name, size=(192, 192)))
+    entry = ElementAnalysis.of_sample(samples.load(name, size=(192, 192)))
     found = entry.arrangement
     assert (found.lattice is not None, found.courses is not None) == (regular, rows)
     if found.courses is not None:

@@ -8,7 +8,7 @@ import pytest
 
 import texrs
 from plane_checks import look, look_at_room, look_twice, turn_between
-from texrs import Plane, View, io, planes
+from texrs import Plane, PlaneView, io, planes
 from texrs.cli import main
 from texrs.errors import InvalidInput
 
@@ -42,7 +42,7 @@ def test_a_sky_goes_on_above_the_floor_and_a_wall_behind_it() -> None:
     picture, low, floor, wall = look_at_room((160, 200))
     sky = np.broadcast_to(np.array([150, 185, 230], np.uint8), picture.shape)
     above = np.where(low[..., np.newaxis], picture, sky)
-    made = texrs.extend(above, right=40, view=View(plane=floor, ground=low), seed=1)
+    made = texrs.extend(above, right=40, view=PlaneView(plane=floor, ground=low), seed=1)
     new = made.image[:, 200:].astype(int)
     blue = new[..., 2] > new[..., 0] + 40
     # The line between them goes on.
@@ -50,7 +50,7 @@ def test_a_sky_goes_on_above_the_floor_and_a_wall_behind_it() -> None:
     line = y - 0.12 * (x - 100) - 0.47 * 160
     assert blue[line < -4].mean() > 0.99
     assert blue[line > 4].mean() < 0.02
-    views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
+    views = [PlaneView(plane=floor, ground=low), PlaneView(plane=wall, ground=~low)]
     room = texrs.extend(picture, right=40, view=views, seed=1)
     rows, columns = np.rint(room.source_map.coordinates[:, 200:]).astype(int).reshape(-1, 2).T
     assert (low[rows, columns] == (line > 0).ravel()).mean() > 0.97
@@ -60,13 +60,13 @@ def test_a_thing_at_the_border_does_not_go_on() -> None:
     seen, ground = FLOOR.copy(), np.ones(FLOOR.shape[:2], np.bool_)
     ground[100:, 50:120] = False
     seen[~ground] = (210, 20, 200)
-    made = texrs.extend(seen, bottom=40, view=View(plane=PLANE, ground=ground), seed=1)
+    made = texrs.extend(seen, bottom=40, view=PlaneView(plane=PLANE, ground=ground), seed=1)
     rows, columns = np.rint(made.source_map.coordinates[160:]).astype(int).reshape(-1, 2).T
     assert ground[rows, columns].all()
     # What covers all of the border does, as a wall on the left.
     wall = np.ones_like(ground)
     wall[:, :50] = False
-    made = texrs.extend(seen, left=30, view=View(plane=PLANE, ground=wall), seed=1)
+    made = texrs.extend(seen, left=30, view=PlaneView(plane=PLANE, ground=wall), seed=1)
     rows, columns = np.rint(made.source_map.coordinates[:, :30]).astype(int).reshape(-1, 2).T
     assert not wall[rows, columns].any()
 
@@ -91,7 +91,7 @@ def test_again_and_otherwise() -> None:
     again = texrs.extend(FLOOR, left=64, right=80, bottom=24, view=PLANE, seed=2)
     np.testing.assert_array_equal(again.image, LARGER.image)
     grey = texrs.extend(
-        FLOOR[..., 0].astype(np.uint16), top=16, view=View(slant=40, tilt=100, fov=55), boundary_width=2
+        FLOOR[..., 0].astype(np.uint16), top=16, view=PlaneView(slant=40, tilt=100, fov=55), boundary_width=2
     )
     assert grey.image.shape == (176, 176)
     assert grey.image.dtype == np.uint16
@@ -105,7 +105,10 @@ def test_again_and_otherwise() -> None:
         (lambda: texrs.extend(FLOOR, right=-4), "right: "),
         (lambda: texrs.extend(FLOOR, right=10**6), "right: "),
         (lambda: texrs.extend(FLOOR, top=300, view=PLANE), "reach the plane's horizon"),
-        (lambda: texrs.extend(FLOOR, top=8, view=View(corners=[[0, 0]] * 4)), "corners: needs the four of a convex"),
+        (
+            lambda: texrs.extend(FLOOR, top=8, view=PlaneView(corners=[[0, 0]] * 4)),
+            "corners: needs the four of a convex",
+        ),
         (lambda: texrs.extend(FLOOR, top=8, view=PLANE, boundary_width=65), "boundary: "),
         (lambda: texrs.extend(FLOOR[:40], top=8), "each side must be at least 64"),
     ],

@@ -9,7 +9,7 @@ import pytest
 
 import texrs
 from plane_checks import look_at_room
-from texrs import Finish, SourceMap, Synthesis, View, samples
+from texrs import PlaneView, RenderOptions, SourceMap, Synthesis, samples
 from texrs.errors import FileError, InvalidInput
 
 PEBBLES = samples.pebbles((64, 80)).image
@@ -17,7 +17,7 @@ LIT = (PEBBLES * np.linspace(0.5, 1, 80)[:, np.newaxis]).astype(np.uint8)
 HOLE = np.zeros((64, 80), np.bool_)
 HOLE[20:40, 30:50] = True
 FLOOR = samples.load("tilted_discs", size=(96, 112)).image
-WORDS = json.loads(Finish((True, True)).arrays()["finish"].tobytes())
+WORDS = json.loads(RenderOptions((True, True)).arrays()["finish"].tobytes())
 ROOM, LOW, LOWER, UPPER = look_at_room((96, 112))
 
 VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
@@ -32,15 +32,18 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
     "inpaint and blend": (lambda: texrs.inpaint(PEBBLES, HOLE, screening=0.1), PEBBLES),
     "synthesize": (lambda: texrs.synthesize(PEBBLES, 64), PEBBLES),
     "perspective": (lambda: texrs.perspective(FLOOR, texrs.scale_maps.from_angles((96, 112), 34, 90), 64), FLOOR),
-    "rectify": (lambda: texrs.rectify(FLOOR, view=texrs.View(slant=34, fov=60)), FLOOR),
-    "rectify and grow": (lambda: texrs.rectify(FLOOR, size=150, view=texrs.View(slant=34, fov=60)), FLOOR),
-    "extend": (lambda: texrs.extend(FLOOR, right=24, view=texrs.View(slant=34, fov=60)), FLOOR),
-    "remove": (lambda: texrs.remove(FLOOR, np.pad(HOLE, ((0, 32), (0, 32))), view=texrs.View(slant=34, fov=60)), FLOOR),
+    "rectify": (lambda: texrs.rectify(FLOOR, view=texrs.PlaneView(slant=34, fov=60)), FLOOR),
+    "rectify and grow": (lambda: texrs.rectify(FLOOR, size=150, view=texrs.PlaneView(slant=34, fov=60)), FLOOR),
+    "extend": (lambda: texrs.extend(FLOOR, right=24, view=texrs.PlaneView(slant=34, fov=60)), FLOOR),
+    "remove": (
+        lambda: texrs.remove(FLOOR, np.pad(HOLE, ((0, 32), (0, 32))), view=texrs.PlaneView(slant=34, fov=60)),
+        FLOOR,
+    ),
     "remove from a room": (
         lambda: texrs.remove(
             ROOM,
             np.pad(HOLE, ((16, 16), (16, 16))),
-            view=[View(plane=LOWER, ground=LOW), View(plane=UPPER, ground=~LOW)],
+            view=[PlaneView(plane=LOWER, ground=LOW), PlaneView(plane=UPPER, ground=~LOW)],
         ),
         ROOM,
     ),
@@ -89,7 +92,7 @@ def test_labels_are_designed_as_labels() -> None:
 
 def test_another_finish_may_be_asked_for() -> None:
     source = texrs.design(PEBBLES, 64).source_map
-    plain = texrs.apply(source, PEBBLES, finish=Finish((True, True)))
+    plain = texrs.apply(source, PEBBLES, finish=RenderOptions((True, True)))
     assert (plain == source.render(PEBBLES)).all()
     assert (plain != texrs.apply(source, PEBBLES)).any()
     # Put together by hand a map says nothing, and is looked up.

@@ -189,7 +189,9 @@ def test_maps_of_no_shape_are_refused(shape):
         (lambda: MAP.compose(range(2**60)), "inner: "),
         (lambda: texrs.fields.identity(axes=np.zeros((2, 2))), "axes: "),
         (
-            lambda: texrs.elements.Elements.of_labels(np.zeros((32, 32)), np.eye(32, dtype=int), layout=np.eye(2)),
+            lambda: texrs.elements.ElementAnalysis.of_labels(
+                np.zeros((32, 32)), np.eye(32, dtype=int), layout=np.eye(2)
+            ),
             "layout: ",
         ),
         (lambda: texrs.stores.map_to_zarr(len, range(2**60), "no.zarr"), "items: "),

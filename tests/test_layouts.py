@@ -16,14 +16,14 @@ from scipy.spatial import cKDTree
 import texrs
 from texrs import io, layouts, samples
 from texrs.cli import main
-from texrs.elements import Elements, Layout, correct, load
+from texrs.elements import ElementAnalysis, Layout, correct, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.sowing import continue_points
 from texrs.point_sets import PointLayout
 
-DOTS = Elements.of_sample(samples.dots((128, 128)))
-WALL = Elements.of_sample(samples.bricks((160, 160)))
+DOTS = ElementAnalysis.of_sample(samples.dots((128, 128)))
+WALL = ElementAnalysis.of_sample(samples.bricks((160, 160)))
 OBLIQUE = ((0.0, 24.0), (18.0, 8.0))
 RING = 64 + 45 * np.stack([np.sin(np.arange(8) * np.pi / 4), np.cos(np.arange(8) * np.pi / 4)], axis=1)
 
@@ -48,7 +48,7 @@ def test_scale_makes_any_layout_sparser() -> None:
 
 
 @pytest.mark.parametrize("entry", [DOTS, WALL], ids=["separate", "cells"])
-def test_an_oblique_lattice_goes_on_as_one(entry: Elements) -> None:
+def test_an_oblique_lattice_goes_on_as_one(entry: ElementAnalysis) -> None:
     made = texrs.splice(entry, layouts.lattice(96, *OBLIQUE), 256, layout_scale=1.4, align=False, seed=1)
     targets = list_matches(made, "target")
     inside = targets[((targets > 20) & (targets < 235)).all(axis=1)]
@@ -131,7 +131,7 @@ def test_cells_that_the_border_cuts_take_the_joints_beside_them() -> None:
     inside = np.logical_and.outer(at % 40 >= 4, at % 40 >= 4)
     labels = np.where(inside, 1 + np.add.outer(3 * ((at + 40) // 40), (at + 40) // 40), 0)
     image = np.where(inside, 200, 20).astype(np.uint8)
-    entry = Elements.of_labels(image, labels, layout="jointed")
+    entry = ElementAnalysis.of_labels(image, labels, layout="jointed")
     made = texrs.splice(entry, layouts.courses(200, 40, 40, joint=4), 200, layout_scale=1, seed=2)
     assert {m["element"] for m in made.report["matches"]} > {4}
     dark = minimum_filter(made.image, 7) < 100
@@ -142,7 +142,7 @@ def test_cells_that_the_border_cuts_take_the_joints_beside_them() -> None:
 def test_known_elements_are_elements_of_all() -> None:
     stones = samples.pebbles((128, 128))
     assert stones.labels is not None
-    entry = Elements.of_labels(stones.image, stones.labels)
+    entry = ElementAnalysis.of_labels(stones.image, stones.labels)
     assert (entry.labels > 0).tolist() == (stones.labels > 0).tolist()
     assert len(entry.instances) == len(np.unique(stones.labels)) - 1
     moved = texrs.self_splice(entry, {"op": "remove", "element": 5})
@@ -156,8 +156,8 @@ def test_pieces_of_a_mask_are_elements() -> None:
         mask[row : row + 8, column : column + 8] = True
     mask[-4:, 30:38] = True
     image = np.where(mask, 200, 50).astype(np.uint8)
-    assert len(Elements.of_labels(image, mask).points) == 4
-    around = Elements.of_labels(image, mask, wrap=(True, False))
+    assert len(ElementAnalysis.of_labels(image, mask).points) == 4
+    around = ElementAnalysis.of_labels(image, mask, wrap=(True, False))
     assert len(around.points) == 3
     assert [1.5, 33.5] in around.points.tolist()
 
@@ -178,7 +178,7 @@ def test_known_elements_are_saved(tmp_path: Path) -> None:
 
 def test_corrections_go_before_known_elements() -> None:
     entry = layouts.lattice(96, (0, 24), (24, 0))
-    known = Elements.of_labels(entry.image, entry.labels)
+    known = ElementAnalysis.of_labels(entry.image, entry.labels)
     fewer = correct(known, [{"op": "drop", "elements": [0]}])
     assert fewer.known is None
     assert len(fewer.instances) == len(known.points) - 1
@@ -230,8 +230,11 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         (lambda: layouts.make({"layout": "spiral"}), "layout: needs a mapping"),
         (lambda: layouts.make({"layout": "courses", "size": 64, "height": 20}), "courses needs 'length'"),
         (lambda: layouts.make({"layout": "courses", "size": 64, "tall": 20}), "courses has no 'tall'"),
-        (lambda: Elements.of_labels(DOTS.image, np.ones((4, 4), int)), "labels: needs whole numbers"),
-        (lambda: Elements.of_labels(DOTS.image, 1 + np.arange(128 * 128).reshape(128, 128)), "separate elements need"),
+        (lambda: ElementAnalysis.of_labels(DOTS.image, np.ones((4, 4), int)), "labels: needs whole numbers"),
+        (
+            lambda: ElementAnalysis.of_labels(DOTS.image, 1 + np.arange(128 * 128).reshape(128, 128)),
+            "separate elements need",
+        ),
         (lambda: texrs.splice(DOTS, replace(WALL, known=np.ones((160, 160), np.int32))), "b.known: needs labels"),
         (
             lambda: texrs.splice(DOTS, replace(WALL, known=np.full((160, 160), 2**31 - 1, np.int32))),

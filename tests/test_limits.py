@@ -17,7 +17,7 @@ from texrs.errors import InvalidInput, LimitExceeded, TexrsError
 DOTS = texrs.samples.dots((64, 64)).image
 HOLE = np.pad(np.ones((16, 16), bool), 24)
 VOLUME = texrs.samples.stripes((32, 32, 32)).image
-ENTRY = texrs.Elements.of_sample(texrs.samples.dots((96, 96)))
+ENTRY = texrs.ElementAnalysis.of_sample(texrs.samples.dots((96, 96)))
 VERBS = {
     "design": lambda: texrs.design(DOTS, 96),
     "design_variants": lambda: list(texrs.design_variants(DOTS, 2, 96)),
@@ -29,10 +29,10 @@ VERBS = {
     "tile": lambda: texrs.tile(DOTS),
     "inpaint": lambda: texrs.inpaint(DOTS, HOLE),
     "extend": lambda: texrs.extend(DOTS, right=32),
-    "rectify": lambda: texrs.rectify(DOTS, view=texrs.View(slant=10, fov=50)),
-    "remove": lambda: texrs.remove(DOTS, HOLE, view=texrs.View(slant=10, fov=50)),
+    "rectify": lambda: texrs.rectify(DOTS, view=texrs.PlaneView(slant=10, fov=50)),
+    "remove": lambda: texrs.remove(DOTS, HOLE, view=texrs.PlaneView(slant=10, fov=50)),
     "analyse": lambda: texrs.elements.analyse(DOTS),
-    "TileSet": lambda: texrs.TileSet(DOTS, 32),
+    "CornerTiles": lambda: texrs.CornerTiles(DOTS, 32),
 }
 
 

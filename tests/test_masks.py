@@ -277,7 +277,7 @@ def test_remove_grows_and_feathers() -> None:
     marked = np.zeros((128, 128), np.uint8)
     marked[60:80, 50:70] = 255
     made = texrs.remove(
-        floor, Mask(marked, grow=2, feather=3), view=texrs.View(slant=35, fov=60), margin=0, boundary_width=0
+        floor, Mask(marked, grow=2, feather=3), view=texrs.PlaneView(slant=35, fov=60), margin=0, boundary_width=0
     )
     inner = widen(marked > 0, 2)
     assert made.report["filled"] == widen(inner, 3).mean()

@@ -40,7 +40,7 @@ FLOOR = samples.load("tilted_discs", size=(96, 112)).image
 TILTED = Material({"albedo": FLOOR, "height": FLOOR[..., 0].astype(np.float32)})
 HOLE = np.zeros((64, 80), np.bool_)
 HOLE[20:40, 30:50] = True
-SEEN = texrs.View(slant=34, fov=60)
+SEEN = texrs.PlaneView(slant=34, fov=60)
 DOTS = Material({"albedo": samples.dots((64, 64)).image, "height": samples.dots((64, 64)).image[..., 0]})
 
 VERBS: dict[str, tuple[Callable[[], Synthesis], Material]] = {

@@ -111,7 +111,7 @@ def test_source_maps_and_elements(manager: Any, tmp_path: Path) -> None:
     assert (kind, options["rgb"], second) == ("image", True, "labels")
     assert places.shape == (*made.source_map.shape, 3)
     assert len(np.unique(patches)) == len(np.unique(made.source_map.label))
-    entry = elements.Elements.of_sample(samples.bricks((96, 96)))
+    entry = elements.ElementAnalysis.of_sample(samples.bricks((96, 96)))
     entry.save(tmp_path / "entry.npz")
     (image, _, _), (labels, _, kind), (points, _, last) = open_files(manager, tmp_path / "entry.npz")
     assert (kind, last) == ("labels", "points")

@@ -44,7 +44,7 @@ VERBS = {
     "perspective": lambda image: texrs.perspective(image, SIZES, 80),
     "extend": lambda image: texrs.extend(image, right=16),
     "remove": lambda image: texrs.remove(image, HOLE),
-    "rectify": lambda image: texrs.rectify(image, view=texrs.View(corners=[(4, 6), (2, 60), (60, 56), (62, 4)])),
+    "rectify": lambda image: texrs.rectify(image, view=texrs.PlaneView(corners=[(4, 6), (2, 60), (60, 56), (62, 4)])),
     "splice": lambda image: texrs.splice(image, np.ascontiguousarray(image[:, ::-1])),
     "self splice": lambda image: texrs.self_splice(image),
 }

@@ -9,7 +9,7 @@ import pytest
 
 import texrs
 from plane_checks import SIDE, look, look_twice
-from texrs import Plane, View, io, scale_maps
+from texrs import Plane, PlaneView, io, scale_maps
 from texrs.cli import main
 from texrs.errors import InvalidInput
 
@@ -32,7 +32,7 @@ def test_a_flat_texture_is_as_it_was() -> None:
 
 
 def test_scales_are_even() -> None:
-    result = texrs.rectify(FLOOR, view=View(slant=45, fov=55))
+    result = texrs.rectify(FLOOR, view=PlaneView(slant=45, fov=55))
     before, after = (
         np.log(scale_maps.from_mask(scale_maps.auto_mask(picture), trend="plane")).std()
         for picture in (FLOOR, result.image)
@@ -129,7 +129,7 @@ def test_doubtful_planes_are_told() -> None:
 def test_only_the_ground_is_used() -> None:
     ground = np.zeros(PLANE.shape, bool)
     ground[100:, 40:] = True
-    result = texrs.rectify(FLOOR, view=View(plane=PLANE, ground=ground))
+    result = texrs.rectify(FLOOR, view=PlaneView(plane=PLANE, ground=ground))
     rows, columns = np.rint(result.source_map.coordinates).astype(int).reshape(-1, 2).T
     assert ground[rows, columns].mean() > 0.99
 
@@ -142,9 +142,9 @@ def test_only_the_ground_is_used() -> None:
         (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: needs a number"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=7.9), "resolution: at most|hardly anything"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, size=8), "size"),
-        (lambda: texrs.rectify(FLOOR, view=View(slant=88, fov=10)), "sharp|before its horizon|are sharp"),
-        (lambda: texrs.rectify(FLOOR, view=View(ground=np.zeros((240, 288), bool))), "ground: marks nothing"),
-        (lambda: texrs.rectify(FLOOR, view=View(ground=np.zeros((9, 9), bool))), "ground"),
+        (lambda: texrs.rectify(FLOOR, view=PlaneView(slant=88, fov=10)), "sharp|before its horizon|are sharp"),
+        (lambda: texrs.rectify(FLOOR, view=PlaneView(ground=np.zeros((240, 288), bool))), "ground: marks nothing"),
+        (lambda: texrs.rectify(FLOOR, view=PlaneView(ground=np.zeros((9, 9), bool))), "ground"),
         (lambda: texrs.rectify(FLOOR[:32], view=PLANE), "image: each side must be at least 64"),
     ],
 )
@@ -176,7 +176,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         == 0
     )
     assert "slant 45.0 and tilt 90.0" in capsys.readouterr().err
-    np.testing.assert_array_equal(io.read(out), texrs.rectify(FLOOR, view=View(slant=45, fov=55)).image)
+    np.testing.assert_array_equal(io.read(out), texrs.rectify(FLOOR, view=PlaneView(slant=45, fov=55)).image)
     assert json.loads((tmp_path / "s" / "report.json").read_text())["plane"]["fov"] == 55
     assert main(["apply", source, photo, "-o", str(tmp_path / "again.png")]) == 0
     corners = PLANE.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])

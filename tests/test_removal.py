@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 import texrs
 from plane_checks import dress, look, look_at_room
-from texrs import Plane, View, io, planes
+from texrs import Plane, PlaneView, io, planes
 from texrs.cli import main
 from texrs.errors import InvalidInput
 from texrs.inpainting._sides import share_out
@@ -85,7 +85,7 @@ def test_light_is_followed() -> None:
     seen = np.where(marked[..., np.newaxis], np.uint8(90), lit)
     off = {}
     for light in (False, True):
-        made = texrs.remove(seen, marked, view=View(plane=PLANE, ground=~marked), match_lighting=light, seed=1)
+        made = texrs.remove(seen, marked, view=PlaneView(plane=PLANE, ground=~marked), match_lighting=light, seed=1)
         sides = [
             np.log(picture[60:125, 150:225].reshape(65, 3, 25, 3).mean(axis=(0, 2, 3))) for picture in (made.image, lit)
         ]
@@ -127,14 +127,14 @@ def test_a_shadow_that_is_left_does_not_go_on() -> None:
     shadow = np.zeros(SIZE, bool)
     shadow[100:, 92:104] = shadow[122:, 92:150] = True
     picture[shadow & ~marked] //= 4
-    made = texrs.remove(picture, marked, view=View(plane=PLANE, ground=ground & ~marked & ~shadow), seed=1)
+    made = texrs.remove(picture, marked, view=PlaneView(plane=PLANE, ground=ground & ~marked & ~shadow), seed=1)
     rows, columns = np.rint(made.source_map.coordinates[marked]).astype(int).T
     assert not shadow[rows, columns].any()
     # Nor does the sky, but where there is sky around the hole.
     assert ground[rows, columns].all()
     aloft = np.zeros(SIZE, bool)
     aloft[20:35, 60:90] = True
-    made = texrs.remove(picture, aloft, view=View(plane=PLANE, ground=ground & ~shadow), seed=1)
+    made = texrs.remove(picture, aloft, view=PlaneView(plane=PLANE, ground=ground & ~shadow), seed=1)
     rows, columns = np.rint(made.source_map.coordinates[aloft]).astype(int).T
     assert not ground[rows, columns].any()
 
@@ -143,7 +143,7 @@ def test_each_of_several_planes_is_filled_from_its_own() -> None:
     picture, low, floor, wall = look_at_room((160, 200))
     marked = np.zeros(low.shape, bool)
     marked[40:110, 80:110] = True
-    views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
+    views = [PlaneView(plane=floor, ground=low), PlaneView(plane=wall, ground=~low)]
     made = texrs.remove(np.where(marked[..., np.newaxis], np.uint8(9), picture), marked, view=views, seed=1)
     changed = made.source_map.label > 0
     rows, columns = np.rint(made.source_map.coordinates[changed]).astype(int).T
@@ -210,7 +210,7 @@ def test_a_plane_seen_from_the_front_needs_no_perspective() -> None:
     wall = texrs.samples.bricks((128, 128)).image
     marked = np.zeros((128, 128), bool)
     marked[40:70, 50:90] = True
-    made = texrs.remove(wall, marked, view=View(slant=0))
+    made = texrs.remove(wall, marked, view=PlaneView(slant=0))
     assert made.report["planes"][0]["plane"] is None
     np.testing.assert_array_equal(made.image[:30], wall[:30])
 
@@ -251,18 +251,21 @@ MARKED[70:90, 60:90] = True
         (lambda: texrs.remove(FLOOR, ~(MARKED | True)), "mask: marks nothing"),
         (lambda: texrs.remove(FLOOR, MARKED | True), "mask: with its margin it covers"),
         (lambda: texrs.remove(FLOOR, MARKED[:40]), "mask: "),
-        (lambda: texrs.remove(FLOOR, MARKED, view=View(ground=MARKED)), "ground: nothing of it is left"),
+        (lambda: texrs.remove(FLOOR, MARKED, view=PlaneView(ground=MARKED)), "ground: nothing of it is left"),
         (lambda: texrs.remove(FLOOR, MARKED, view=[]), "view: needs at least one"),
         (lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, PLANE]), "ground: of several planes all but one"),
         (
-            lambda: texrs.remove(FLOOR, MARKED, view=[View(ground=~MARKED), View(ground=~MARKED)]),
+            lambda: texrs.remove(FLOOR, MARKED, view=[PlaneView(ground=~MARKED), PlaneView(ground=~MARKED)]),
             "ground: nothing of it is left",
         ),
-        (lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, View(ground=MARKED | True)]), "ground: the others leave"),
+        (
+            lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, PlaneView(ground=MARKED | True)]),
+            "ground: the others leave",
+        ),
         (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
         (lambda: texrs.remove(FLOOR, MARKED, patch_size=2), "patch: "),
         (lambda: texrs.remove(FLOOR, MARKED, boundary_width=65), "boundary: "),
-        (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: needs a texrs.View"),
+        (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: needs a texrs.PlaneView"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: nothing"),
         (lambda: texrs.inpaint(FLOOR, MARKED, allowed=MARKED), "allowed: marks nothing"),
@@ -288,7 +291,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     io.write(mask, MARKED.astype(np.uint8) * 255)
     assert main(["remove", photo, mask, "-o", out, "--slant", "48", "--fov", "55", "--seed", "2"]) == 0
     assert "slant 48.0" in capsys.readouterr().err
-    np.testing.assert_array_equal(io.read(out), texrs.remove(FLOOR, MARKED, view=View(slant=48, fov=55), seed=2).image)
+    np.testing.assert_array_equal(
+        io.read(out), texrs.remove(FLOOR, MARKED, view=PlaneView(slant=48, fov=55), seed=2).image
+    )
     assert main(["remove", photo, mask, "-o", str(tmp_path / "no.png"), "--margin", "99"]) == 2
     assert "--margin" in capsys.readouterr().err
     assert not (tmp_path / "no.png").exists()
@@ -300,7 +305,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         io.write(path, what.astype(np.uint8))
     said = ["remove", photo, mask, "-o", out, "--ground", lower, "--ground", upper]
     assert main([*said, "--fov", "55", "--slant", "50", "--slant", "35", "--tilt", "90", "--tilt", "10"]) == 0
-    views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
+    views = [PlaneView(plane=floor, ground=low), PlaneView(plane=wall, ground=~low)]
     np.testing.assert_array_equal(io.read(out), texrs.remove(picture, marked, view=views).image)
     capsys.readouterr()
     for more, words in (

@@ -19,12 +19,12 @@ STONES = texrs.Material({"albedo": PEBBLES, "height": PEBBLES[..., 0]})
 THINGS = {
     "Synthesis": MADE,
     "SourceMap": MADE.source_map,
-    "Finish": MADE.source_map.finish,
+    "RenderOptions": MADE.source_map.finish,
     "Exemplar": texrs.Exemplar(PEBBLES),
-    "Elements": texrs.elements.Elements.of_sample(DOTS),
+    "ElementAnalysis": texrs.elements.ElementAnalysis.of_sample(DOTS),
     "layout": texrs.layouts.points([(20, 20), (40, 40), (20, 50)], 64),
     "Plane": texrs.Plane((64, 64), 45),
-    "View": texrs.View(slant=45, ground=np.ones((64, 64), bool)),
+    "PlaneView": texrs.PlaneView(slant=45, ground=np.ones((64, 64), bool)),
     "Field": texrs.fields.circular(axes=2),
     "field of frames": texrs.fields.from_array(np.tile(np.eye(2), (8, 8, 1, 1))),
     "Segmentation": texrs.exemplar.segment(PEBBLES),
@@ -33,14 +33,14 @@ THINGS = {
     "Guide": texrs.Guide(exemplar=PEBBLES[..., 0], output=PEBBLES[..., 1]),
     "ElementOptions": texrs.ElementOptions(labels=DOTS.labels),
     "Comparison": texrs.volume.compare(VOLUME, VOLUME),
-    "Particles": texrs.volume.component_statistics(VOLUME[..., 0] > 100),
+    "ComponentStatistics": texrs.volume.component_statistics(VOLUME[..., 0] > 100),
     "Material": STONES,
     "Map": STONES["height"],
     "ScaleMap": texrs.scale_maps.from_angles((64, 64), 40, 90),
     "Sample": DOTS,
     "list": [MADE] * 3,
-    "Gallery": texrs.Gallery([MADE] * 3),
-    "long Gallery": texrs.Gallery([MADE] * 30),
+    "ResultList": texrs.ResultList([MADE] * 3),
+    "long ResultList": texrs.ResultList([MADE] * 30),
 }
 
 
@@ -64,7 +64,7 @@ def test_a_scale_map_is_shown_with_its_contours():
 def test_what_is_as_by_default_is_not_said():
     assert repr(texrs.ElementOptions(segmentation="grid")) == "ElementOptions(segmentation='grid')"
     assert repr(MADE) == f"<Synthesis of {MADE.image.shape[0]} x {MADE.image.shape[1]}, 3 channels of uint8>"
-    assert repr(texrs.Gallery([MADE] * 30)).endswith("... 30 in all])")
+    assert repr(texrs.ResultList([MADE] * 30)).endswith("... 30 in all])")
 
 
 def open_png(data: bytes) -> Any:
@@ -112,9 +112,9 @@ def test_arrows_go_where_the_axes_go():
 
 
 def test_a_gallery_shows_all_that_it_holds():
-    gallery = texrs.Gallery(each for each in (MADE, PEBBLES, PEBBLES[..., 0], MADE.source_map))
+    gallery = texrs.ResultList(each for each in (MADE, PEBBLES, PEBBLES[..., 0], MADE.source_map))
     pictures = [open_png(b64decode(part.split('"')[0])) for part in gallery._repr_html_().split("base64,")[1:]]
     assert [p.shape[:2] for p in pictures] == [MADE.image.shape[:2], (64, 64), (64, 64), MADE.image.shape[:2]]
     assert np.array_equal(pictures[0], MADE.image)
     with pytest.raises(InvalidInput, match="results: "):
-        texrs.Gallery([{"no": "picture"}])._repr_html_()
+        texrs.ResultList([{"no": "picture"}])._repr_html_()

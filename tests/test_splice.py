@@ -14,7 +14,7 @@ import splice_checks as checks
 import texrs
 from reference.look_up import view
 from texrs import samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.papers.splice.energy import minimise_energy
 from texrs.papers.splice.factors import _FACTORS
@@ -22,8 +22,8 @@ from texrs.papers.splice.factors import _FACTORS
 SIZE = (192, 192)
 
 
-def entry(name: str, seed: int = 0, size: tuple[int, int] = SIZE) -> Elements:
-    return Elements.of_sample(samples.load(name, size=size, seed=seed))
+def entry(name: str, seed: int = 0, size: tuple[int, int] = SIZE) -> ElementAnalysis:
+    return ElementAnalysis.of_sample(samples.load(name, size=size, seed=seed))
 
 
 ENTRIES = {name: entry(name) for name in ("dots", "pebbles", "leaves_and_flowers", "net", "bricks")}
@@ -189,7 +189,7 @@ def test_an_element_moves_whole_where_its_centre_lies_beside_it(shape: str, midd
     image[~mask] += 160
     centre = np.argwhere(one).mean(axis=0) if middle == "of mass" else np.array([11.5, 11.5])
     points = centre + 24.0 * np.array([[i, j] for i in range(4) for j in range(4)])
-    mine = Elements(image, points, mask, (25, 25), layout, np.ones(16))
+    mine = ElementAnalysis(image, points, mask, (25, 25), layout, np.ones(16))
     result = texrs.self_splice(mine, {"op": "move", "element": 5, "by": [4, -3]})
     assert (result.image != image).any()
     if layout == Layout.DISJOINT:

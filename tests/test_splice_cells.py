@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 import texrs
 from test_cells import draw_voronoi
 from texrs import samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import find_cells
 from texrs.exemplar.contours import resample
@@ -26,19 +26,19 @@ from texrs.papers.splice.cells.tessellation import take_cells
 SIZE = (160, 160)
 
 
-def stones(seed: int = 0, *, apart: float = 30.0, light: bool = True) -> Elements:
+def stones(seed: int = 0, *, apart: float = 30.0, light: bool = True) -> ElementAnalysis:
     image, truth = draw_voronoi(SIZE, apart, light=light, seed=seed)
     mask = image < 200 if light else image > 40
     pixels = np.argwhere(np.ones(SIZE))
     points = np.stack([pixels[truth.ravel() == k].mean(axis=0) for k in np.unique(truth)])
     width = int(apart) | 1
-    return Elements(image, points, mask, (width, width), Layout.JOINTED, np.ones(len(points)))
+    return ElementAnalysis(image, points, mask, (width, width), Layout.JOINTED, np.ones(len(points)))
 
 
 STONES = stones()
-WALL = Elements.of_sample(samples.bricks((192, 192)))
-NET = Elements.of_sample(samples.net((192, 192)))
-DOTS = Elements.of_sample(samples.dots((160, 160)))
+WALL = ElementAnalysis.of_sample(samples.bricks((192, 192)))
+NET = ElementAnalysis.of_sample(samples.net((192, 192)))
+DOTS = ElementAnalysis.of_sample(samples.dots((160, 160)))
 
 
 @pytest.fixture(scope="module")
@@ -70,14 +70,14 @@ def test_cells_are_where_they_are_wanted(a: str, b: str, spliced: Any) -> None:
 @pytest.mark.parametrize("side", [128, 320])
 def test_what_is_known_of_a_sample_is_put_together_from_its_cells(side: int) -> None:
     wall = samples.bricks((side, side))
-    entry = Elements.of_sample(wall)
+    entry = ElementAnalysis.of_sample(wall)
     assert len(entry.points) < entry.labels.max() == wall.labels.max()
     report = texrs.self_splice(entry, size=(side + 64, side + 80), seed=1).report
     assert (report["method"], report["present"]) == ("cells", 1)
 
 
 def test_few_whole_cells_keep_their_size() -> None:
-    entry = Elements.of_sample(samples.bricks((128, 128)))
+    entry = ElementAnalysis.of_sample(samples.bricks((128, 128)))
     wide = texrs.self_splice(entry, size=(192, 208), seed=1)
     there = wide.source_map.render(entry.mask, interpolation="nearest")
     assert there.mean() == pytest.approx(entry.mask.mean(), abs=0.05)

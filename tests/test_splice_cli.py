@@ -23,7 +23,7 @@ def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         io.write(f"{name}.png", texrs.samples.load(name, size=(96, 96)).image)
     # What is known need not be found.
     for name, side in (("bricks", 160), ("pebbles", 96)):
-        texrs.Elements.of_sample(texrs.samples.load(name, size=(side, side))).save(f"{name}.npz")
+        texrs.ElementAnalysis.of_sample(texrs.samples.load(name, size=(side, side))).save(f"{name}.npz")
 
 
 def test_splice(tmp_path: Path) -> None:

@@ -5,15 +5,15 @@ import pytest
 
 import texrs
 from texrs import samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 
 SIDE, RADIUS = 160, 9
 SHADOW = (8, 8)
 """Where the middle of a disc's shadow lies, from its own."""
-LAYOUT = Elements.of_sample(samples.load("pebbles", size=(SIDE, SIDE)))
+LAYOUT = ElementAnalysis.of_sample(samples.load("pebbles", size=(SIDE, SIDE)))
 
 
-def make_discs(*, shadow: bool = False, light: float = 0.0) -> Elements:
+def make_discs(*, shadow: bool = False, light: float = 0.0) -> ElementAnalysis:
     """Return discs on a rough ground, with a shadow each, or in a light that grows from left to right."""
     rng = np.random.default_rng(2)
     image = 0.5 + rng.normal(0, 0.05, (SIDE, SIDE))
@@ -31,7 +31,7 @@ def make_discs(*, shadow: bool = False, light: float = 0.0) -> Elements:
     image = (image * (1 + light * (columns / SIDE - 0.5))).clip(0, 1)
     pixels = np.rint(255 * np.stack([image] * 3, axis=-1)).astype(np.uint8)
     box = (2 * RADIUS + 1, 2 * RADIUS + 1)
-    return Elements(pixels, centres.astype(float), mask, box, Layout.DISJOINT, np.ones(len(centres)))
+    return ElementAnalysis(pixels, centres.astype(float), mask, box, Layout.DISJOINT, np.ones(len(centres)))
 
 
 def find_ground(result: texrs.Synthesis) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_without_ground_to_speak_of_it_is_warped_as_before() -> None:
     # Squares of 40 with a line of a pixel between them.
     mask = np.ones_like(mine.mask)
     mask[::40] = mask[:, ::40] = False
-    full = Elements(mine.image, mine.points, mask, (39, 39), Layout.DISJOINT, mine.scores)
+    full = ElementAnalysis(mine.image, mine.points, mask, (39, 39), Layout.DISJOINT, mine.scores)
     result = texrs.splice(full, LAYOUT, 96, seed=1)
     assert result.image.shape == (96, 96, 3)
     assert result.report["screening"] == 0
@@ -118,7 +118,7 @@ def test_what_is_kept_of_a_texture_changes_nothing() -> None:
 
     from texrs.papers.splice.entry import CACHES
 
-    def splice_anew(entry: Elements, seed: int) -> np.ndarray:
+    def splice_anew(entry: ElementAnalysis, seed: int) -> np.ndarray:
         for cache in CACHES:
             cache.clear()
         return np.asarray(texrs.splice(entry, LAYOUT, seed=seed).image)

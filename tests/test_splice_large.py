@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay, KDTree
 import texrs
 from reference.look_up import view
 from texrs import point_sets, samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.papers.splice import energy
 from texrs.papers.splice.adjustment import STRAIN, limit_strain
 from texrs.papers.splice.matching import Match, match_layouts
@@ -45,7 +45,7 @@ def test_crowded_targets_find_sources_farther_away(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("upright", [True, False])
 def test_large_walls_are_solved_for_at_fewer_pixels(upright: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    wall = Elements.of_sample(samples.load("bricks", size=(192, 192)))
+    wall = ElementAnalysis.of_sample(samples.load("bricks", size=(192, 192)))
     pins = np.rint(wall.points).astype(np.intp)
     shift = np.random.default_rng(1).uniform(-3, 3, pins.shape)
     full = energy.minimise_energy(~wall.mask, pins, shift, upright=upright)
@@ -60,8 +60,8 @@ def test_large_walls_are_solved_for_at_fewer_pixels(upright: bool, monkeypatch: 
 
 
 def test_neighbours_in_walls_go_about_as_far() -> None:
-    wall = Elements.of_sample(samples.load("bricks", size=(192, 192)))
-    stones = Elements.of_sample(samples.load("pebbles", size=(192, 192)))
+    wall = ElementAnalysis.of_sample(samples.load("bricks", size=(192, 192)))
+    stones = ElementAnalysis.of_sample(samples.load("pebbles", size=(192, 192)))
     torn = match_layouts(wall, stones, (192, 192), align=True)
     found = limit_strain(wall, torn)
     start = found.starts
@@ -100,8 +100,8 @@ def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPat
     """Coarser systems and near matches go through the whole of a splice."""
     monkeypatch.setattr(energy, "MOST", 1 << 13)
     monkeypatch.setattr(_matching, "DENSE", 0)
-    wall = Elements.of_sample(samples.load("bricks", size=(128, 128)))
-    stones = Elements.of_sample(samples.load("pebbles", size=(128, 128)))
+    wall = ElementAnalysis.of_sample(samples.load("bricks", size=(128, 128)))
+    stones = ElementAnalysis.of_sample(samples.load("pebbles", size=(128, 128)))
     result = texrs.splice(wall, stones, use_cells=False, seed=1)
     assert max(result.report["system"]) < 128
     np.testing.assert_array_equal(view(result.source_map, wall.image), result.image)
@@ -109,7 +109,7 @@ def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("name", ["pebbles", "dots"])
 def test_separate_elements_go_on_unmirrored_on_their_own_layout(name: str) -> None:
-    mine = Elements.of_sample(samples.load(name, size=(160, 160)))
+    mine = ElementAnalysis.of_sample(samples.load(name, size=(160, 160)))
     made = texrs.self_splice(mine, size=480, seed=1)
     found = np.array([match["found"] for match in made.report["matches"]])
     which = np.array([match["element"] for match in made.report["matches"]])

@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay
 
 import texrs
 from texrs import samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.papers.splice.nets.graph import describe_places, join_knots
 from texrs.papers.splice.nets.targets import Targets, go_part_of_the_way, take_points
@@ -22,7 +22,7 @@ SIZE = (144, 144)
 UNIT = 30.0
 
 
-def draw_net(seed: int = 0, *, shifted: bool = False, jitter: float = 2.0) -> Elements:
+def draw_net(seed: int = 0, *, shifted: bool = False, jitter: float = 2.0) -> ElementAnalysis:
     """Draw rings, each joined with its neighbours by slack lines, over a ground of noise."""
     rng = np.random.default_rng(seed)
     lattice = np.argwhere(np.ones((5, 5))) * UNIT + 12.0
@@ -42,11 +42,11 @@ def draw_net(seed: int = 0, *, shifted: bool = False, jitter: float = 2.0) -> El
         mask[at[:, 0], at[:, 1]] = mask[np.maximum(at[:, 0] - 1, 0), at[:, 1]] = True
     shade = np.where(mask, 210, 50) + rng.normal(0, 6, SIZE)
     image = np.repeat(np.clip(shade, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
-    return Elements(image, points, mask, (17, 17), Layout.CONNECTED, np.ones(len(points)))
+    return ElementAnalysis(image, points, mask, (17, 17), Layout.CONNECTED, np.ones(len(points)))
 
 
 NET, LAYOUT = draw_net(), draw_net(3, shifted=True, jitter=3.0)
-DOTS = Elements.of_sample(samples.dots((144, 144)))
+DOTS = ElementAnalysis.of_sample(samples.dots((144, 144)))
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +194,7 @@ def test_places_say_how_far_knots_and_lines_are() -> None:
         (replace(NET, points=NET.points[:6] / 20), {"use_nets": True}, "8 pixels"),
     ],
 )
-def test_wrong_options_are_told(entry: Elements, options: Any, words: str) -> None:
+def test_wrong_options_are_told(entry: ElementAnalysis, options: Any, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
         texrs.splice(entry, LAYOUT, 64, **options)
 

@@ -11,16 +11,16 @@ from scipy.ndimage import binary_dilation, gaussian_filter
 
 import texrs
 from texrs import samples
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.papers.splice.foreground import split_foreground
 from texrs.papers.splice.ground import survey
 
-BUTTONS = Elements.of_sample(samples.load("dots", size=(192, 192)))
+BUTTONS = ElementAnalysis.of_sample(samples.load("dots", size=(192, 192)))
 SIDE, RADIUS = 160, 9
 
 
-def make_discs(*, light: float = 0.0, noise: float = 0.02, share: float = 1.0) -> Elements:
+def make_discs(*, light: float = 0.0, noise: float = 0.02, share: float = 1.0) -> ElementAnalysis:
     """Return discs on a rough ground, in a light that grows from left to right, of which a share falls on the discs."""
     rng = np.random.default_rng(4)
     rows, columns = np.indices((SIDE, SIDE))
@@ -34,14 +34,14 @@ def make_discs(*, light: float = 0.0, noise: float = 0.02, share: float = 1.0) -
     image = np.where(mask, 0.7 + share * lit, 0.4 + rng.normal(0, noise, mask.shape) + lit)
     pixels = np.rint(255 * np.stack([image] * 3, axis=-1).clip(0, 1)).astype(np.uint8)
     box = (2 * RADIUS + 1, 2 * RADIUS + 1)
-    return Elements(pixels, centres.astype(float), mask, box, Layout.DISJOINT, np.ones(len(centres)))
+    return ElementAnalysis(pixels, centres.astype(float), mask, box, Layout.DISJOINT, np.ones(len(centres)))
 
 
-def find_middle(a: Elements) -> int:
+def find_middle(a: ElementAnalysis) -> int:
     return int(np.hypot(*(a.points - np.array(a.mask.shape) / 2).T).argmin())
 
 
-def count_elements(result: texrs.Synthesis, a: Elements) -> np.ndarray[Any, np.dtype[np.intp]]:
+def count_elements(result: texrs.Synthesis, a: ElementAnalysis) -> np.ndarray[Any, np.dtype[np.intp]]:
     """How many pixels of an element the result shows of each target."""
     core = split_foreground(a).core > 0
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
@@ -73,7 +73,7 @@ def test_moved_elements_keep_their_colours_above_others() -> None:
 @pytest.mark.parametrize("edit", [{"op": "rows", "by": 12}, {"op": "shift", "by": 14}, {"op": "scale", "factor": 0.85}])
 def test_margins_of_dense_textures_are_full(edit: dict[str, Any]) -> None:
     """Of pebbles hardly any ground is seen; the layout goes on, and is not reflected at pixels."""
-    stones = Elements.of_sample(samples.load("pebbles", size=(192, 192)))
+    stones = ElementAnalysis.of_sample(samples.load("pebbles", size=(192, 192)))
     result = texrs.self_splice(stones, edit, seed=1)
     shown = result.source_map.label > 0
     sides = (shown[:16], shown[-16:], shown[:, :16], shown[:, -16:])
@@ -204,14 +204,16 @@ def test_without_correction_it_is_the_texture_looked_up() -> None:
 
 
 def test_no_strength_keeps_what_the_border_cuts() -> None:
-    result = texrs.splice(BUTTONS, Elements.of_sample(samples.load("pebbles", size=(192, 192))), strength=0, seed=1)
+    result = texrs.splice(
+        BUTTONS, ElementAnalysis.of_sample(samples.load("pebbles", size=(192, 192))), strength=0, seed=1
+    )
     np.testing.assert_array_equal(result.image, BUTTONS.image)
     assert len(result.report["matches"]) == len(split_foreground(BUTTONS).points)
 
 
 def test_a_texture_that_wraps_goes_on_around() -> None:
     sample = samples.load("dots", size=(160, 160), wrap=True)
-    mine = replace(Elements.of_sample(sample), wrap=(True, True))
+    mine = replace(ElementAnalysis.of_sample(sample), wrap=(True, True))
     moved = texrs.self_splice(mine, {"op": "shift", "by": [30, 50]}, seed=1).image
     np.testing.assert_array_equal(moved, np.roll(mine.image, (30, 50), axis=(0, 1)))
 

@@ -9,13 +9,13 @@ import pytest
 
 import texrs
 from texrs import samples
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.point_sets import nearest_distances, spacing
 
 
-def entry(name: str, size: tuple[int, int] = (128, 128)) -> Elements:
-    return Elements.of_sample(samples.load(name, size=size))
+def entry(name: str, size: tuple[int, int] = (128, 128)) -> ElementAnalysis:
+    return ElementAnalysis.of_sample(samples.load(name, size=size))
 
 
 ENTRIES = {name: entry(name) for name in ("dots", "pebbles", "net", "bricks")}
@@ -54,7 +54,7 @@ def test_the_map_looks_into_the_texture(name: str, edit: Any) -> None:
 
 def test_every_separate_element_is_shown_whole() -> None:
     sample = samples.load("dots", size=(128, 128))
-    mine = Elements.of_sample(sample)
+    mine = ElementAnalysis.of_sample(sample)
     assert sample.labels is not None
     result = texrs.self_splice(mine, size=LARGE, seed=1)
     whole = np.bincount(sample.labels.ravel())

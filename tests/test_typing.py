@@ -19,7 +19,7 @@ CALLS = {
     "extend": "texrs.extend(image",
     "remove": "texrs.remove(image, image",
     "Plane": "texrs.Plane((32, 32), 45",
-    "View": "texrs.View(",
+    "PlaneView": "texrs.PlaneView(",
     "inpaint": "texrs.inpaint(image, image",
     "blend": "texrs.blend(source, image, wrap=True",
     "analyse": "texrs.elements.analyse(image",

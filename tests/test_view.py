@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import Plane, View
+from texrs import Plane, PlaneView
 from texrs._masks import widen
 from texrs.errors import InvalidInput
 from texrs.planes import _choose
@@ -20,17 +20,17 @@ CORNERS = PLANE.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])
 
 
 def test_each_way_to_say_it_settles_the_plane() -> None:
-    angles, ground = View(slant=40, tilt=100, fov=55).settle(SHAPE)
+    angles, ground = PlaneView(slant=40, tilt=100, fov=55).settle(SHAPE)
     assert angles == PLANE
     assert ground is None
-    corners, _ = View(corners=CORNERS, fov=55).settle(SHAPE)
+    corners, _ = PlaneView(corners=CORNERS, fov=55).settle(SHAPE)
     assert corners is not None
     assert corners.slant == pytest.approx(40, abs=1e-6)
     assert corners.tilt == pytest.approx(100, abs=1e-6)
-    assert View(slant=30).settle(SHAPE)[0] == Plane(SHAPE, 30, 90, fov=60)
-    assert View.of(PLANE).settle(SHAPE)[0] == PLANE
-    assert View.of(None).settle(SHAPE) == (None, None)
-    plane, ground = View(fov=50, ground=MASK.astype(np.uint8) * 9).settle(SHAPE)
+    assert PlaneView(slant=30).settle(SHAPE)[0] == Plane(SHAPE, 30, 90, fov=60)
+    assert PlaneView.of(PLANE).settle(SHAPE)[0] == PLANE
+    assert PlaneView.of(None).settle(SHAPE) == (None, None)
+    plane, ground = PlaneView(fov=50, ground=MASK.astype(np.uint8) * 9).settle(SHAPE)
     assert plane is None
     assert ground is not None
     np.testing.assert_array_equal(ground, MASK)
@@ -39,20 +39,20 @@ def test_each_way_to_say_it_settles_the_plane() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: View(slant=40, corners=CORNERS), "slant: corners says how the plane lies"),
-        (lambda: View(slant=40, plane=PLANE), "slant: plane says how the plane lies"),
-        (lambda: View(corners=CORNERS, plane=PLANE), "corners: plane says how the plane lies"),
-        (lambda: View(plane=40), "plane: needs a texrs.Plane, got 40"),  # type: ignore[arg-type]
-        (lambda: View(tilt=40), "tilt: needs slant"),
-        (lambda: View(plane=PLANE, fov=50), "fov: the plane has one already"),
-        (lambda: View(slant=89), "slant: needs a number"),
-        (lambda: View(fov=0.5), "fov: needs a number"),
-        (lambda: View(corners=[[1, 2], [3, 4]]), "corners: needs shape"),
-        (lambda: View(corners=CORNERS[[0, 2, 1, 3]]).settle(SHAPE), "corners: needs the four of a convex shape"),
-        (lambda: View.of(PLANE).settle((9, 9)), "plane: needs one of a picture of 9 x 9"),
-        (lambda: View(ground=MASK).settle((9, 9)), "ground: "),
-        (lambda: View(ground=MASK & False).settle(SHAPE), "ground: marks nothing"),
-        (lambda: View.of("floor"), "view: needs a texrs.View, or a texrs.Plane, got 'floor'"),  # type: ignore[arg-type]
+        (lambda: PlaneView(slant=40, corners=CORNERS), "slant: corners says how the plane lies"),
+        (lambda: PlaneView(slant=40, plane=PLANE), "slant: plane says how the plane lies"),
+        (lambda: PlaneView(corners=CORNERS, plane=PLANE), "corners: plane says how the plane lies"),
+        (lambda: PlaneView(plane=40), "plane: needs a texrs.Plane, got 40"),  # type: ignore[arg-type]
+        (lambda: PlaneView(tilt=40), "tilt: needs slant"),
+        (lambda: PlaneView(plane=PLANE, fov=50), "fov: the plane has one already"),
+        (lambda: PlaneView(slant=89), "slant: needs a number"),
+        (lambda: PlaneView(fov=0.5), "fov: needs a number"),
+        (lambda: PlaneView(corners=[[1, 2], [3, 4]]), "corners: needs shape"),
+        (lambda: PlaneView(corners=CORNERS[[0, 2, 1, 3]]).settle(SHAPE), "corners: needs the four of a convex shape"),
+        (lambda: PlaneView.of(PLANE).settle((9, 9)), "plane: needs one of a picture of 9 x 9"),
+        (lambda: PlaneView(ground=MASK).settle((9, 9)), "ground: "),
+        (lambda: PlaneView(ground=MASK & False).settle(SHAPE), "ground: marks nothing"),
+        (lambda: PlaneView.of("floor"), "view: needs a texrs.PlaneView, or a texrs.Plane, got 'floor'"),  # type: ignore[arg-type]
     ],
 )
 def test_what_says_nothing_gets_a_sentence(make: Callable[[], object], words: str) -> None:
@@ -74,7 +74,7 @@ def test_nor_is_it_in_what_is_taken_out(monkeypatch: pytest.MonkeyPatch) -> None
     with pytest.raises(InvalidInput, match="plane: needs one of"):
         texrs.remove(PICTURE, MASK, view=Plane((9, 9), 20))
     with pytest.raises(InvalidInput, match="corners: needs the four"):
-        texrs.remove(PICTURE, MASK, view=View(corners=CORNERS[[0, 2, 1, 3]]))
+        texrs.remove(PICTURE, MASK, view=PlaneView(corners=CORNERS[[0, 2, 1, 3]]))
 
 
 @pytest.mark.parametrize("wrap", [(False, False), (True, False), (False, True), (True, True)])

@@ -113,11 +113,13 @@ def splice_by_texrs(side: int, cold: bool, method: str | None) -> Side:
     def ready(given: Arrays) -> Work:
         import texrs
         from texrs import samples
-        from texrs.elements import Elements
+        from texrs.elements import ElementAnalysis
         from texrs.papers.splice import factors
         from texrs.papers.splice.entry import CACHES
 
-        mine, theirs = (Elements.of_sample(samples.load(name, size=(side, side))) for name in ("dots", "pebbles"))
+        mine, theirs = (
+            ElementAnalysis.of_sample(samples.load(name, size=(side, side))) for name in ("dots", "pebbles")
+        )
         mine.similarity()
 
         def work() -> np.ndarray:

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 
 import texrs
 
-wall = texrs.Elements.of_sample(texrs.samples.bricks((192, 192)))
+wall = texrs.ElementAnalysis.of_sample(texrs.samples.bricks((192, 192)))
 courses = texrs.layouts.courses((240, 320), [20, 34, 26], 52, vary=0.4, seed=1)
 built = texrs.splice(wall, courses, (240, 320), layout_scale=1, seed=2).image
 

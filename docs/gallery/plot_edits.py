@@ -11,7 +11,7 @@ import numpy as np
 
 import texrs
 
-buttons = texrs.Elements.of_sample(texrs.samples.dots((192, 192)))
+buttons = texrs.ElementAnalysis.of_sample(texrs.samples.dots((192, 192)))
 turns = np.sqrt(np.linspace(6, 165, 22))
 spiral = 96 + 6.5 * turns[:, np.newaxis] * np.stack([np.sin(turns), np.cos(turns)], axis=-1)
 edits = (None, "regularise", ["regularise", {"op": "rows", "by": 12}], [{"op": "points", "points": spiral.tolist()}])

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 import texrs
 
-wall = texrs.Elements.of_sample(texrs.samples.bricks((192, 192)))
+wall = texrs.ElementAnalysis.of_sample(texrs.samples.bricks((192, 192)))
 rng = np.random.default_rng(3)
 points = np.concatenate([np.indices((6, 8)).reshape(2, -1).T * 40 + 20.0])
 points += rng.uniform(-13, 13, points.shape)

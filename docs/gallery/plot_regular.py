@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import texrs
 
 dots = texrs.samples.dots((192, 192))
-elements = texrs.Elements.of_sample(dots)
+elements = texrs.ElementAnalysis.of_sample(dots)
 ordered = texrs.self_splice(elements, "regularise", seed=1).image
 
 figure, row = plt.subplots(1, 2, figsize=(9, 4.6), layout="constrained")

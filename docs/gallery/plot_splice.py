@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import texrs
 
 dots = texrs.samples.dots((192, 192))
-elements = texrs.Elements.of_sample(dots)
+elements = texrs.ElementAnalysis.of_sample(dots)
 layout = texrs.samples.net((192, 192))
 spliced = texrs.splice(elements, layout.image, seed=3).image
 

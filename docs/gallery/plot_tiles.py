@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 
 import texrs
 
-tiles = texrs.TileSet(texrs.samples.leaves_and_flowers((256, 256)).image, 128, seed=1)
+tiles = texrs.CornerTiles(texrs.samples.leaves_and_flowers((256, 256)).image, 128, seed=1)
 window = tiles[10**9 : 10**9 + 288, 0:480]
 
 figure, row = plt.subplots(1, 2, width_ratios=[288, 480], figsize=(11, 4.2), layout="constrained")

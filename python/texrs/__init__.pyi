@@ -22,8 +22,9 @@ from ._masks import Mask
 from ._threads import threads
 from ._version import __version__
 from .blending import blend
+from .corner_tiles import CornerTiles
 from .database import TextureDatabase
-from .elements import Elements
+from .elements import ElementAnalysis
 from .exemplar import ElementOptions, Exemplar
 from .extension import extend
 from .growth.constraints import Constraints, Guide
@@ -34,35 +35,34 @@ from .papers.perspective import perspective
 from .papers.solid import solid, synthesize
 from .papers.solid.window import PlaneTexture, SolidTexture
 from .papers.splice import self_splice, splice
-from .planes import Plane, View
+from .planes import Plane, PlaneView
 from .rectification import rectify
 from .removal import remove
-from .source_map import Finish, Reuse, SourceMap
-from .synthesis import Gallery, Synthesis
-from .tile_set import TileSet
+from .source_map import CopyStatistics, RenderOptions, SourceMap
+from .synthesis import ResultList, Synthesis
 from .tiling import Tiling, check_tiling, tile
 
 __all__ = [
     "Constraints",
+    "CopyStatistics",
+    "CornerTiles",
     "DeformationOptions",
+    "ElementAnalysis",
     "ElementOptions",
-    "Elements",
     "Exemplar",
-    "Finish",
-    "Gallery",
     "Guide",
     "Mask",
     "Material",
     "Plane",
     "PlaneTexture",
-    "Reuse",
+    "PlaneView",
+    "RenderOptions",
+    "ResultList",
     "SolidTexture",
     "SourceMap",
     "Synthesis",
     "TextureDatabase",
-    "TileSet",
     "Tiling",
-    "View",
     "__version__",
     "apply",
     "blend",

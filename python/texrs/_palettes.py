@@ -22,7 +22,7 @@ from texrs._typing import Array
 from texrs.errors import TexrsError
 from texrs.io import _origins
 from texrs.materials._material import Material
-from texrs.source_map import Finish, SourceMap
+from texrs.source_map import RenderOptions, SourceMap
 from texrs.synthesis import Synthesis
 
 __all__ = ["Palette", "ask", "find", "has_few_colours", "keep_material", "make_plain"]
@@ -138,7 +138,7 @@ def has_few_colours(image: Array) -> bool:
 def make_plain(source: SourceMap) -> SourceMap:
     """Return a source map whose pixels are looked up to the nearest pixel and are not corrected."""
     wrap = (False, False) if source.finish is None else source.finish.wrap
-    return replace(source, finish=Finish(wrap, interpolation="nearest"))
+    return replace(source, finish=RenderOptions(wrap, interpolation="nearest"))
 
 
 def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:

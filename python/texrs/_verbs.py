@@ -21,7 +21,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["takes_materials"]
 
 if TYPE_CHECKING:
-    from texrs.elements import Elements
+    from texrs.elements import ElementAnalysis
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -152,7 +152,7 @@ def _report_each(made: Iterator[Any], notices: Notices) -> Iterator[Any]:
         yield _report(_report(one, notices), own)
 
 
-def _analyse(material: object, guide: Array, name: str, progress: Progress | None) -> Elements:
+def _analyse(material: object, guide: Array, name: str, progress: Progress | None) -> ElementAnalysis:
     """Return the elements of a material, which are compared by all its maps."""
     # Most verbs need none.
     from texrs.elements import analyse

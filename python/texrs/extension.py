@@ -19,7 +19,7 @@ from texrs.blending import apply
 from texrs.errors import InvalidInput
 from texrs.inpainting._planes import LEAST, Part, add_rest, fill_parts
 from texrs.materials import Material
-from texrs.planes import Plane, View
+from texrs.planes import Plane, PlaneView
 from texrs.planes._choose import as_views, find_grounds, follow_plane
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -39,7 +39,7 @@ def extend(
     left: int = 0,
     right: int = 0,
     size: int | Sequence[int] | None = None,
-    view: View | Plane | Sequence[View | Plane] | None = None,
+    view: PlaneView | Plane | Sequence[PlaneView | Plane] | None = None,
     boundary_width: int = 0,
     screening: float | None = 0.1,
     match_lighting: bool = True,
@@ -57,7 +57,7 @@ def extend(
     size : int or (rows, columns), optional
         Size of the larger picture, in pixels: what the sides above do not add to it is added evenly, but towards the horizon
         only as far as the plane goes, and on the other side then.
-    view : View or Plane, or a sequence of them, optional
+    view : PlaneView or Plane, or a sequence of them, optional
         How the photograph shows the plane, as far as that is to be said; what is not is found. Where that is not sure, or the
         plane is seen from the front, things are as large as they are seen anywhere. What is no ground, as the sky above a
         floor, goes on as it lies, but nothing that stands on it. Of several planes, as a floor and a wall, each goes on by
@@ -95,7 +95,7 @@ def extend(
     --------
     >>> import texrs
     >>> floor = texrs.samples.tilted_discs((128, 128))
-    >>> larger = texrs.extend(floor.image, right=64, view=texrs.View(slant=35, fov=60), seed=1)
+    >>> larger = texrs.extend(floor.image, right=64, view=texrs.PlaneView(slant=35, fov=60), seed=1)
     >>> larger.image.shape, bool((larger.image[:, :128] == floor.image).all())
     ((128, 192, 3), True)
 

@@ -1,6 +1,6 @@
 """Layouts that are drawn, not found: points, lattices, cells and courses that elements are brought into.
 
-Each is an entry like that of a picture (`texrs.elements.Elements`), whose picture is a drawing of the layout, so that all that
+Each is an entry like that of a picture (`texrs.elements.ElementAnalysis`), whose picture is a drawing of the layout. All that
 takes the arrangement of a texture takes it: the second argument of `texrs.splice`, and a `texrs.TextureDatabase`. `make` makes
 one of a description in plain JSON types, as the command line does.
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_items, as_seed, as_size, as_wrap, check_memory, try_array
 from texrs._typing import Array, Labels
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.point_sets import nearest_distances
 
@@ -35,7 +35,7 @@ MOST = 1 << 18
 """Points or bricks, at the most."""
 
 
-def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[bool] = False) -> Elements:
+def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[bool] = False) -> ElementAnalysis:
     """Return a layout of points.
 
     Parameters
@@ -49,7 +49,7 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
 
     Returns
     -------
-    Elements
+    ElementAnalysis
         Disjoint, on a drawing (rows, columns) uint8.
 
     Raises
@@ -60,10 +60,10 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     Examples
     --------
     >>> import texrs
-    >>> from texrs.elements import Elements
+    >>> from texrs.elements import ElementAnalysis
     >>> ring = [[64 + 40 * s, 64 + 40 * c] for s, c in [(0, 1), (1, 0), (0, -1), (-1, 0), (0.7, 0.7), (-0.7, -0.7)]]
     >>> layout = texrs.layouts.points(ring, 128)
-    >>> buttons = Elements.of_sample(texrs.samples.dots((128, 128)))
+    >>> buttons = ElementAnalysis.of_sample(texrs.samples.dots((128, 128)))
     >>> made = texrs.splice(buttons, layout, 128, layout_scale=1)
     >>> len(made.report["matches"])
     6
@@ -90,7 +90,7 @@ def lattice(
     second: Sequence[float],
     *,
     origin: Sequence[float] | None = None,
-) -> Elements:
+) -> ElementAnalysis:
     """Return the points of a lattice, which goes on beyond the drawing as a lattice does.
 
     Parameters
@@ -104,7 +104,7 @@ def lattice(
 
     Returns
     -------
-    Elements
+    ElementAnalysis
         Disjoint, on a drawing (rows, columns) uint8.
 
     Raises
@@ -138,7 +138,7 @@ def lattice(
     return _draw_points(at, shape, (False, False))
 
 
-def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> Elements:
+def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> ElementAnalysis:
     """Return a layout of cells: a tessellation, as the panes of a window or the stones of a pavement.
 
     Parameters
@@ -150,7 +150,7 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> Elements:
 
     Returns
     -------
-    Elements
+    ElementAnalysis
         Jointed, one a label, on a drawing (H, W) uint8.
 
     Raises
@@ -162,9 +162,9 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> Elements:
     --------
     >>> import numpy as np
     >>> import texrs
-    >>> from texrs.elements import Elements
+    >>> from texrs.elements import ElementAnalysis
     >>> panes = np.add.outer(10 * (np.arange(96) // 24), np.arange(96) // 32) + 1
-    >>> wall = Elements.of_sample(texrs.samples.bricks((160, 160)))
+    >>> wall = ElementAnalysis.of_sample(texrs.samples.bricks((160, 160)))
     >>> texrs.splice(wall, texrs.layouts.cells(panes), 96).report["method"]
     'cells'
 
@@ -174,7 +174,7 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> Elements:
         raise InvalidInput(f"labels: needs (H, W) with sides of at least {SHORTEST}, got shape {given.shape}")
     check_memory(4 * given.size, "labels")
     image = np.full(given.shape, GROUND, np.uint8)
-    found = Elements.of_labels(image, given, layout=Layout.JOINTED, wrap=wrap)
+    found = ElementAnalysis.of_labels(image, given, layout=Layout.JOINTED, wrap=wrap)
     image[~found.mask] = THING
     return found
 
@@ -188,7 +188,7 @@ def courses(
     vary: float = 0.0,
     joint: float = 2.0,
     seed: int = 0,
-) -> Elements:
+) -> ElementAnalysis:
     """Return courses of bricks or stones, each free along its own: a wall.
 
     Parameters
@@ -210,7 +210,7 @@ def courses(
 
     Returns
     -------
-    Elements
+    ElementAnalysis
         Jointed, on a drawing (rows, columns) uint8.
 
     Raises
@@ -251,7 +251,7 @@ def courses(
     return cells(labels)
 
 
-def make(description: Mapping[str, Any]) -> Elements:
+def make(description: Mapping[str, Any]) -> ElementAnalysis:
     """Make a layout of a description in plain JSON types.
 
     Parameters
@@ -262,7 +262,7 @@ def make(description: Mapping[str, Any]) -> Elements:
 
     Returns
     -------
-    Elements
+    ElementAnalysis
 
     Raises
     ------
@@ -292,7 +292,12 @@ def make(description: Mapping[str, Any]) -> Elements:
     return function(**given)
 
 
-_MADE: dict[str, Callable[..., Elements]] = {"points": points, "lattice": lattice, "cells": cells, "courses": courses}
+_MADE: dict[str, Callable[..., ElementAnalysis]] = {
+    "points": points,
+    "lattice": lattice,
+    "cells": cells,
+    "courses": courses,
+}
 
 
 def __dir__() -> list[str]:
@@ -311,7 +316,7 @@ def _as_pair(value: object, name: str) -> tuple[float, float]:
     return as_float(float(pair[0]), name, -1e6, 1e6), as_float(float(pair[1]), name, -1e6, 1e6)
 
 
-def _draw_points(at: Points, shape: tuple[int, int], wrap: tuple[bool, bool]) -> Elements:
+def _draw_points(at: Points, shape: tuple[int, int], wrap: tuple[bool, bool]) -> ElementAnalysis:
     """Draw points as discs of one size that do not touch."""
     from scipy.spatial import cKDTree
 
@@ -324,4 +329,4 @@ def _draw_points(at: Points, shape: tuple[int, int], wrap: tuple[bool, bool]) ->
     owner[pixel[:, 0], pixel[:, 1]] = np.arange(1, len(at) + 1)
     image = np.where(owner > 0, THING, GROUND).astype(np.uint8)
     side = 2 * round(radius) + 1
-    return Elements(image, at, owner > 0, (side, side), Layout.DISJOINT, np.ones(len(at)), wrap=wrap)
+    return ElementAnalysis(image, at, owner > 0, (side, side), Layout.DISJOINT, np.ones(len(at)), wrap=wrap)

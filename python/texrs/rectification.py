@@ -22,7 +22,7 @@ from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.errors import InvalidInput
 from texrs.materials import Material
-from texrs.planes import Plane, View
+from texrs.planes import Plane, PlaneView
 from texrs.planes._choose import see
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -50,7 +50,7 @@ COURSES = 0.35
 def rectify(
     image: Array | Material,
     *,
-    view: View | Plane | None = None,
+    view: PlaneView | Plane | None = None,
     resolution: float | None = None,
     size: int | Sequence[int] | None = None,
     wrap: bool | Sequence[bool] | None = None,
@@ -64,7 +64,7 @@ def rectify(
     ----------
     image : (H, W) or (H, W, C) array
         The photograph, any real dtype, each side at least 64.
-    view : View or Plane, optional
+    view : PlaneView or Plane, optional
         How the photograph shows the plane, as far as that is to be said; what is not is found.
     resolution : float, optional
         Pixels of the texture for one of the photograph's middle, 0.05 to 8. By default as large as things are seen in the mean
@@ -103,7 +103,7 @@ def rectify(
     --------
     >>> import texrs
     >>> floor = texrs.samples.tilted_discs((192, 192))
-    >>> flat = texrs.rectify(floor.image, view=texrs.View(slant=50, fov=53))
+    >>> flat = texrs.rectify(floor.image, view=texrs.PlaneView(slant=50, fov=53))
     >>> flat.source_map.shapes, flat.report["plane"]["slant"]
     (((192, 192),), 50.0)
 
@@ -118,7 +118,7 @@ def rectify(
     check_work("rectify", [pixels], asked or pixels.shape[:2], "image" if asked is None else "size")
     watch("plane", 0.0)
     with answering(progress, "plane", 0.0):
-        seen = see(pixels, View.of(view))
+        seen = see(pixels, PlaneView.of(view))
     watch("plane", 1.0)
     plane = seen.plane
     fine = choose_resolution(plane, seen.ground, fine)

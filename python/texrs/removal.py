@@ -21,7 +21,7 @@ from texrs.blending import apply
 from texrs.errors import InvalidInput
 from texrs.inpainting._planes import Part, add_rest, fill_parts
 from texrs.materials import Material
-from texrs.planes import Plane, View
+from texrs.planes import Plane, PlaneView
 from texrs.planes._choose import as_views, find_grounds, follow_plane
 from texrs.synthesis import Synthesis
 
@@ -40,7 +40,7 @@ def remove(
     image: Array | Material,
     mask: Array | Mask | str,
     *,
-    view: View | Plane | Sequence[View | Plane] | None = None,
+    view: PlaneView | Plane | Sequence[PlaneView | Plane] | None = None,
     margin: int | None = None,
     boundary_width: int | None = None,
     patch_size: int | None = None,
@@ -58,7 +58,7 @@ def remove(
     mask : (H, W) array, path or Mask
         Mask of the object to remove and of its shadow, white where it marks. See `texrs.Mask` for how a mask is read,
         inverted, grown and feathered.
-    view : View or Plane, or a sequence of them, optional
+    view : PlaneView or Plane, or a sequence of them, optional
         How the photograph shows the plane that it stands on, as far as that is to be said; what is not is found. Where that
         is not sure, or the plane is seen from the front, things are filled in as large as they are seen anywhere. Of several
         planes, as a floor and a wall, each is filled in by itself; all but one need a ground.
@@ -107,7 +107,7 @@ def remove(
     >>> floor = texrs.samples.tilted_discs((128, 128)).image
     >>> mask = np.zeros((128, 128), bool)
     >>> mask[60:90, 50:80] = True
-    >>> mended = texrs.remove(floor, mask, view=texrs.View(slant=35, fov=60))
+    >>> mended = texrs.remove(floor, mask, view=texrs.PlaneView(slant=35, fov=60))
     >>> bool((mended.image[:40] == floor[:40]).all())
     True
 

@@ -17,7 +17,7 @@ from texrs._viewer import as_page
 from texrs.materials._material import Material
 from texrs.source_map import SourceMap
 
-__all__ = ["Gallery", "Synthesis"]
+__all__ = ["ResultList", "Synthesis"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,12 +122,12 @@ class Synthesis:
         return slices(stage)
 
 
-class Gallery(list[Any]):
+class ResultList(list[Any]):
     """A list of results that shows itself side by side in a notebook.
 
     Parameters
     ----------
-    iterable : iterable of Synthesis, Exemplar, Elements, SourceMap, Field or array
+    iterable : iterable of Synthesis, Exemplar, ElementAnalysis, SourceMap, Field or array
         What shows itself, or pictures (H, W[, C]).
 
     Raises
@@ -139,14 +139,14 @@ class Gallery(list[Any]):
     --------
     >>> import texrs
     >>> dots = texrs.samples.dots((64, 64)).image
-    >>> texrs.Gallery(texrs.synthesize(dots, 64, seed=seed) for seed in range(2))
-    Gallery([<Synthesis of 64 x 64, 3 channels of uint8>, <Synthesis of 64 x 64, 3 channels of uint8>])
+    >>> texrs.ResultList(texrs.synthesize(dots, 64, seed=seed) for seed in range(2))
+    ResultList([<Synthesis of 64 x 64, 3 channels of uint8>, <Synthesis of 64 x 64, 3 channels of uint8>])
 
     """
 
     def __repr__(self) -> str:
         """Return the list of its results."""
-        return f"Gallery({spell_list(self)})"
+        return f"ResultList({spell_list(self)})"
 
     def _repr_html_(self) -> str:
         """Show all that there is, side by side."""

@@ -10,7 +10,7 @@ import numpy as np
 
 import texrs
 from texrs import DeformationOptions, ElementOptions, elements
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.exemplar import segment
 from truth.exemplars import clear, colour, deep, floats, sample
 from truth.table import Parts, case, parts_of
@@ -87,9 +87,9 @@ def design_as_printed() -> Parts:
 SPLICED = ("layout", "holes", "triangles", "flipped", "flipped_rigid", "matches")
 
 
-def entry(name: str, *size: int, seed: int = 0) -> Elements:
+def entry(name: str, *size: int, seed: int = 0) -> ElementAnalysis:
     """Return what is known of a sample's elements."""
-    return Elements.of_sample(sample(name, *size, seed=seed))
+    return ElementAnalysis.of_sample(sample(name, *size, seed=seed))
 
 
 def moved_parts_of(result: texrs.Synthesis, stages: Sequence[str] = ()) -> dict[str, Any]:
@@ -229,7 +229,7 @@ SEGMENTED = {
 }
 
 
-def found_in(entry: Elements) -> Parts:
+def found_in(entry: ElementAnalysis) -> Parts:
     """Return what an analysis finds; similarities come of Fourier transforms."""
     return {
         "points": entry.points,

@@ -135,7 +135,7 @@ def scale_maps_edited() -> Parts:
 @case
 def rectified_by_angles() -> Parts:
     wall = deep("tilted_bricks", 112, 128)
-    return parts_of(texrs.rectify(wall, view=texrs.View(slant=40, tilt=200, fov=60), wrap=(False, True), size=96))
+    return parts_of(texrs.rectify(wall, view=texrs.PlaneView(slant=40, tilt=200, fov=60), wrap=(False, True), size=96))
 
 
 @case
@@ -147,14 +147,16 @@ def rectified_as_found() -> Parts:
 @case
 def extended() -> Parts:
     floor = sample("tilted_discs", 96, 112)
-    return parts_of(texrs.extend(floor.image, left=24, right=32, view=texrs.View(slant=34, fov=60), seed=1))
+    return parts_of(texrs.extend(floor.image, left=24, right=32, view=texrs.PlaneView(slant=34, fov=60), seed=1))
 
 
 @case
 def removed() -> Parts:
     floor = sample("tilted_discs", 112, 128).image.copy()
     floor[:20] = floor[:1, :1]
-    return parts_of(texrs.remove(floor, box((112, 128), (50, 80), (40, 70)), view=texrs.View(slant=34, fov=60), seed=1))
+    return parts_of(
+        texrs.remove(floor, box((112, 128), (50, 80), (40, 70)), view=texrs.PlaneView(slant=34, fov=60), seed=1)
+    )
 
 
 @case

@@ -41,7 +41,7 @@ from texrs.blending._seams import Look, Seam, take_rows
 from texrs.blending._values import Samples
 from texrs.blending._visibility import Visibility, measure_visibility
 from texrs.errors import InvalidInput
-from texrs.source_map import Finish, SourceMap
+from texrs.source_map import RenderOptions, SourceMap
 
 __all__ = ["SCREENING", "Visibility", "apply", "blend", "measure_visibility"]
 
@@ -202,7 +202,7 @@ def apply(
     *,
     map_type: Literal["colour", "normal", "vector", "label"] = "colour",
     green: Literal["up", "down"] = "up",
-    finish: Finish | None = None,
+    finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
     """Look a map up through a source map, and finish it as the verb that made the source map finished its picture.
@@ -219,7 +219,7 @@ def apply(
         Meaning of the values (see `texrs.apply`).
     green : {"up", "down"}
         Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX).
-    finish : Finish, optional
+    finish : RenderOptions, optional
         Another finish than that of the map.
     progress : callable or True, optional
         Called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a bar.
@@ -247,7 +247,7 @@ def apply(
     as_instance(source, "source", SourceMap)
     as_choice(map_type, "map_type", ("colour", "normal", "vector", "label"))
     if finish is not None:
-        as_instance(finish, "finish", Finish)
+        as_instance(finish, "finish", RenderOptions)
     how = finish or source.finish
     several: Sequence[Array] = as_list(exemplars)
     made = _look_up(source, several, how, map_type, green, progress)
@@ -257,7 +257,7 @@ def apply(
 def _look_up(
     source: SourceMap,
     several: Sequence[Array],
-    how: Finish | None,
+    how: RenderOptions | None,
     map_type: Literal["colour", "normal", "vector", "label"],
     green: Literal["up", "down"],
     progress: Progress | None,
@@ -281,7 +281,7 @@ def _look_up(
 def _even_out(
     source: SourceMap,
     exemplars: Array | Sequence[Array],
-    how: Finish | None,
+    how: RenderOptions | None,
     map_type: Literal["colour", "normal", "vector"],
     green: Literal["up", "down"],
     progress: Progress | None,
@@ -309,7 +309,7 @@ def _even_out(
     )
 
 
-def _follow_light(source: SourceMap, exemplar: Array, how: Finish, progress: Progress | None) -> Array:
+def _follow_light(source: SourceMap, exemplar: Array, how: RenderOptions, progress: Progress | None) -> Array:
     """Look a map up in even light, and give what is new the light of where it is shown."""
     assert how.light is not None
     assert how.within is not None

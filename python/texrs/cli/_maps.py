@@ -23,7 +23,7 @@ from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
 from texrs.materials import Map, apply
 from texrs.materials._applying import Green, Kind, choose_finish, choose_kind, find_packed, look_up
-from texrs.source_map import Finish, SourceMap
+from texrs.source_map import RenderOptions, SourceMap
 
 APPLIED = Options(
     apply,
@@ -95,7 +95,7 @@ def store_map(
     places: SourceMap,
     paths: Sequence[str],
     out: str,
-    finish: Finish,
+    finish: RenderOptions,
     values: Mapping[tuple[str, ...], Any],
     *,
     count: int | None,
@@ -128,9 +128,9 @@ def store_map(
     note(f"{paths[0]} gives {out}: {show_sides(places.shape)}, {done.chunks} chunks", quiet=quiet)
 
 
-def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> Finish:
+def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> RenderOptions:
     """Return how results are finished: as the map says, but for what is said here."""
-    known = places.finish or Finish((True,) * places.axes)
+    known = places.finish or RenderOptions((True,) * places.axes)
     fields = {path[1]: value for path, value in values.items() if path[0] == "finish"}
     if "screening" in fields:
         fields["screening"] = as_float(fields["screening"], "--screening", 0, 1e6) or None
@@ -144,7 +144,7 @@ def make_map(
     images: Sequence[Array],
     places: SourceMap,
     values: Mapping[tuple[str, ...], Any],
-    finish: Finish,
+    finish: RenderOptions,
 ) -> Array:
     """Return what a source map makes of a map, by the options or else by its name."""
     packed = None if {("map_type",), ("green",)} & values.keys() else find_packed(path)
@@ -161,7 +161,7 @@ def read_kind(
     return choose_kind(path, images, places.axes, values.get(("map_type",)), values.get(("green",)))
 
 
-def fit(finish: Finish, paths: Sequence[str], given: Mapping[str, Any]) -> Finish:
+def fit(finish: RenderOptions, paths: Sequence[str], given: Mapping[str, Any]) -> RenderOptions:
     """Return how maps are finished whose names may say that they are no colours, which alone are lit."""
     return finish if given["finish_flatten_lighting"] is not None else choose_finish(finish, paths[0])
 

@@ -20,15 +20,15 @@ from texrs.cli._parts import BEYOND, Asked, is_stored, write_part
 from texrs.cli._provenance import check_free
 from texrs.cli._stacks import Roles, Stack, is_stack
 from texrs.cli._texts import About, parse_size
+from texrs.corner_tiles import CornerTiles
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.materials._single import SingleMap
 from texrs.papers.design import design_variants
-from texrs.tile_set import TileSet
 
 CELLS = 256
 """Of the index texture along each side."""
-TILED = Options(TileSet, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
+TILED = Options(CornerTiles, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
 DESIGNED = Options(
     design_variants,
     only=("elements", "deformation", "motion", "copies", "patch_size", "screening"),
@@ -107,7 +107,7 @@ def tiles_command(
         stack.refuse({})
     names = DESIGNED.name_values(given) | TILED.name_values(given)
     with name_arguments(**names, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
-        tiles = TileSet(**call, progress=progress)
+        tiles = CornerTiles(**call, progress=progress)
     note(f"made {tiles!r}, in {time.monotonic() - start:.1f} s", quiet=quiet)
     if not windowed:
         # What the command wrote before is its own: each name is asked for in `write_folder`.

@@ -230,7 +230,7 @@ def make_views(
     ground: list[Array | None] | None = None,
 ) -> Any:
     """Return what is said of each plane: of one for each ground, or of the only one."""
-    from texrs.planes import View
+    from texrs.planes import PlaneView
 
     given = {"corners": corners, "slant": slant, "tilt": tilt, "fov": fov, "ground": ground}
     several = {n: value if isinstance(value, list) else [value] for n, value in given.items() if value is not None}
@@ -242,7 +242,7 @@ def make_views(
             many = f"one for each of {count} grounds, in their order, or 'found'" if count > 1 else "to be given once"
             raise InvalidInput(f"{name}: needs {many}; it was given {len(values)} times")
     fields: list[dict[str, Any]] = [{name: values[k] for name, values in several.items()} for k in range(count)]
-    views = [View(**each) for each in fields]
+    views = [PlaneView(**each) for each in fields]
     return views if count > 1 else views[0]
 
 

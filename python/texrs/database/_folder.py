@@ -17,7 +17,7 @@ import numpy as np
 
 from texrs import io
 from texrs._typing import Array
-from texrs.elements import FORMAT, Elements, ElementSearch, Layout, digest, load
+from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
 
 MANIFEST, LOCK = "manifest.json", ".lock"
@@ -57,13 +57,13 @@ class Folder:
     def keep(
         self,
         name: str,
-        entry: Elements,
+        entry: ElementAnalysis,
         image: str,
         options: Mapping[str, Any],
         *,
         pixels: Array | None = None,
         replace_other: bool = True,
-    ) -> Elements:
+    ) -> ElementAnalysis:
         """Write an entry, its ``pixels`` into the file ``image`` where they are given, and what the manifest says of it."""
         plain = {k: _to_plain(v) for k, v in options.items()}
         # With all that the manifest needs, should that be lost.
@@ -225,7 +225,7 @@ def _lock_file(number: int) -> bool:
     return True
 
 
-def _record_of(name: str, file: str, entry: Elements) -> Record:
+def _record_of(name: str, file: str, entry: ElementAnalysis) -> Record:
     kept = entry.report.get("database", {})
     box = tuple(int(n) for n in entry.report.get("box", (0, 0, *entry.box)))
     image, options = str(kept.get("image", "")), dict(kept.get("options", {}))

@@ -20,7 +20,7 @@ from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
 from texrs.database._sheet import Sheet
-from texrs.elements import FORMAT, Elements, ElementSearch, Layout, LayoutName, analyse, digest, load
+from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, LayoutName, analyse, digest, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
 from texrs.io._files import as_path
 from texrs.papers.splice import splice
@@ -125,7 +125,7 @@ class TextureDatabase:
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and name in self._folder.read()
 
-    def __getitem__(self, name: str) -> Elements:
+    def __getitem__(self, name: str) -> ElementAnalysis:
         """Return an entry, remade if it has to be."""
         return self.analyse(name)
 
@@ -159,7 +159,7 @@ class TextureDatabase:
         similarity: bool = False,
         progress: Progress | bool | None = None,
         **options: Unpack[AnalyseOptions],
-    ) -> Elements:
+    ) -> ElementAnalysis:
         """Analyse a texture and keep it.
 
         Parameters
@@ -183,7 +183,7 @@ class TextureDatabase:
 
         Returns
         -------
-        Elements
+        ElementAnalysis
 
         Raises
         ------
@@ -271,7 +271,7 @@ class TextureDatabase:
             # Another process was quicker.
             self._find_record(name)
 
-    def analyse(self, name: str, *, progress: Progress | bool | None = None) -> Elements:
+    def analyse(self, name: str, *, progress: Progress | bool | None = None) -> ElementAnalysis:
         """Return an entry, made anew if its image or the version is another one, or if it is damaged.
 
         Parameters
@@ -283,7 +283,7 @@ class TextureDatabase:
 
         Returns
         -------
-        Elements
+        ElementAnalysis
 
         Raises
         ------
@@ -305,7 +305,7 @@ class TextureDatabase:
         """
         progress = listen(progress)
         record = self._find_record(name)
-        entry: Elements | None = None
+        entry: ElementAnalysis | None = None
         reason = ""
         if record.version != FORMAT:
             reason = f"is of version {record.version}, this is {FORMAT}"
@@ -439,7 +439,7 @@ class TextureDatabase:
             check_call(each, "each", "a", "b", "result")
         side = as_int(cell, "cell", 16, 1024)
         down, across = (self._choose(names, which) for names, which in ((rows, "rows"), (columns, "columns")))
-        kept: Cache[str, Elements] = Cache(KEPT, count_bytes)
+        kept: Cache[str, ElementAnalysis] = Cache(KEPT, count_bytes)
         read = partial(self._read_entry, kept)
         results: dict[tuple[str, str], Synthesis] = {}
         failed: dict[tuple[str, str], str] = {}
@@ -491,7 +491,7 @@ class TextureDatabase:
             raise InvalidInput(f"{which}: no textures to splice")
         return tuple(chosen)
 
-    def _read_entry(self, kept: Cache[str, Elements], name: str) -> Elements:
+    def _read_entry(self, kept: Cache[str, ElementAnalysis], name: str) -> ElementAnalysis:
         return kept.get_or_make(name, partial(self.analyse, name))
 
     def _read_image(self, record: Record) -> Array | None:
@@ -501,7 +501,7 @@ class TextureDatabase:
             return None
 
 
-def count_bytes(entry: Elements) -> int:
+def count_bytes(entry: ElementAnalysis) -> int:
     """Return the bytes of the arrays of an entry."""
     arrays = (entry.image, entry.points, entry.mask, entry.scores, entry.angles, entry.scales, entry.sets)
     return sum(array.nbytes for array in arrays if array is not None)

@@ -6,7 +6,7 @@ from typing import Any
 
 from texrs._html import card, cards, code, figure
 from texrs.demo._workshop import Section, Workshop, load_sample
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.layouts import courses, lattice
 from texrs.papers.splice import self_splice, splice
 
@@ -18,9 +18,9 @@ EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
 )
 
 
-def _load_entry(name: str) -> Elements:
+def _load_entry(name: str) -> ElementAnalysis:
     """Return a sample with the elements that it is known to have."""
-    return Elements.of_sample(load_sample(name, SIDE))
+    return ElementAnalysis.of_sample(load_sample(name, SIDE))
 
 
 def _splice(workshop: Workshop) -> str:

@@ -1,9 +1,9 @@
 """Elements: where the repeated elements of a texture are, and what belongs to them (Liu et al. 2009, section 3).
 
 `analyse` finds them, from a box around one and a few places between them, or by itself; `correct` puts right what it got
-wrong, and `page` shows it; `load` reads what `Elements.save` wrote. `Elements.of_sample` takes over what is known of a
-generated texture. `Elements.instances` are the elements one by one, `Elements.arrangement` how they lie. `Layout` says how
-they hang together, and `ElementSearch` how they are looked for.
+wrong, and `page` shows it; `load` reads what `ElementAnalysis.save` wrote. `ElementAnalysis.of_sample` takes over what is known of
+a generated texture. `ElementAnalysis.instances` are the elements one by one, and `ElementAnalysis.arrangement` is how they lie.
+`Layout` is how they are connected, and `ElementSearch` how they are looked for.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from texrs.elements._analyse import analyse
 from texrs.elements._arrangement import Arrangement
 from texrs.elements._corrections import correct
-from texrs.elements._elements import FORMAT, Elements, digest, load
+from texrs.elements._elements import FORMAT, ElementAnalysis, digest, load
 from texrs.elements._instances import Instance
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch
@@ -21,8 +21,8 @@ from texrs.elements._pictures import pictures
 __all__ = [
     "FORMAT",
     "Arrangement",
+    "ElementAnalysis",
     "ElementSearch",
-    "Elements",
     "Instance",
     "Layout",
     "LayoutName",

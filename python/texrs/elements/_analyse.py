@@ -18,7 +18,7 @@ from texrs.elements._arguments import Arguments, Box, check_consistency, choose_
 from texrs.elements._cellular import start_from_cells
 from texrs.elements._consensus import extend_mask
 from texrs.elements._corrections import correct, read_steps
-from texrs.elements._elements import Elements
+from texrs.elements._elements import ElementAnalysis
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch, Settings
 from texrs.elements._proposal import ADVICE, DOUBTFUL, Start, propose
@@ -54,7 +54,7 @@ def analyse(
     seed: int = 0,
     corrections: Sequence[Mapping[str, object]] | None = None,
     progress: Progress | bool | None = None,
-) -> Elements:
+) -> ElementAnalysis:
     """Find the elements of a texture, what belongs to them and how they are connected [1]_.
 
     Everything may be left out: then the element, the background and the layout are proposed, and the report says how sure
@@ -92,7 +92,7 @@ def analyse(
 
     Returns
     -------
-    Elements
+    ElementAnalysis
         Points by falling similarity, mask, layout and the directions in which the points line up.
 
     Raises
@@ -162,9 +162,9 @@ def analyse(
     return correct(entry, steps)
 
 
-def _choose_map(material: Material, look: Callable[[Array], Elements]) -> Elements:
+def _choose_map(material: Material, look: Callable[[Array], ElementAnalysis]) -> ElementAnalysis:
     """Return what is found in the colours of a material, or in all its maps where that is surer."""
-    entries: list[Elements] = []
+    entries: list[ElementAnalysis] = []
     trouble: InvalidInput | None = None
     for pixels in (material.base, material.guide):
         try:
@@ -179,7 +179,7 @@ def _choose_map(material: Material, look: Callable[[Array], Elements]) -> Elemen
     return replace(max(entries, key=_be_sure), image=as_image(material.base))
 
 
-def _be_sure(entry: Elements) -> float:
+def _be_sure(entry: ElementAnalysis) -> float:
     """Return how sure the least sure of what was proposed is."""
     return float(min(entry.report["confidence"].values(), default=1.0))
 
@@ -274,7 +274,7 @@ def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: 
 
 def _reanalyse(
     pixels: Array, given: Arguments, start: Start, parted: Separation, how: Settings, progress: Progress
-) -> Elements | None:
+) -> ElementAnalysis | None:
     """Analyse again from the box of a usual piece of the mask: what was proposed may lie beside the middle of an element.
 
     Return None where the box was said, or where that finds far fewer elements.
@@ -303,7 +303,7 @@ def _reanalyse(
 
 def _make_entry(
     pixels: Array, given: Arguments, start: Start, found: Detections, parted: Separation, how: Settings
-) -> Elements:
+) -> ElementAnalysis:
     """Return the entry of a texture, with a report of what was found and decided."""
     report: dict[str, Any] = {
         "proposed": start.proposed,
@@ -321,7 +321,7 @@ def _make_entry(
         "spacing": spacing(parted.points),
     }
     poses = np.concatenate([found.poses, [[0.0, 1.0]]])[parted.detection]
-    return Elements(
+    return ElementAnalysis(
         pixels,
         parted.points,
         parted.mask,

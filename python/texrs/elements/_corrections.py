@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_instance, as_int
 from texrs._typing import Bools
 from texrs.elements._arguments import as_points, find_contradiction
-from texrs.elements._elements import Elements
+from texrs.elements._elements import ElementAnalysis
 from texrs.elements._layout import Layout
 from texrs.elements._mask import ellipse, round_to_odd, stamp
 from texrs.elements._separation import find_nearest_pixels, label_components
@@ -37,12 +37,12 @@ RADIUS = 4.0
 """Of a dab of foreground or background, in pixels, if none is given."""
 
 
-def correct(entry: Elements, steps: object) -> Elements:
+def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
     """Return an entry with what an analysis got wrong put right.
 
     Parameters
     ----------
-    entry : Elements
+    entry : ElementAnalysis
         As it was found.
     steps : sequence of dict
         Done one after the other; elements have the numbers of `pictures`, from 0, as they are before the step:
@@ -55,9 +55,9 @@ def correct(entry: Elements, steps: object) -> Elements:
 
     Returns
     -------
-    Elements
+    ElementAnalysis
         Its report holds all steps under ``"corrections"``, those of earlier corrections first. Labels that were given
-        (`Elements.of_labels`) hold until a step: then elements are told by the mask and the points.
+        (`ElementAnalysis.of_labels`) hold until a step: then elements are told by the mask and the points.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def correct(entry: Elements, steps: object) -> Elements:
     1
 
     """
-    as_instance(entry, "entry", Elements)
+    as_instance(entry, "entry", ElementAnalysis)
     known = read_steps(steps)
     for number, step in enumerate(known):
         try:
@@ -122,7 +122,7 @@ def _to_plain(value: object, number: int) -> Any:
         raise InvalidInput(f"corrections: step {number} holds {value!r}; text, numbers and lists are allowed") from None
 
 
-def _drop(entry: Elements, step: Mapping[str, Any]) -> Elements:
+def _drop(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     listed = step["elements"] if isinstance(step["elements"], list) else [step["elements"]]
     gone = [as_int(n, "elements", 0, len(entry.points) - 1) for n in listed]
     kept = np.setdiff1d(np.arange(len(entry.points)), gone)
@@ -136,7 +136,7 @@ def _drop(entry: Elements, step: Mapping[str, Any]) -> Elements:
     return _take(entry, kept, mask)
 
 
-def _add(entry: Elements, step: Mapping[str, Any]) -> Elements:
+def _add(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     size = (entry.image.shape[0], entry.image.shape[1])
     new = as_points(step["points"], size, "points")
     points = as_points(np.concatenate([entry.points, new]), size, "points")
@@ -152,7 +152,7 @@ def _add(entry: Elements, step: Mapping[str, Any]) -> Elements:
     return replace(entry, points=points, mask=mask, scores=scores, angles=angles, scales=scales)
 
 
-def _move(entry: Elements, step: Mapping[str, Any]) -> Elements:
+def _move(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     number = as_int(step["element"], "element", 0, len(entry.points) - 1)
     size = (entry.image.shape[0], entry.image.shape[1])
     place, points = as_points(step["to"], size, "to"), entry.points.copy()
@@ -162,11 +162,11 @@ def _move(entry: Elements, step: Mapping[str, Any]) -> Elements:
     return replace(entry, points=as_points(points, size, "to"))
 
 
-def _name_layout(entry: Elements, step: Mapping[str, Any]) -> Elements:
+def _name_layout(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     return replace(entry, layout=Layout(step["layout"]))
 
 
-def _dab(entry: Elements, step: Mapping[str, Any]) -> Elements:
+def _dab(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     size = (entry.image.shape[0], entry.image.shape[1])
     radius = as_float(step.get("radius", RADIUS), "radius", 0.5, 1e4)
     marked: Bools = np.zeros(size, bool)
@@ -178,7 +178,7 @@ def _dab(entry: Elements, step: Mapping[str, Any]) -> Elements:
     return replace(entry, mask=mask)
 
 
-def _take(entry: Elements, kept: NDArray[np.intp], mask: Bools) -> Elements:
+def _take(entry: ElementAnalysis, kept: NDArray[np.intp], mask: Bools) -> ElementAnalysis:
     """Return an entry with some of its elements."""
     angles, scales = (None if a is None else a[kept] for a in (entry.angles, entry.scales))
     return replace(entry, points=entry.points[kept], mask=mask, scores=entry.scores[kept], angles=angles, scales=scales)

@@ -38,7 +38,7 @@ LONGEST, CHANNELS, SIMILAR = 2**26, 64, 16
 
 
 @dataclass(frozen=True, eq=False)
-class Elements:
+class ElementAnalysis:
     """The elements of one texture.
 
     Attributes
@@ -107,7 +107,7 @@ class Elements:
         return as_png(mark_points(draw_plain(self.image), self.points, self.box))
 
     @classmethod
-    def of_sample(cls, sample: Sample, *, wrap: tuple[bool, bool] = (False, False)) -> Elements:
+    def of_sample(cls, sample: Sample, *, wrap: tuple[bool, bool] = (False, False)) -> ElementAnalysis:
         """Return the entry of a generated texture, whose elements are known.
 
         Parameters
@@ -119,7 +119,7 @@ class Elements:
 
         Returns
         -------
-        Elements
+        ElementAnalysis
             With the sample's centres and mask, each element as alike to the chosen one as can be.
 
         Raises
@@ -130,8 +130,8 @@ class Elements:
         Examples
         --------
         >>> from texrs import samples
-        >>> from texrs.elements import Elements
-        >>> Elements.of_sample(samples.bricks((96, 96)))
+        >>> from texrs.elements import ElementAnalysis
+        >>> ElementAnalysis.of_sample(samples.bricks((96, 96)))
         Elements(3 of box (25, 47) in 96 x 96, jointed)
 
         """
@@ -153,7 +153,7 @@ class Elements:
         *,
         layout: Layout | LayoutName = Layout.DISJOINT,
         wrap: Sequence[bool] | bool = False,
-    ) -> Elements:
+    ) -> ElementAnalysis:
         """Return the entry of a texture whose elements are known pixel by pixel: drawn by hand, or found by another program.
 
         Parameters
@@ -170,7 +170,7 @@ class Elements:
 
         Returns
         -------
-        Elements
+        ElementAnalysis
             One point a label, at its centroid.
 
         Raises
@@ -181,9 +181,9 @@ class Elements:
         Examples
         --------
         >>> from texrs import samples
-        >>> from texrs.elements import Elements
+        >>> from texrs.elements import ElementAnalysis
         >>> wall = samples.bricks((96, 96))
-        >>> Elements.of_labels(wall.image, wall.labels, layout="jointed")
+        >>> ElementAnalysis.of_labels(wall.image, wall.labels, layout="jointed")
         Elements(8 of box (25, 47) in 96 x 96, jointed)
 
         """
@@ -229,8 +229,8 @@ class Elements:
         Examples
         --------
         >>> from texrs import samples
-        >>> from texrs.elements import Elements
-        >>> entry = Elements.of_sample(samples.load("dots", size=(96, 96)))
+        >>> from texrs.elements import ElementAnalysis
+        >>> entry = ElementAnalysis.of_sample(samples.load("dots", size=(96, 96)))
         >>> entry.labels.shape, bool(entry.mask[entry.labels > 0].all())
         ((96, 96), True)
 
@@ -244,8 +244,8 @@ class Elements:
         Examples
         --------
         >>> from texrs import samples
-        >>> from texrs.elements import Elements
-        >>> entry = Elements.of_sample(samples.load("dots", size=(96, 96)))
+        >>> from texrs.elements import ElementAnalysis
+        >>> entry = ElementAnalysis.of_sample(samples.load("dots", size=(96, 96)))
         >>> one = entry.instances[0]
         >>> bool(one.mask.sum() == (entry.labels == 1).sum()), one.confidence
         (True, 1.0)
@@ -297,7 +297,7 @@ class Elements:
             return self.sets
         return Exemplar(self.image, repeat=self.wrap).similarity(-1, k=k, progress=progress)
 
-    def with_similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Elements:
+    def with_similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> ElementAnalysis:
         """Return the entry with its similarity sets, so that they are saved with it.
 
         Parameters
@@ -309,7 +309,7 @@ class Elements:
 
         Returns
         -------
-        Elements
+        ElementAnalysis
             The same but for `sets`.
 
         Raises
@@ -345,7 +345,7 @@ class Elements:
         --------
         >>> import pathlib, tempfile
         >>> from texrs import elements, samples
-        >>> found = elements.Elements.of_sample(samples.dots((96, 96)))
+        >>> found = elements.ElementAnalysis.of_sample(samples.dots((96, 96)))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     path = pathlib.Path(folder, "dots.npz")
         ...     found.save(path)
@@ -411,7 +411,7 @@ def digest(image: Array) -> str:
     return made.hexdigest()
 
 
-def load(path: Path) -> Elements:
+def load(path: Path) -> ElementAnalysis:
     """Read an entry that `save` wrote.
 
     Parameters
@@ -421,7 +421,7 @@ def load(path: Path) -> Elements:
 
     Returns
     -------
-    Elements
+    ElementAnalysis
 
     Raises
     ------
@@ -434,7 +434,7 @@ def load(path: Path) -> Elements:
     >>> from texrs import elements, samples
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = pathlib.Path(folder, "wall.npz")
-    ...     elements.Elements.of_sample(samples.bricks((96, 96))).save(path)
+    ...     elements.ElementAnalysis.of_sample(samples.bricks((96, 96))).save(path)
     ...     elements.load(path).layout
     <Layout.JOINTED: 'jointed'>
 
@@ -479,7 +479,7 @@ def load(path: Path) -> Elements:
             if len(names) < count or not np.array_equal(names, np.arange(1, len(names) + 1)):
                 raise InvalidInput("known elements")
         rows, columns = (int(n) for n in parts["box"])
-        return Elements(
+        return ElementAnalysis(
             image,
             parts["points"].astype(np.float64),
             parts["mask"],

@@ -62,7 +62,7 @@ class Instance:
     Examples
     --------
     >>> from texrs import elements, samples
-    >>> one = elements.Elements.of_sample(samples.dots((96, 96))).instances[0]
+    >>> one = elements.ElementAnalysis.of_sample(samples.dots((96, 96))).instances[0]
     >>> len(one.centre), one.mask.ndim, one.mask.dtype
     (2, 2, dtype('bool'))
 

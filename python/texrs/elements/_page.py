@@ -11,7 +11,7 @@ import imageio.v3 as iio
 from texrs._checks import as_instance
 from texrs._version import __version__
 from texrs.elements._drawing import Picture, draw_plain
-from texrs.elements._elements import Elements
+from texrs.elements._elements import ElementAnalysis
 from texrs.elements._layout import Layout
 from texrs.elements._pictures import pictures
 from texrs.elements._proposal import ADVICE, DOUBTFUL
@@ -19,12 +19,12 @@ from texrs.elements._proposal import ADVICE, DOUBTFUL
 __all__ = ["page"]
 
 
-def page(entry: Elements, title: str = "elements") -> str:
+def page(entry: ElementAnalysis, title: str = "elements") -> str:
     """Return a page of HTML that shows what was found, and on which corrections can be made by clicking.
 
     Parameters
     ----------
-    entry : Elements
+    entry : ElementAnalysis
         As it was found.
     title : str
         What it is called.
@@ -42,7 +42,7 @@ def page(entry: Elements, title: str = "elements") -> str:
     '<!doctype html>'
 
     """
-    as_instance(entry, "entry", Elements)
+    as_instance(entry, "entry", ElementAnalysis)
     as_instance(title, "title", str)
     drawn, report = pictures(entry), entry.report
     height, width = entry.image.shape[:2]

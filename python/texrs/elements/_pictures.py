@@ -7,7 +7,7 @@ import numpy as np
 from texrs._checks import as_instance
 from texrs._digits import write_number
 from texrs.elements._drawing import Picture, draw_dot, draw_plain, mark_points
-from texrs.elements._elements import Elements
+from texrs.elements._elements import ElementAnalysis
 
 BOX, GROUND, NUMBER = (0, 230, 255), np.array((30, 30, 190), np.float64), (255, 235, 90)
 """Colours of the chosen box, of what is not foreground, and of numbers."""
@@ -15,12 +15,12 @@ DIM = 0.65
 """How much of the ground's colour is that."""
 
 
-def pictures(entry: Elements) -> dict[str, Picture]:
+def pictures(entry: ElementAnalysis) -> dict[str, Picture]:
     """Draw an entry: its points on the texture, and its mask.
 
     Parameters
     ----------
-    entry : Elements
+    entry : ElementAnalysis
         As it was found.
 
     Returns
@@ -37,7 +37,7 @@ def pictures(entry: Elements) -> dict[str, Picture]:
     ['mask', 'numbers', 'points']
 
     """
-    as_instance(entry, "entry", Elements)
+    as_instance(entry, "entry", ElementAnalysis)
     plain = draw_plain(entry.image)
     dimmed = np.where(entry.mask[..., np.newaxis], plain, (1 - DIM) * plain + DIM * GROUND)
     drawn = mark_points(plain, entry.points, entry.box)
@@ -53,7 +53,7 @@ def pictures(entry: Elements) -> dict[str, Picture]:
     return {"points": drawn, "mask": dimmed.astype(np.uint8), "numbers": _draw_numbers(plain, entry)}
 
 
-def _draw_numbers(plain: Picture, entry: Elements) -> Picture:
+def _draw_numbers(plain: Picture, entry: ElementAnalysis) -> Picture:
     """Draw the number of each element in its middle, on a black plate."""
     large = plain.repeat(2, axis=0).repeat(2, axis=1)
     dot = 1 if min(entry.box) < 24 else 2

@@ -40,7 +40,7 @@ from texrs.inpainting._optimise import optimise, recover_scale
 from texrs.inpainting._patches import LEAST, choose_mirrors
 from texrs.inpainting._volumes import inpaint_volume, is_volume
 from texrs.materials import Material
-from texrs.planes import Sizes
+from texrs.planes import ScaleEstimate
 from texrs.scale_maps._kinds import Kind, as_kind
 from texrs.synthesis import Synthesis
 
@@ -132,7 +132,7 @@ def inpaint(
         into ``[image, exemplar]``; pixels that are kept map to themselves, and none maps into the hole. To render a
         picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
         (each in a shade of its own) and ``"before_blending"``, the result before ``screening``. In the report ``"measured"``
-        tells of a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is;
+        tells of a ``scale_map`` "auto" what it is of, as `texrs.planes.ScaleEstimate` has it, and how sure that is;
         ``"exemplar_measured"`` the same of the exemplar's. ``"filled"`` is the share of the image that is filled, 0 to 1.
 
     Raises
@@ -298,7 +298,7 @@ def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
 
 def recover_scales(
     pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object, scale_kind: Kind | None
-) -> tuple[list[Floats] | None, list[Sizes | None]]:
+) -> tuple[list[Floats] | None, list[ScaleEstimate | None]]:
     """Return the scale maps of the picture and of the one to copy from, if scales count, and how each was measured."""
     scale, measured = recover_scale(pictures[0], open_, own, scale_kind=scale_kind)
     if scale is None or len(pictures) == 1:

@@ -18,7 +18,7 @@ from texrs.exemplar.analysis import count_levels
 from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
 from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
 from texrs.inpainting._holes import look_around, paint_over
-from texrs.planes import Sizes
+from texrs.planes import ScaleEstimate
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps._kinds import Kind, find_kind, keep_kind
 from texrs.scale_maps._maps import as_map
@@ -40,7 +40,7 @@ NOWHERE = 1e6
 
 def recover_scale(
     picture: Array, open_: Bools, given: object, name: str = "scale_map", scale_kind: Kind | None = None
-) -> tuple[Floats | None, Sizes | None]:
+) -> tuple[Floats | None, ScaleEstimate | None]:
     """Return the scale map of a picture with holes: given, and continued into them, or measured, and how that was."""
     if given is None:
         return None, None

@@ -138,7 +138,7 @@ class Mended:
     """(H, W): where each part was seen, the lighter the earlier; 0 in the holes, and of what is none of them."""
 
     def finish(self, screening: float, first: tuple[int, int] | None) -> dict[str, Any]:
-        """Return how the picture is finished, for a `Finish`.
+        """Return how the picture is finished, for a `RenderOptions`.
 
         Seams are evened out, but not where two parts meet, for one would stain the other; and light is followed where it is
         said at which place in what is known the first pixel lies.

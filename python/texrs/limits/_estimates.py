@@ -60,7 +60,7 @@ COSTS: dict[str, dict[str | None, Cost]] = {
     "rectify": {None: Cost(0, 0, 78, fixed=12e6)},
     "remove": {None: Cost(0, 0, 360, fixed=16e6)},
     "analyse": {None: Cost(480, 0, 0, fixed=14e6)},
-    "TileSet": {None: Cost(1000, 680, 90)},
+    "CornerTiles": {None: Cost(1000, 680, 90)},
 }
 """By verb, and by the ``method`` or the ``quality`` that takes another amount than the others."""
 
@@ -80,11 +80,11 @@ def estimate_memory(
     ----------
     verb : str
         Its name: design, splice, self_splice, perspective, solid, synthesize, tile, inpaint, extend, rectify, remove,
-        analyse (`texrs.elements.analyse`), or TileSet (`texrs.TileSet`).
+        analyse (`texrs.elements.analyse`), or CornerTiles (`texrs.CornerTiles`).
     exemplar : sequence of int, or a sequence of them
         Shape of the example, (H, W), (H, W, C), or for solid (D, H, W[, C]); of several their shapes.
     size : sequence of int, optional
-        Of the result, which of a TileSet is its atlas, nine tiles a side; by default that of the first example.
+        Of the result, which of a CornerTiles is its atlas, nine tiles a side; by default that of the first example.
     dtype : dtype
         Of the example.
     method : str, optional

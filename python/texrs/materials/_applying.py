@@ -20,7 +20,7 @@ from texrs.materials._conventions import cut_name, guess_roles
 from texrs.materials._labels import REASON, holds_labels
 from texrs.materials._map import Map, split_channels
 from texrs.materials._roles import Role, guess_role
-from texrs.source_map import Finish, SourceMap
+from texrs.source_map import RenderOptions, SourceMap
 
 __all__ = ["Green", "Kind", "apply", "choose_finish", "choose_kind"]
 
@@ -34,7 +34,7 @@ def apply(
     *,
     map_type: Kind | None = None,
     green: Green | None = None,
-    finish: Finish | None = None,
+    finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
     """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
@@ -58,7 +58,7 @@ def apply(
     green : {"up", "down"}, optional
         Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: as the name of the file
         says, else "up".
-    finish : Finish, optional
+    finish : RenderOptions, optional
         Another finish than that of the map.
     progress : callable or True, optional
         Called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a bar.
@@ -131,7 +131,7 @@ def find_packed(name: str | None) -> Role | None:
 
 
 def look_up(
-    source: SourceMap, several: Sequence[Map], finish: Finish | None, watch: Callable[[float], object]
+    source: SourceMap, several: Sequence[Map], finish: RenderOptions | None, watch: Callable[[float], object]
 ) -> Array:
     """Return what a source map makes of one map of each exemplar: each group of channels as it must be, by the role."""
     groups = list(zip(*(split_channels(each, source.axes) for each in several), strict=True))
@@ -187,7 +187,7 @@ def find_kind(role: Role | None) -> Kind:
     return "vector" if role is Role.VECTOR else "colour"
 
 
-def choose_finish(finish: Finish, name: str | None) -> Finish:
+def choose_finish(finish: RenderOptions, name: str | None) -> RenderOptions:
     """Return a finish that removes uneven light from colours alone."""
     role = find_named(name)
     return (

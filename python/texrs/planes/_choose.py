@@ -13,8 +13,8 @@ from texrs.errors import InvalidInput
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
 from texrs.planes._plane import Plane
-from texrs.planes._sizes import SURE, Sizes, measure
-from texrs.planes._view import View
+from texrs.planes._sizes import SURE, ScaleEstimate, measure
+from texrs.planes._view import PlaneView
 
 __all__ = ["SURE", "Seen", "as_views", "find_grounds", "follow_plane", "measure_scale", "see"]
 
@@ -34,7 +34,7 @@ class Seen:
     """Whether nobody said how it lies."""
 
 
-def see(pixels: Array, view: View) -> Seen:
+def see(pixels: Array, view: PlaneView) -> Seen:
     """Return what is said of a plane, and what is found where nothing is, with a warning where that is not sure.
 
     All is checked before anything is looked for.
@@ -73,13 +73,13 @@ def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | 
     return (None, False) if seen.slant < FLAT else (seen, True)
 
 
-def as_views(view: View | Plane | Sequence[View | Plane] | None) -> list[View]:
+def as_views(view: PlaneView | Plane | Sequence[PlaneView | Plane] | None) -> list[PlaneView]:
     """Return what is said of one plane, or of each of several."""
     if not isinstance(view, Sequence):
-        return [View.of(view)]
+        return [PlaneView.of(view)]
     if not view:
         raise InvalidInput("view: needs at least one, got an empty list")
-    views = [View.of(each) for each in view]
+    views = [PlaneView.of(each) for each in view]
     if len(views) > 1 and sum(v.ground is None for v in views) > 1:
         raise InvalidInput("ground: of several planes all but one need one, for they are told apart by that")
     return views
@@ -95,7 +95,7 @@ def find_grounds(
     pixels : (H, W, C) array
         The picture.
     settled : sequence of (Plane, (H, W) bool)
-        What is said of each plane (`View.settle`). Of two grounds that overlap the first counts.
+        What is said of each plane (`PlaneView.settle`). Of two grounds that overlap the first counts.
     known : (H, W) bool
         Where the picture says anything.
     everywhere : bool
@@ -118,7 +118,7 @@ def find_grounds(
     return found
 
 
-def measure_scale(pixels: Array, known: Bools) -> Sizes:
+def measure_scale(pixels: Array, known: Bools) -> ScaleEstimate:
     """Return how large things are at each pixel of a picture, with a warning where that is not sure."""
     found = measure(pixels, known=known)
     if found.confidence < SURE:

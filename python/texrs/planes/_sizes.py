@@ -25,7 +25,7 @@ from texrs.planes._plane import Plane
 from texrs.scale_maps import ScaleMap
 from texrs.scale_maps._trend import follow
 
-__all__ = ["SURE", "Shape", "Sizes", "measure"]
+__all__ = ["SURE", "ScaleEstimate", "Shape", "measure"]
 
 Reals = NDArray[np.float64]
 Shape: TypeAlias = Literal["plane", "curved", "free", "even"]
@@ -59,7 +59,7 @@ TERMS = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sizes:
+class ScaleEstimate:
     """How large things are in a picture, as it was measured.
 
     Attributes
@@ -107,7 +107,7 @@ class Sizes:
         return {"shape": self.shape, "scale_kind": self.scale.kind, "confidence": self.confidence, "plane": plane}
 
 
-def measure(image: object, *, known: object = None) -> Sizes:
+def measure(image: object, *, known: object = None) -> ScaleEstimate:
     """Measure how large things are all over a picture.
 
     Parameters
@@ -119,7 +119,7 @@ def measure(image: object, *, known: object = None) -> Sizes:
 
     Returns
     -------
-    Sizes
+    ScaleEstimate
         The map, what it is of, and how sure it is.
 
     Raises
@@ -146,10 +146,12 @@ def measure(image: object, *, known: object = None) -> Sizes:
         # Too small, or too little of it is known; a mask may still be found.
         plane, sure, voices = None, False, []
     if plane is not None and sure and not bends(plane, voices):
-        return Sizes(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
+        return ScaleEstimate(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
     if not voices:
         mask = scale_maps.auto_mask(pixels, known=there)
-        return Sizes(ScaleMap(scale_maps.from_mask(mask, trend="plane", known=there), "area"), "plane", None, 0.0)
+        return ScaleEstimate(
+            ScaleMap(scale_maps.from_mask(mask, trend="plane", known=there), "area"), "plane", None, 0.0
+        )
     places = list_places(size, there)
     said = [evaluate(v, places, size) for v in voices]
     masks = list_masks(pixels, there)
@@ -158,9 +160,9 @@ def measure(image: object, *, known: object = None) -> Sizes:
     confidence = float(f"{confidence * weigh_bands(said[: len(voices)]):.3g}")
     if confidence < SURE and plane is not None and sure:
         # It may bend, but nobody knows how.
-        return Sizes(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
+        return ScaleEstimate(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
     if confidence < SURE:
-        return Sizes(ScaleMap(np.ones(size, np.float32), "area"), "even", None, confidence)
+        return ScaleEstimate(ScaleMap(np.ones(size, np.float32), "area"), "even", None, confidence)
     mean = np.mean([said[k] for k in agreed], axis=0)
     return shape_of(mean, places, [m for k, m in enumerate(masks) if k + len(voices) in agreed], size, confidence)
 
@@ -299,7 +301,7 @@ def shape_of(
     free: list[Floats],
     size: tuple[int, int],
     sure: float,
-) -> Sizes:
+) -> ScaleEstimate:
     """Return the map of what was agreed on: of a plane where that is enough, else curved, else as masks have it."""
     surface = fit(places, mean, size)
     every = tuple(np.indices(size).reshape(2, -1))
@@ -309,11 +311,11 @@ def shape_of(
     widths = logs * np.float32(2 / 3)
     flat = follow(widths, "plane")
     if float((flat - widths)[places].std()) * 1.5 < BENT:
-        return Sizes(ScaleMap(exp_single(flat - flat.mean()), "width"), "plane", None, sure)
+        return ScaleEstimate(ScaleMap(exp_single(flat - flat.mean()), "width"), "plane", None, sure)
     if len(free) > 1:
         both = np.mean([m[places] - m[places].mean() for m in free], axis=0)
         apart = max(float((m[places] - m[places].mean() - both).std()) for m in free)
         if float((both - mean).std()) > ROUGH and apart < 0.5 * float((both - mean).std()):
             whole = np.asarray(sum(free[1:], free[0]) / np.float32(len(free)), np.float32)
-            return Sizes(ScaleMap(exp_single(whole - whole.mean()), "area"), "free", None, sure)
-    return Sizes(ScaleMap(exp_single(logs - logs.mean()), "area"), "curved", None, sure)
+            return ScaleEstimate(ScaleMap(exp_single(whole - whole.mean()), "area"), "free", None, sure)
+    return ScaleEstimate(ScaleMap(exp_single(logs - logs.mean()), "area"), "curved", None, sure)

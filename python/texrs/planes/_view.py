@@ -14,11 +14,11 @@ from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
 from texrs.planes._plane import FOV, STEEPEST, Plane
 
-__all__ = ["View"]
+__all__ = ["PlaneView"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class View:
+class PlaneView:
     """How a photograph shows a plane, as far as somebody says: what is not said is found.
 
     `texrs.rectify`, `texrs.extend` and `texrs.remove` take one, or a `Plane` alone, as ``view``.
@@ -50,9 +50,9 @@ class View:
     --------
     >>> import texrs
     >>> floor = texrs.samples.tilted_discs((128, 128)).image
-    >>> texrs.extend(floor, right=32, view=texrs.View(slant=35, fov=55)).image.shape
+    >>> texrs.extend(floor, right=32, view=texrs.PlaneView(slant=35, fov=55)).image.shape
     (128, 160, 3)
-    >>> texrs.View(slant=35, corners=[[9, 20], [9, 80], [90, 99], [90, 4]])
+    >>> texrs.PlaneView(slant=35, corners=[[9, 20], [9, 80], [90, 99], [90, 4]])
     Traceback (most recent call last):
         ...
     texrs.errors.InvalidInput: slant: corners says how the plane lies already
@@ -83,17 +83,17 @@ class View:
             object.__setattr__(self, "corners", as_array(self.corners, "corners", np.float64, (4, 2)))
 
     @classmethod
-    def of(cls, given: View | Plane | Sequence[View | Plane] | None) -> View:
+    def of(cls, given: PlaneView | Plane | Sequence[PlaneView | Plane] | None) -> PlaneView:
         """Return a view as it is, one of a plane, or one of which nothing is said.
 
         Parameters
         ----------
-        given : View or Plane, optional
+        given : PlaneView or Plane, optional
             What is known of the photograph.
 
         Returns
         -------
-        View
+        PlaneView
 
         Raises
         ------
@@ -102,8 +102,8 @@ class View:
 
         Examples
         --------
-        >>> from texrs import Plane, View
-        >>> View.of(Plane((64, 96), slant=50)).plane.slant
+        >>> from texrs import Plane, PlaneView
+        >>> PlaneView.of(Plane((64, 96), slant=50)).plane.slant
         50.0
 
         """
@@ -111,8 +111,8 @@ class View:
             return cls(plane=given)
         if isinstance(given, list | tuple):
             raise InvalidInput(f"view: one plane is made flat at a time, got {len(given)}")
-        if not isinstance(given, View):
-            raise InvalidInput(f"view: needs a texrs.View, or a texrs.Plane, got {given!r}")
+        if not isinstance(given, PlaneView):
+            raise InvalidInput(f"view: needs a texrs.PlaneView, or a texrs.Plane, got {given!r}")
         return given
 
     def settle(self, shape: Sequence[int]) -> tuple[Plane | None, Bools | None]:
@@ -137,8 +137,8 @@ class View:
 
         Examples
         --------
-        >>> from texrs import View
-        >>> plane, ground = View(slant=40, tilt=90).settle((64, 96))
+        >>> from texrs import PlaneView
+        >>> plane, ground = PlaneView(slant=40, tilt=90).settle((64, 96))
         >>> plane.shape, ground is None
         ((64, 96), True)
 

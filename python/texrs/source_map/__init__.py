@@ -22,13 +22,13 @@ from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
 from texrs.source_map._antialias import find_shrinking, gather_smoothed
 from texrs.source_map._files import read_map, write_map
-from texrs.source_map._finish import Finish
+from texrs.source_map._finish import RenderOptions
 from texrs.source_map._parts import Parted
 from texrs.source_map._pixels import Pixels, divide_bands
-from texrs.source_map._reuse import Reuse, find_continued, measure_reuse
+from texrs.source_map._reuse import CopyStatistics, find_continued, measure_reuse
 from texrs.source_map._vectors import stores_z, turn_all
 
-__all__ = ["Finish", "Reuse", "SourceMap"]
+__all__ = ["CopyStatistics", "RenderOptions", "SourceMap"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class SourceMap(Parted):
         output.
     shapes : tuple of tuple of int
         Shapes of the exemplars, without channels: what `render` expects.
-    finish : Finish, optional
+    finish : RenderOptions, optional
         How the verb that made the map finished its picture, which `texrs.apply` does with other maps; none of maps that are
         put together by hand.
 
@@ -176,7 +176,7 @@ class SourceMap(Parted):
         wrap : sequence of bool
             Axes along which the picture is cyclic.
         **how : object
-            The other attributes of a `Finish`.
+            The other attributes of a `RenderOptions`.
 
         Returns
         -------
@@ -185,7 +185,7 @@ class SourceMap(Parted):
         Raises
         ------
         TypeError
-            What is no attribute of a `Finish`.
+            What is no attribute of a `RenderOptions`.
 
         Examples
         --------
@@ -194,7 +194,7 @@ class SourceMap(Parted):
         0.15
 
         """
-        return replace(self, finish=Finish(as_wrap(wrap, axes=self.axes), **how))
+        return replace(self, finish=RenderOptions(as_wrap(wrap, axes=self.axes), **how))
 
     def jacobians(self) -> NDArray[np.float32]:
         """Return the Jacobian J of every pixel.
@@ -433,19 +433,19 @@ class SourceMap(Parted):
         """
         return find_continued(self, as_int(axis, "axis", 0, self.axes - 1), wrap=as_bool(wrap, "wrap"))
 
-    def reuse(self) -> Reuse:
+    def reuse(self) -> CopyStatistics:
         """Return how much is copied verbatim from the exemplars, and in how large pieces.
 
         Returns
         -------
-        Reuse
+        CopyStatistics
             Shares of the output and of the exemplar, and the number of pieces.
 
         Examples
         --------
         >>> from texrs import SourceMap
         >>> SourceMap.identity((2, 3)).reuse()
-        Reuse(verbatim=1.0, largest=1.0, regions=1)
+        CopyStatistics(verbatim=1.0, largest=1.0, regions=1)
 
         """
         return measure_reuse(self)

@@ -11,7 +11,7 @@ import numpy as np
 from texrs._checks import as_limit
 from texrs._typing import Path
 from texrs.errors import FileError, InvalidInput, LimitExceeded
-from texrs.source_map._finish import Finish
+from texrs.source_map._finish import RenderOptions
 from texrs.source_map._parts import Parted
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def read_map(path: Path, make: type[Map]) -> Map:
         made = make(parts["coordinates"], parts["exemplar"], *rest)
         if "finish" not in parts:
             return made
-        finish = Finish.from_arrays(parts, made.shape, shapes)
+        finish = RenderOptions.from_arrays(parts, made.shape, shapes)
         return make(parts["coordinates"], parts["exemplar"], *rest, finish)
     except (InvalidInput, TypeError, ValueError) as error:
         raise FileError(f"{path}: is damaged ({error})") from None

@@ -15,14 +15,14 @@ from texrs._show import brief
 from texrs._typing import Array, Bools, Interpolation
 from texrs.errors import InvalidInput
 
-__all__ = ["Finish"]
+__all__ = ["RenderOptions"]
 
 PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines", "flatten_lighting", "light")
 """What is said in words; the rest are masks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Finish:
+class RenderOptions:
     """How a verb looks its exemplar up through its source map, and makes the seams disappear.
 
     `texrs.apply` does the same with any map in register, and ``texrs apply`` with files.
@@ -62,7 +62,7 @@ class Finish:
     --------
     >>> import texrs
     >>> made = texrs.synthesize(texrs.samples.pebbles((48, 48)).image, 48)
-    >>> isinstance(made.source_map.finish, texrs.Finish), made.source_map.finish.wrap
+    >>> isinstance(made.source_map.finish, texrs.RenderOptions), made.source_map.finish.wrap
     (True, (False, False))
 
     """
@@ -94,8 +94,8 @@ class Finish:
 
         Examples
         --------
-        >>> from texrs import Finish
-        >>> sorted(Finish((True, True)).arrays())
+        >>> from texrs import RenderOptions
+        >>> sorted(RenderOptions((True, True)).arrays())
         ['finish']
 
         """
@@ -113,7 +113,7 @@ class Finish:
     @classmethod
     def from_arrays(
         cls, parts: Mapping[str, Array], shape: tuple[int, ...], shapes: tuple[tuple[int, ...], ...]
-    ) -> Finish:
+    ) -> RenderOptions:
         """Return what `arrays` wrote of a map of a shape, which looks into exemplars of other shapes.
 
         Parameters
@@ -127,7 +127,7 @@ class Finish:
 
         Returns
         -------
-        Finish
+        RenderOptions
 
         Raises
         ------
@@ -138,8 +138,8 @@ class Finish:
 
         Examples
         --------
-        >>> from texrs import Finish
-        >>> Finish.from_arrays(Finish((True, False)).arrays(), (8, 8), ((4, 4),)).wrap
+        >>> from texrs import RenderOptions
+        >>> RenderOptions.from_arrays(RenderOptions((True, False)).arrays(), (8, 8), ((4, 4),)).wrap
         (True, False)
 
         """

@@ -21,7 +21,7 @@ from texrs._chunks.store import IMAGE, Stored, write_image
 from texrs._chunks.words import share_words
 from texrs._typing import Array, Frames, Path, Progress
 from texrs.errors import InvalidInput
-from texrs.source_map._finish import Finish
+from texrs.source_map._finish import RenderOptions
 
 __all__ = ["Parted"]
 
@@ -35,7 +35,7 @@ class Parted(ABC):
     label: NDArray[np.uint32]
     jacobian: NDArray[np.float32] | Frames | None
     shapes: tuple[tuple[int, ...], ...]
-    finish: Finish | None = None
+    finish: RenderOptions | None = None
 
     def __post_init__(self) -> None:
         """Check that the parts agree."""

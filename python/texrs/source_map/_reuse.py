@@ -11,11 +11,11 @@ from texrs._typing import Bools
 from texrs.source_map._parts import Parted
 from texrs.source_map._pixels import label_pieces
 
-__all__ = ["Reuse", "find_continued", "measure_reuse"]
+__all__ = ["CopyStatistics", "find_continued", "measure_reuse"]
 
 
 @dataclass(frozen=True, slots=True)
-class Reuse:
+class CopyStatistics:
     """How much of a synthesis is copied verbatim (see `SourceMap.reuse`).
 
     Attributes
@@ -31,7 +31,7 @@ class Reuse:
     --------
     >>> from texrs import SourceMap
     >>> SourceMap.identity((8, 8)).reuse()
-    Reuse(verbatim=1.0, largest=1.0, regions=1)
+    CopyStatistics(verbatim=1.0, largest=1.0, regions=1)
 
     """
 
@@ -57,10 +57,10 @@ def find_continued(source: Parted, axis: int, *, wrap: bool = False) -> Bools:
     return result
 
 
-def measure_reuse(source: Parted) -> Reuse:
+def measure_reuse(source: Parted) -> CopyStatistics:
     """Return how much is copied verbatim from the exemplars, and in how large pieces."""
     joined = [np.delete(find_continued(source, axis), -1, axis) for axis in range(source.axes)]
     regions, region = label_pieces(joined, source.shape)
     largest = int(np.bincount(region).max())
     whole = (source.coordinates == np.rint(source.coordinates)).all(axis=-1)
-    return Reuse(float(whole.mean()), largest / max(int(np.prod(s)) for s in source.shapes), regions)
+    return CopyStatistics(float(whole.mean()), largest / max(int(np.prod(s)) for s in source.shapes), regions)

@@ -53,7 +53,7 @@ __all__ = ["Tiling", "check_tiling", "tile"]
 
 SHARE, LEAST = 8, 25
 """An overlap that is chosen is at least the side divided by the one, or the other in pixels."""
-LARGER = "texrs.TileSet makes an endless design, and gives it in parts"
+LARGER = "texrs.CornerTiles makes an endless design, and gives it in parts"
 """How larger ones are made."""
 MOST = 7
 """Sixteenths of the side that it is at most."""

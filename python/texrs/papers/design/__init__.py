@@ -61,7 +61,7 @@ from texrs._progress import listen
 from texrs._typing import Progress
 from texrs._verbs import takes_materials
 from texrs.blending import SCREENING
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.exemplar import ElementOptions
 from texrs.papers.design.arguments import Arguments, Choice, Density, Exemplars, Method, Size, Weights, check_arguments
 from texrs.papers.design.options import DeformationOptions
@@ -84,7 +84,7 @@ def design(
     wrap: bool | Sequence[bool] | None = None,
     weights: Weights = None,
     density: Density = None,
-    elements: ElementOptions | Elements = ElementOptions(),
+    elements: ElementOptions | ElementAnalysis = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     motion: Choice = "auto",
     copies: int = 4,
@@ -97,7 +97,7 @@ def design(
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, Exemplar, Elements, or a sequence of them
+    exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
         The example, any real dtype, at least 16 pixels a side. Several, of one dtype and one number of channels, are
         mixed. An entry of analysed elements, as `splice` takes them, brings its own elements along.
     size : int or (rows, columns), optional
@@ -113,7 +113,7 @@ def design(
         Share of the area on which things of all exemplars but the first are seen, 0 to 1, of each or of all, on the whole or
         place by place: they are scattered over a texture of the first, each whole, those of the last on top. Not for use
         with ``weights``. The report's "density" says what was asked and reached, and what their own exemplar has.
-    elements : ElementOptions or Elements
+    elements : ElementOptions or ElementAnalysis
         How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
         How elements are deformed.
@@ -179,7 +179,7 @@ def design(
     >>> heights = np.linspace(0, 1, 96 * 96, dtype=np.float32).reshape(96, 96)
     >>> result.source_map.render(heights).shape
     (128, 160)
-    >>> stones = texrs.elements.Elements.of_sample(texrs.samples.pebbles((96, 96)))
+    >>> stones = texrs.elements.ElementAnalysis.of_sample(texrs.samples.pebbles((96, 96)))
     >>> texrs.design(stones, 96, copies=1, motion="move").report["segmentation"]
     'labels'
     >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, allow_mirror=False))
@@ -216,7 +216,7 @@ def design_variants(
     wrap: bool | Sequence[bool] | None = None,
     weights: Weights = None,
     density: Density = None,
-    elements: ElementOptions | Elements = ElementOptions(),
+    elements: ElementOptions | ElementAnalysis = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     motion: Choice = "auto",
     copies: int = 4,
@@ -232,7 +232,7 @@ def design_variants(
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, Exemplar, Elements, or a sequence of them
+    exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
         The example, any real dtype, at least 16 pixels a side. Several, of one dtype and one number of channels, are
         mixed. An entry of analysed elements, as `splice` takes them, brings its own elements along.
     count : int
@@ -250,7 +250,7 @@ def design_variants(
         Share of the area on which things of all exemplars but the first are seen, 0 to 1, of each or of all, on the whole or
         place by place: they are scattered over a texture of the first, each whole, those of the last on top. Not for use
         with ``weights``. The report's "density" says what was asked and reached, and what their own exemplar has.
-    elements : ElementOptions or Elements
+    elements : ElementOptions or ElementAnalysis
         How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
         How elements are deformed.

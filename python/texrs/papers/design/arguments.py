@@ -23,7 +23,7 @@ from texrs._arrays import (
     try_array,
 )
 from texrs._typing import Array, Progress
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
 from texrs.materials import Material
@@ -31,7 +31,9 @@ from texrs.papers.design.options import DeformationOptions
 
 __all__ = ["Arguments", "Choice", "Density", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
 
-Exemplars: TypeAlias = Array | Exemplar | Elements | Material | Sequence[Array | Exemplar | Elements | Material]
+Exemplars: TypeAlias = (
+    Array | Exemplar | ElementAnalysis | Material | Sequence[Array | Exemplar | ElementAnalysis | Material]
+)
 Size: TypeAlias = int | Sequence[int] | None
 Weights: TypeAlias = Sequence[float] | Array | None
 Density: TypeAlias = float | Sequence[float] | Array | None
@@ -40,7 +42,7 @@ Choice: TypeAlias = Literal["auto", "move", "keep"]
 
 MINIMUM_SIDE = 16
 """An exemplar with a shorter side holds no texture to speak of."""
-LARGER = "texrs.TileSet makes an endless design, and gives it in parts"
+LARGER = "texrs.CornerTiles makes an endless design, and gives it in parts"
 """How larger ones are made."""
 
 
@@ -89,7 +91,7 @@ def check_arguments(
     wrap: bool | Sequence[bool] | None,
     weights: Weights,
     density: Density,
-    elements: ElementOptions | Elements,
+    elements: ElementOptions | ElementAnalysis,
     deformation: DeformationOptions,
     motion: Choice,
     copies: int,
@@ -100,7 +102,7 @@ def check_arguments(
 ) -> Arguments:
     """Check the arguments of `texrs.design_variants`."""
     given = as_list(exemplar)
-    exemplars = [as_exemplar(e.image if isinstance(e, Elements) else e, minimum=MINIMUM_SIDE) for e in given]
+    exemplars = [as_exemplar(e.image if isinstance(e, ElementAnalysis) else e, minimum=MINIMUM_SIDE) for e in given]
     chosen = take_entries(given, exemplars, elements)
     for name, value, kind in (("elements", chosen, ElementOptions), ("deformation", deformation, DeformationOptions)):
         if not isinstance(value, kind):
@@ -141,7 +143,7 @@ def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], element
 
     What is said of the elements beside stands above an entry that the exemplar came in.
     """
-    if isinstance(elements, Elements):
+    if isinstance(elements, ElementAnalysis):
         shapes = [e.shape for e in exemplars]
         if shapes != [elements.mask.shape]:
             raise InvalidInput(
@@ -150,13 +152,13 @@ def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], element
             )
         return ElementOptions(labels=part_at_borders(elements))
     plain = isinstance(elements, ElementOptions) and (elements.layers, elements.segmentation) == (None, "auto")
-    if not plain or elements.labels is not None or not any(isinstance(e, Elements) for e in given):
+    if not plain or elements.labels is not None or not any(isinstance(e, ElementAnalysis) for e in given):
         return elements
-    labels: list[Any] = [part_at_borders(e) if isinstance(e, Elements) else None for e in given]
+    labels: list[Any] = [part_at_borders(e) if isinstance(e, ElementAnalysis) else None for e in given]
     return ElementOptions(labels=labels if len(labels) > 1 else labels[0])
 
 
-def part_at_borders(entry: Elements) -> NDArray[np.integer[Any]]:
+def part_at_borders(entry: ElementAnalysis) -> NDArray[np.integer[Any]]:
     """Return the labels of an entry, elements that go on around a border of it in two: they are moved within the exemplar."""
     from scipy.ndimage import label
 

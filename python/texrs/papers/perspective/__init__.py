@@ -144,7 +144,7 @@ def perspective(
         The picture; its source map, whose labels tell the patches and whose frames how the exemplar is seen at each pixel:
         ``source.render(map, antialias=True)`` brings any map in register along; the stages, of which ``"sheet"`` is what
         patches are cut from and ``"target"`` the scale map that was followed; and a report, in which ``"measured"`` tells
-        of a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is.
+        of a ``scale_map`` "auto" what it is of, as `texrs.planes.ScaleEstimate` has it, and how sure that is.
 
     Raises
     ------

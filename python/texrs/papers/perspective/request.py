@@ -28,7 +28,7 @@ from texrs.papers.perspective.directions import as_turn
 from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.papers.perspective.targets import Surface, as_surface, as_target, find_size, is_map, is_words, read_plane
 from texrs.planes import FOV, Plane
-from texrs.planes import Sizes as Measured
+from texrs.planes import ScaleEstimate as Measured
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps import Measuring
 from texrs.scale_maps._jacobians import measure_sizes
@@ -57,7 +57,7 @@ class Request:
         How large those of the output are to be.
     kinds : (kind, kind)
         What the two maps hold; None where nobody says.
-    measured : texrs.planes.Sizes, optional
+    measured : texrs.planes.ScaleEstimate, optional
         How large its elements are as that was measured in the picture alone, and how sure that is.
     plane : texrs.Plane, optional
         That the exemplar shows, where it is given.

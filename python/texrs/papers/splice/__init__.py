@@ -61,7 +61,7 @@ from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size, check_
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.papers.splice.adjustment import adjust_targets, crop_extension, straighten_rows
@@ -101,8 +101,8 @@ Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 @takes_materials("elements", beside=("layout",), analysed=True)
 def splice(
-    elements: Elements | Material | Array,
-    layout: Elements | Material | Array,
+    elements: ElementAnalysis | Material | Array,
+    layout: ElementAnalysis | Material | Array,
     size: int | Sequence[int] | None = None,
     *,
     seed: int = 0,
@@ -122,9 +122,9 @@ def splice(
 
     Parameters
     ----------
-    elements : Elements, or (H, W) or (H, W, C) array
+    elements : ElementAnalysis, or (H, W) or (H, W, C) array
         The texture whose elements are shown; a picture is analysed by `texrs.elements.analyse`.
-    layout : Elements, or array
+    layout : ElementAnalysis, or array
         The texture whose layout they take, or a layout that was drawn (`texrs.layouts`).
     size : int or (rows, columns), optional
         Size of the result, in pixels; that of ``elements`` by default.
@@ -186,9 +186,9 @@ def splice(
     Examples
     --------
     >>> import texrs
-    >>> from texrs.elements import Elements, Layout
-    >>> buttons = Elements.of_sample(texrs.samples.dots((128, 128)))
-    >>> stones = Elements.of_sample(texrs.samples.pebbles((128, 128)))
+    >>> from texrs.elements import ElementAnalysis, Layout
+    >>> buttons = ElementAnalysis.of_sample(texrs.samples.dots((128, 128)))
+    >>> stones = ElementAnalysis.of_sample(texrs.samples.pebbles((128, 128)))
     >>> result = texrs.splice(buttons, stones, seed=1, screening=None)
     >>> row, column = result.source_map.coordinates[30, 40].astype(int)
     >>> result.image.shape, bool((result.image[30, 40] == buttons.image[row, column]).all())
@@ -274,7 +274,7 @@ def splice(
 
 @takes_materials("elements", analysed=True)
 def self_splice(
-    elements: Elements | Material | Array,
+    elements: ElementAnalysis | Material | Array,
     edit: Edit | None = None,
     size: int | Sequence[int] | None = None,
     *,
@@ -288,7 +288,7 @@ def self_splice(
 
     Parameters
     ----------
-    elements : Elements, or (H, W) or (H, W, C) array
+    elements : ElementAnalysis, or (H, W) or (H, W, C) array
         The texture; a picture is analysed by `texrs.elements.analyse`.
     edit : str, mapping, or sequence of mappings, optional
         What is done, step by step: scale, shift, rows, randomise, regularise, move, remove or points. In plain JSON
@@ -337,8 +337,8 @@ def self_splice(
     Examples
     --------
     >>> import texrs
-    >>> from texrs.elements import Elements, Layout
-    >>> entry = Elements.of_sample(texrs.samples.dots((96, 96)))
+    >>> from texrs.elements import ElementAnalysis, Layout
+    >>> entry = ElementAnalysis.of_sample(texrs.samples.dots((96, 96)))
     >>> same = texrs.self_splice(entry, {"op": "move", "element": 0, "by": [0, 0]})
     >>> bool((same.image == entry.image).all())
     True
@@ -393,8 +393,8 @@ def _as_screening(screening: object) -> float:
 
 
 def _synthesize(
-    a: Elements,
-    b: Elements | None,
+    a: ElementAnalysis,
+    b: ElementAnalysis | None,
     match: Match,
     size: tuple[int, int],
     seed: int,

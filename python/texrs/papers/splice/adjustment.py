@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import split_foreground
 from texrs.papers.splice.matching import Match
@@ -29,7 +29,7 @@ STRAIN = {Layout.CONNECTED: 0.45, Layout.JOINTED: 0.3}
 walls."""
 
 
-def adjust_targets(a: Elements, match: Match, *, snap: bool, part: bool = False) -> Match:
+def adjust_targets(a: ElementAnalysis, match: Match, *, snap: bool, part: bool = False) -> Match:
     """Give disjoint elements room; bring those of a connected figure to rows, if asked to, and limit how it is strained.
 
     Where they go but a ``part`` of their way, or to their own layout, disjoint elements that touch may go on doing so.
@@ -52,7 +52,7 @@ def straighten_rows(match: Match) -> Match:
 
 
 def separate_targets(
-    a: Elements, match: Match, *, rounds: int = 12, room: float = 1.0, starts: Points | None = None
+    a: ElementAnalysis, match: Match, *, rounds: int = 12, room: float = 1.0, starts: Points | None = None
 ) -> Match:
     """Push targets apart where the disjoint elements that go there would lie over each other.
 
@@ -88,7 +88,7 @@ def separate_targets(
 
 
 @remember(16)
-def _measure_reach(a: Elements, count: int = 32) -> Points:
+def _measure_reach(a: ElementAnalysis, count: int = 32) -> Points:
     """Return how far each element reaches from its centre in so many directions, (n, count)."""
     parts = split_foreground(a)
     angles = 2 * math.pi * np.arange(count) / count
@@ -104,7 +104,7 @@ def _measure_reach(a: Elements, count: int = 32) -> Points:
     return reach
 
 
-def limit_strain(a: Elements, match: Match, *, rounds: int = 200) -> Match:
+def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Match:
     """Let neighbours in a connected figure differ in how far they go by no more than a share of an element.
 
     Each pair of neighbours that does is brought together, half by half, until none is left or the rounds are over.
@@ -135,7 +135,7 @@ def limit_strain(a: Elements, match: Match, *, rounds: int = 200) -> Match:
     return replace(match, targets=start + shift)
 
 
-def crop_extension(a: Elements, match: Match, size: tuple[int, int]) -> Match:
+def crop_extension(a: ElementAnalysis, match: Match, size: tuple[int, int]) -> Match:
     """Leave out of the texture's surroundings what cannot come into the output.
 
     What is kept has one of few widths, so that the next layout may find the factor of its system.

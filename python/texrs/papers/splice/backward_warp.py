@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from texrs._progress import stage
 from texrs._typing import Bools, Floats, Progress
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.kernels.warp import from_points, mesh
 from texrs.papers.splice.deformation import Deformation, deform, deform_by_energy, find_rigid_shifts, mark_removed
 from texrs.papers.splice.matching import Match
@@ -48,13 +48,13 @@ class BackwardWarp:
 
 
 def warp_backwards(
-    a: Elements, match: Match, size: tuple[int, int], *, method: str | None, listed: bool, progress: Progress
+    a: ElementAnalysis, match: Match, size: tuple[int, int], *, method: str | None, listed: bool, progress: Progress
 ) -> BackwardWarp:
     """Deform the texture and draw it into an output of that size.
 
     Parameters
     ----------
-    a : Elements
+    a : ElementAnalysis
         The texture.
     match : Match
         Which of its elements goes where.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.papers.splice.energy import minimise_energy
 from texrs.papers.splice.extension import Extension
 from texrs.papers.splice.interpolation import interpolate
@@ -44,7 +44,7 @@ class Deformation:
     removed: Bools
 
 
-def deform(a: Elements, match: Match) -> Deformation:
+def deform(a: ElementAnalysis, match: Match) -> Deformation:
     """Move every pixel of the texture, as its layout says."""
     if a.layout != Layout.DISJOINT:
         return deform_by_energy(a, match)
@@ -55,7 +55,7 @@ def deform(a: Elements, match: Match) -> Deformation:
     return Deformation(_add_places(shift, extension.origin), extension.instance > 0, removed)
 
 
-def deform_by_energy(a: Elements, match: Match) -> Deformation:
+def deform_by_energy(a: ElementAnalysis, match: Match) -> Deformation:
     """Move every pixel as Eq. 5 says: of a net the foreground is rigid, of elements that are jointed the joints."""
     extension, jointed = match.extension, a.layout == Layout.JOINTED
     rigid = ~extension.mask if jointed else extension.mask

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.deformation import find_rigid_shifts
 from texrs.papers.splice.foreground import Foreground, split_foreground
@@ -18,7 +18,7 @@ __all__ = ["draft_pixels"]
 Labels = NDArray[np.uint32]
 
 
-def draft_pixels(a: Elements, match: Match, warp: BackwardWarp, *, whole: bool) -> tuple[Draft, Labels]:
+def draft_pixels(a: ElementAnalysis, match: Match, warp: BackwardWarp, *, whole: bool) -> tuple[Draft, Labels]:
     """Read a warp as pixels of the texture: what of it stays, and the target of each pixel that moved ``whole``, or 0."""
     extension, known = match.extension, warp.known
     at = warp.place[..., 0] * extension.mask.shape[1] + warp.place[..., 1]

@@ -12,7 +12,7 @@ import numpy as np
 from texrs._arrays import as_image, as_ndarray, as_wrap
 from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
-from texrs.elements import Elements, analyse
+from texrs.elements import ElementAnalysis, analyse
 from texrs.elements._arguments import as_points
 from texrs.errors import InvalidInput, LimitExceeded
 
@@ -20,7 +20,7 @@ __all__ = ["as_elements", "remember"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
-Making: TypeAlias = Callable[Concatenate[Elements, P], T]
+Making: TypeAlias = Callable[Concatenate[ElementAnalysis, P], T]
 
 FEWEST = 3
 SHORTEST = 16
@@ -28,9 +28,9 @@ CACHES: list[Cache[bytes, Any]] = []
 """All that is remembered of entries."""
 
 
-def as_elements(value: object, name: str, progress: Progress) -> Elements:
+def as_elements(value: object, name: str, progress: Progress) -> ElementAnalysis:
     """Check an entry, or analyse a picture."""
-    if not isinstance(value, Elements):
+    if not isinstance(value, ElementAnalysis):
         given = as_ndarray(value, name)
         as_image(given, name, minimum=SHORTEST)
         try:
@@ -44,7 +44,7 @@ def as_elements(value: object, name: str, progress: Progress) -> Elements:
     return check_entry(value, name)
 
 
-def check_entry(entry: Elements, name: str) -> Elements:
+def check_entry(entry: ElementAnalysis, name: str) -> ElementAnalysis:
     """Check that the parts of an entry belong together; return it with its points as floats of 64 bit."""
     image = as_image(entry.image, f"{name}.image", minimum=SHORTEST)
     shape = image.shape[:2]
@@ -89,7 +89,7 @@ def remember(
         CACHES.append(cache)
 
         @wraps(make)
-        def recall(entry: Elements, /, *rest: P.args, **options: P.kwargs) -> T:
+        def recall(entry: ElementAnalysis, /, *rest: P.args, **options: P.kwargs) -> T:
             content = (np.packbits(entry.mask), entry.points, entry.mask.shape, entry.layout, entry.wrap, entry.known)
             shown = (np.asarray(entry.image), entry.box) if seen else ()
             key = content_hash(*content, *shown, rest, sorted(options.items()))

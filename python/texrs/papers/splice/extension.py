@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import check_memory
 from texrs._typing import Bools, Labels
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.limits._estimates import BEYOND
 from texrs.papers.splice.entry import remember
@@ -82,7 +82,7 @@ class Extension:
 
 @remember(4)
 def extend(
-    entry: Elements, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False
+    entry: ElementAnalysis, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False
 ) -> Extension:
     """Let a texture go on so far beyond an output that is centred on it.
 
@@ -119,7 +119,7 @@ def extend(
 
 
 @remember(4)
-def sow(entry: Elements, size: tuple[int, int], margin: int) -> Extension | None:
+def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension | None:
     """Let separate elements go on as they lie, that far beyond an output; None where they go on by a rule, or need not."""
     layout, low, high = _find_bounds(entry, size, margin, exact=False)
     parts, shape = split_foreground(entry), entry.mask.shape
@@ -148,7 +148,7 @@ def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) 
 
 
 @remember(256)
-def count_elements(entry: Elements, size: tuple[int, int], margin: int) -> int:
+def count_elements(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> int:
     """Count the elements that `extend` finds, without what it makes of them."""
     layout, low, high = _find_bounds(entry, size, margin, exact=False)
     if entry.layout == Layout.DISJOINT:
@@ -157,7 +157,7 @@ def count_elements(entry: Elements, size: tuple[int, int], margin: int) -> int:
 
 
 @remember(2)
-def _place_copies(entry: Elements, low: tuple[int, int], high: tuple[int, int]) -> Placed:
+def _place_copies(entry: ElementAnalysis, low: tuple[int, int], high: tuple[int, int]) -> Placed:
     """Put every whole element where the picture goes on with it, in a box of its own pixels."""
     check_memory((high[0] - low[0]) * (high[1] - low[1]) * BEYOND)
     places, of, flips = _reflect_all(entry).within(np.array(low, np.float64), np.array(high, np.float64) - 1)
@@ -169,13 +169,13 @@ def _as_pair(place: NDArray[np.intp]) -> tuple[int, int]:
 
 
 @remember(64)
-def lay_out(entry: Elements, *, beyond: bool) -> PointLayout:
+def lay_out(entry: ElementAnalysis, *, beyond: bool) -> PointLayout:
     """Return how the layout of a texture goes on; ``beyond`` lets it be reflected outside of the picture."""
     return PointLayout.of(entry.points, entry.mask.shape, entry.wrap, beyond=beyond)
 
 
 def _find_bounds(
-    entry: Elements, size: tuple[int, int], margin: int, *, exact: bool
+    entry: ElementAnalysis, size: tuple[int, int], margin: int, *, exact: bool
 ) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
     """Return the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
     shape = np.array(entry.mask.shape)
@@ -185,7 +185,7 @@ def _find_bounds(
     return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
 
 
-def _reflect_all(entry: Elements) -> PointLayout:
+def _reflect_all(entry: ElementAnalysis) -> PointLayout:
     """Return the layout of a texture that is reflected at its very ends, or goes around.
 
     The elements that the border cuts are left out, or wanted: no pixel is in the way.
@@ -198,7 +198,7 @@ def _reflect_all(entry: Elements) -> PointLayout:
 
 
 def _stamp(
-    entry: Elements,
+    entry: ElementAnalysis,
     pixel: Places,
     mask: Bools,
     mirrored: Bools,
@@ -247,7 +247,7 @@ def _stamp(
 
 
 def _place_elements(
-    entry: Elements,
+    entry: ElementAnalysis,
     shape: tuple[int, ...],
     copies: Copies,
     inside: Bools | None = None,
@@ -291,7 +291,7 @@ def _place_elements(
 
 
 @remember(4)
-def _list_shapes(entry: Elements) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], NDArray[np.intp]]:
+def _list_shapes(entry: ElementAnalysis) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], NDArray[np.intp]]:
     """Return of each element its pixels, how far they lie from its centre, and the first and the last of that, (2, n, 2)."""
     parts, shape = split_foreground(entry), np.array(entry.mask.shape)
     centres, count = _round_half_up(parts.points), len(parts.points)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools, Labels
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.elements._foreground import divide_foreground
 from texrs.elements._known import extend_points
 from texrs.papers.splice.entry import remember
@@ -57,7 +57,7 @@ class Foreground:
 
 
 @remember(16)
-def split_foreground(entry: Elements) -> Foreground:
+def split_foreground(entry: ElementAnalysis) -> Foreground:
     """Split a disjoint foreground into its elements: by component, and within one by the nearest element; or as is known."""
     from skimage.segmentation import expand_labels
 

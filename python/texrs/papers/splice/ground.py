@@ -18,7 +18,7 @@ from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._engine.smoothing import smooth
 from texrs._progress import stage
 from texrs._typing import Bools, Floats, Progress
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.exemplar import Exemplar
 from texrs.growth import patch_side
 from texrs.growth.start import OVERLAP, weights_of
@@ -61,7 +61,7 @@ class Scene:
 
     Attributes
     ----------
-    a : Elements
+    a : ElementAnalysis
         The texture, in even light.
     light : Light or None
         What was taken off; None where its light was even.
@@ -75,7 +75,7 @@ class Scene:
 
     """
 
-    a: Elements
+    a: ElementAnalysis
     light: Light | None
     own: NDArray[np.int32]
     certain: Bools
@@ -83,7 +83,7 @@ class Scene:
 
 
 @remember(KEPT, seen=True, size=lambda scene: min(scene.own.size * PIXEL, KEPT))
-def survey(a: Elements, *, narrow: bool = False) -> Scene:
+def survey(a: ElementAnalysis, *, narrow: bool = False) -> Scene:
     """Tell elements with their mattes from ground, and take off what light there is on them.
 
     With ``narrow`` they have no mattes where these would leave too little ground.
@@ -198,7 +198,7 @@ def cut_in(
     return np.where(taken[..., np.newaxis], carried, ground).astype(np.int32)
 
 
-def find_owners(guide: Floats, a: Elements, parts: Foreground) -> tuple[NDArray[np.int32], Bools]:
+def find_owners(guide: Floats, a: ElementAnalysis, parts: Foreground) -> tuple[NDArray[np.int32], Bools]:
     """Return the element, counted from 1, that each pixel of the texture belongs to, and where that is certain.
 
     A pixel may be the element's own, or in its matte or beside that; all else is ground, 0, but for scraps, -1.
@@ -218,7 +218,7 @@ def find_owners(guide: Floats, a: Elements, parts: Foreground) -> tuple[NDArray[
     return np.where((away <= BESIDE) | beside, nearest, np.where(scraps, -1, 0)).astype(np.int32), certain
 
 
-def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -> Bools:
+def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Floats) -> Bools:
     """Return what looks alike around elements, and unlike the ground, in a square around their middles."""
     from scipy.ndimage import label
 
@@ -250,7 +250,7 @@ def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -
     return np.asarray(pieces == middle) if middle else none
 
 
-def complete_ground(a: Elements, own: NDArray[np.int32], seed: int, watch: Progress) -> NDArray[np.int32] | None:
+def complete_ground(a: ElementAnalysis, own: NDArray[np.int32], seed: int, watch: Progress) -> NDArray[np.int32] | None:
     """Return where each pixel of the texture's ground comes from, elements and mattes filled with what is neither."""
     hole = own != 0
     if (~hole).mean() < ENOUGH:
@@ -263,7 +263,7 @@ def complete_ground(a: Elements, own: NDArray[np.int32], seed: int, watch: Progr
 
 
 def grow_ground(
-    a: Elements, bare: NDArray[np.int32], size: tuple[int, ...], seed: int, watch: Progress
+    a: ElementAnalysis, bare: NDArray[np.int32], size: tuple[int, ...], seed: int, watch: Progress
 ) -> NDArray[np.int32]:
     """Return where each pixel of a ground of some size comes from: the completed one, or patches of it, cut together.
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, to_unit
 from texrs._engine.smoothing import Edge, smooth
 from texrs._typing import Array, Bools, Floats, Labels
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.point_sets import spacing
 
 __all__ = ["Light", "measure_light"]
@@ -86,12 +86,12 @@ class Light:
         return found[..., 0] if np.ndim(image) == 2 else found
 
 
-def measure_light(a: Elements, ground: Bools, elements: Labels) -> Light | None:
+def measure_light(a: ElementAnalysis, ground: Bools, elements: Labels) -> Light | None:
     """Return the light on a texture as its ground shows it; None where that is even, or its values are no colours.
 
     Parameters
     ----------
-    a : Elements
+    a : ElementAnalysis
         The texture.
     ground : (h, w) bool
         What is neither element nor near one.

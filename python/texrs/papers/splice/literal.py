@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.papers.splice.extension import extend
 from texrs.papers.splice.matching import Match, find_turns
@@ -31,7 +31,7 @@ Points = NDArray[np.float64]
 NEIGHBOURS = 5
 
 
-def match_literally(a: Elements, b: Elements, size: tuple[int, int], *, align: bool) -> Match:
+def match_literally(a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int], *, align: bool) -> Match:
     """Match as section 4.1 says: mean distances to the nearest points become one, centroids meet, lines are turned together."""
     from scipy.optimize import linear_sum_assignment
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.papers.splice.edit import Step, apply_steps
 from texrs.papers.splice.entry import remember
@@ -108,13 +108,15 @@ class Match:
         }
 
 
-def list_element_points(entry: Elements) -> Points:
+def list_element_points(entry: ElementAnalysis) -> Points:
     """Return the elements that may be moved: also foreground that none was found for, where elements are disjoint."""
     disjoint = entry.layout == Layout.DISJOINT
     return split_foreground(entry).points if disjoint else entry.points
 
 
-def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: bool, scale: float | None = None) -> Match:
+def match_layouts(
+    a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int], *, align: bool, scale: float | None = None
+) -> Match:
     """Match the elements of A with B's layout, brought to the spacing of A, or enlarged as asked, middle upon middle.
 
     Separate elements on their own layout in a larger output lie as they are sown.
@@ -165,12 +167,12 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
     return best
 
 
-def is_own(a: Elements, b: Elements) -> bool:
+def is_own(a: ElementAnalysis, b: ElementAnalysis) -> bool:
     """Return whether a layout is the texture's own, in which its elements have the room that they have."""
     return np.array_equal(a.points, b.points) and np.array_equal(a.mask, b.mask)
 
 
-def go_part_of_the_way(a: Elements, match: Match, strength: float) -> Match:
+def go_part_of_the_way(a: ElementAnalysis, match: Match, strength: float) -> Match:
     """Let elements go so much of their way only: 0 leaves the texture's own layout, 1 takes the other's."""
     targets, assigned = match.starts + strength * match.shift, match.assigned
     if a.layout == Layout.DISJOINT:
@@ -184,7 +186,7 @@ def go_part_of_the_way(a: Elements, match: Match, strength: float) -> Match:
     return replace(match, targets=targets, assigned=assigned)
 
 
-def keep_cut(a: Elements, match: Match, strength: float) -> Match:
+def keep_cut(a: ElementAnalysis, match: Match, strength: float) -> Match:
     """Let elements that the border cuts stay where there is room for them: at no strength all, at the full one none.
 
     They cannot go anywhere else, and without them a texture's own layout would have a bare margin.
@@ -222,7 +224,7 @@ def keep_cut(a: Elements, match: Match, strength: float) -> Match:
     )
 
 
-def find_turns(a: Elements, b: Elements) -> list[float]:
+def find_turns(a: ElementAnalysis, b: ElementAnalysis) -> list[float]:
     """Return the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
     mine, theirs = (t.directions or find_directions(t) for t in (a, b))
     # Lines have no sense of direction: angles are those within a quarter turn.
@@ -231,12 +233,12 @@ def find_turns(a: Elements, b: Elements) -> list[float]:
 
 
 @remember(64)
-def find_directions(entry: Elements) -> tuple[float, ...]:
+def find_directions(entry: ElementAnalysis) -> tuple[float, ...]:
     """Return the directions in which the points of a texture line up."""
     return directions(entry.points)
 
 
-def _measure_gain(a: Elements, distances: Points) -> float:
+def _measure_gain(a: ElementAnalysis, distances: Points) -> float:
     """Return what a layout must grow by so that disjoint elements have room; ``distances``: to the nearest, at A's spacing."""
     parts = split_foreground(a)
     area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
@@ -296,7 +298,7 @@ def _find_offsets(points: Points, wanted: Points, unit: float) -> Points:
     return np.asarray(tried[np.argsort(costs, kind="stable")[:3]], np.float64)
 
 
-def _extend_until(a: Elements, size: tuple[int, int], unit: float, needed: float) -> Extension:
+def _extend_until(a: ElementAnalysis, size: tuple[int, int], unit: float, needed: float) -> Extension:
     """Let a texture go on so far that it has as many elements as are needed, or nearly without end."""
     margin = MARGIN
     while count_elements(a, size, math.ceil(margin * unit)) < needed and margin < WIDEST:
@@ -345,7 +347,7 @@ class Edit:
     shrink: float
 
 
-def edit_layout(a: Elements, steps: Sequence[Step], *, labels: bool = False) -> Edit:
+def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = False) -> Edit:
     """Edit a texture's own layout, as far beyond its borders as anything may come in.
 
     With ``labels`` the layout alone goes on there, also where the border cuts elements, and not the picture.
@@ -387,7 +389,7 @@ def edit_layout(a: Elements, steps: Sequence[Step], *, labels: bool = False) -> 
     return Edit(extension, edited.points, edited.kept, inwards, together, edited.listed, ruled, cyclic, shrink)
 
 
-def match_edit(a: Elements, edit: Edit) -> Match:
+def match_edit(a: ElementAnalysis, edit: Edit) -> Match:
     """Match a texture with its own layout, edited: what the border cuts does not come in, unless all goes one way."""
     kept = edit.kept & (edit.together | ~edit.inwards)
     assigned = np.flatnonzero(kept)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_rgb, to_unit
 from texrs._typing import Array, Bools, Labels
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft
@@ -46,7 +46,13 @@ class Stages(Mapping[str, Array]):
 
 
 def draw_stages(
-    a: Elements, b: Elements | None, match: Match, target: Points | None, draft: Draft, filled: Draft, image: Array
+    a: ElementAnalysis,
+    b: ElementAnalysis | None,
+    match: Match,
+    target: Points | None,
+    draft: Draft,
+    filled: Draft,
+    image: Array,
 ) -> Stages:
     """Return the stages of a splice, or of an edit, which has no ``b``; where nothing was warped there is no ``target``."""
     extension = match.extension

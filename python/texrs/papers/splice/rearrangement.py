@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image
 from texrs._typing import Bools, Floats, Progress
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.papers.splice.adjustment import separate_targets
 from texrs.papers.splice.edit import Step
 from texrs.papers.splice.foreground import Foreground, split_foreground
@@ -74,12 +74,12 @@ class Rearrangement:
     field: Floats | None
 
 
-def rearrange(a: Elements, steps: Sequence[Step], seed: int, watch: Progress) -> Rearrangement | None:
+def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progress) -> Rearrangement | None:
     """Put the elements of a texture where an edit has them; None where too little of its ground is seen.
 
     Parameters
     ----------
-    a : Elements
+    a : ElementAnalysis
         The texture: its elements are separate.
     steps : sequence
         The edit, as `as_steps` returns it.
@@ -125,7 +125,7 @@ def rearrange(a: Elements, steps: Sequence[Step], seed: int, watch: Progress) ->
     )
 
 
-def move_picture(a: Elements, step: NDArray[np.intp]) -> tuple[Places, Bools]:
+def move_picture(a: ElementAnalysis, step: NDArray[np.intp]) -> tuple[Places, Bools]:
     """Return where each pixel comes from when a picture is moved as a whole, and where one does."""
     base = np.moveaxis(np.indices(a.mask.shape, np.int32), 0, -1) - step.astype(np.int32)
     limits = np.array(a.mask.shape, np.int32)
@@ -172,7 +172,7 @@ def fill_holes(scene: Scene, base: Places, known: Bools, pasted: Bools, seed: in
 
 
 def choose_elements(
-    a: Elements, parts: Foreground, edit: Edit, step: NDArray[np.intp], seed: int
+    a: ElementAnalysis, parts: Foreground, edit: Edit, step: NDArray[np.intp], seed: int
 ) -> tuple[Match, Bools]:
     """Return which element lies where, those that come in first, and which do not move but by the step of all."""
     extension, size = edit.extension, np.array(a.mask.shape)

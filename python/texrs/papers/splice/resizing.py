@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.papers.splice.edit import Step
 from texrs.papers.splice.entry import FEWEST
@@ -24,7 +24,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["check_resized", "crop", "read_elements", "report_resized"]
 
 
-def crop(a: Elements, size: Sequence[int]) -> Synthesis:
+def crop(a: ElementAnalysis, size: Sequence[int]) -> Synthesis:
     """Return the middle of a texture, as a splice would."""
     shape = a.mask.shape
     first = [(n - m) // 2 for n, m in zip(shape, size, strict=True)]
@@ -41,7 +41,7 @@ def crop(a: Elements, size: Sequence[int]) -> Synthesis:
     return Synthesis(image, source, {"before_blending": image}, report)
 
 
-def read_elements(a: Elements, made: Synthesis) -> Elements:
+def read_elements(a: ElementAnalysis, made: Synthesis) -> ElementAnalysis:
     """Return the entry of a picture that shows elements of a texture: those whose centres lie in it.
 
     Nothing is looked for: the splice says where its elements are, and the mask is looked up as the picture is.
@@ -67,7 +67,7 @@ def read_elements(a: Elements, made: Synthesis) -> Elements:
     )
 
 
-def check_resized(entry: Elements) -> Elements:
+def check_resized(entry: ElementAnalysis) -> ElementAnalysis:
     """Check that a picture in another size shows enough elements for its layout to be edited."""
     if len(entry.points) < FEWEST:
         size = entry.mask.shape
@@ -76,7 +76,7 @@ def check_resized(entry: Elements) -> Elements:
 
 
 def report_resized(
-    a: Elements, entry: Elements, resized: Synthesis, edited: Synthesis, steps: Sequence[Step]
+    a: ElementAnalysis, entry: ElementAnalysis, resized: Synthesis, edited: Synthesis, steps: Sequence[Step]
 ) -> Synthesis:
     """Return an edit of a texture in another size as one of the texture itself."""
     whole = edited.source_map

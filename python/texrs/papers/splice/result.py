@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array, Bools
 from texrs.blending import apply
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.energy import choose_coarseness
 from texrs.papers.splice.interpolation import STEP
@@ -28,8 +28,8 @@ STAYS = 0.5
 
 
 def compose(
-    a: Elements,
-    b: Elements | None,
+    a: ElementAnalysis,
+    b: ElementAnalysis | None,
     match: Match,
     warp: BackwardWarp,
     draft: Draft,
@@ -71,7 +71,7 @@ def compose(
     return Synthesis(image, source, draw_stages(a, b, match, warp.target, draft, filled, image), report)
 
 
-def compose_edit(a: Elements, laid: Rearrangement, *, seed: int, screening: float) -> Synthesis:
+def compose_edit(a: ElementAnalysis, laid: Rearrangement, *, seed: int, screening: float) -> Synthesis:
     """Return the result of an edit whose elements were rearranged."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     source = SourceMap.from_coordinates(laid.filled.places.astype(np.float32), shape, label=laid.label)
@@ -108,7 +108,9 @@ def say_finish(source: SourceMap, screening: float, within: Bools | None = None)
     return source.with_finish((False, False), interpolation="linear", screening=screening, within=within)
 
 
-def correct_colours(a: Elements, source: SourceMap, light: Light | None, field: NDArray[np.float32] | None) -> Array:
+def correct_colours(
+    a: ElementAnalysis, source: SourceMap, light: Light | None, field: NDArray[np.float32] | None
+) -> Array:
     """Return the picture of a source map in the light that is to fall on it, with its seams made to disappear."""
     image = apply(source, a.image if light is None else light.even)
     if light is None or field is None:
@@ -126,7 +128,7 @@ def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
     return frames
 
 
-def _list_matches(a: Elements, match: Match) -> tuple[list[dict[str, Any]], float]:
+def _list_matches(a: ElementAnalysis, match: Match) -> tuple[list[dict[str, Any]], float]:
     """Return which element goes where, in JSON types, and how much of all their ways they go."""
     points = list_element_points(a)
     wanted = match.targets if match.wanted is None else match.wanted

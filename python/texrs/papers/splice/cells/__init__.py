@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, guidance
 from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.elements._instances import find_sure_cells
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.symmetry import find_mirrors
@@ -51,15 +51,15 @@ HERE = 0.2
 _TARGETS: Cache[bytes, Tessellation] = Cache(16)
 
 
-def find_entry_cells(entry: Elements, watch: Progress | None = None) -> Cells | None:
+def find_entry_cells(entry: ElementAnalysis, watch: Progress | None = None) -> Cells | None:
     """Return the cells of a connected texture; none where it has none that are sure enough, as nets."""
     found = find_sure_cells(entry.image, entry.mask, entry.box, entry.layout, watch, known=entry.known)
     return found if found is not None and len(list_usable(found)) >= FEWEST else None
 
 
 def splice_cells(
-    a: Elements,
-    b: Elements,
+    a: ElementAnalysis,
+    b: ElementAnalysis,
     cells: Cells,
     size: tuple[int, int],
     *,
@@ -74,7 +74,7 @@ def splice_cells(
 
     Parameters
     ----------
-    a, b : Elements
+    a, b : ElementAnalysis
         The textures.
     cells : Cells
         Those of A.
@@ -136,7 +136,9 @@ def splice_cells(
     return Synthesis(image, source, draw_cell_stages(a, b, cells, wanted, charts, joined, image), report)
 
 
-def _take_targets(b: Elements, size: tuple[int, int], unit: float, scale: float | None, seed: int) -> Tessellation:
+def _take_targets(
+    b: ElementAnalysis, size: tuple[int, int], unit: float, scale: float | None, seed: int
+) -> Tessellation:
     """Return the target cells: kept, for one layout often serves several textures of one size."""
     parts = np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.box, b.wrap, b.known
     key = content_hash(*parts, size, unit, scale, seed)

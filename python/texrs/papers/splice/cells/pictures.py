@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array, Labels
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.exemplar.cells import Cells
 from texrs.papers.splice.cells.charts import Charts
 from texrs.papers.splice.cells.joining import Joined
@@ -19,7 +19,13 @@ Picture = NDArray[np.uint8]
 
 
 def draw_cell_stages(
-    a: Elements, b: Elements, cells: Cells, wanted: Tessellation, charts: Charts, joined: Joined, image: Array
+    a: ElementAnalysis,
+    b: ElementAnalysis,
+    cells: Cells,
+    wanted: Tessellation,
+    charts: Charts,
+    joined: Joined,
+    image: Array,
 ) -> Stages:
     """Return the stages of a splice by cells."""
     m = wanted.margin

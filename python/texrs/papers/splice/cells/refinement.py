@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, guidance, hypot_single
 from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Floats, Progress
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.cells.charts import Charts
@@ -49,7 +49,7 @@ class TurnedRefinement(Refinement):
 
 
 def refine_charts(
-    a: Elements,
+    a: ElementAnalysis,
     cells: Cells,
     charts: Charts,
     joined: Joined,
@@ -85,7 +85,7 @@ def _measure_least(frames: Floats) -> Floats:
     return np.asarray(np.abs(hypot_single(a + d, b - c) - hypot_single(a - d, b + c)) / 2, np.float32)
 
 
-def _measure_grain(a: Elements, cells: Cells) -> float:
+def _measure_grain(a: ElementAnalysis, cells: Cells) -> float:
     """Return the share of the variance of lightness inside of cells that is of fine grain."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 

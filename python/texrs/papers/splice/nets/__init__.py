@@ -26,7 +26,7 @@ from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._engine.stitcher import FREE
 from texrs._progress import stage
 from texrs._typing import Bools, Floats, Progress
-from texrs.elements import Elements, Layout
+from texrs.elements import ElementAnalysis, Layout
 from texrs.exemplar import Exemplar
 from texrs.exemplar.cells import Cells
 from texrs.growth.start import OVERLAP, weights_of
@@ -55,21 +55,21 @@ NEAR = 1.5
 """Pixels by which the pixel at a knot's place may show another one, for the knot to be there."""
 
 
-def is_net(entry: Elements) -> bool:
+def is_net(entry: ElementAnalysis) -> bool:
     """Return whether a texture is connected, surely, and has knots enough to be shown by these."""
     sure = entry.report.get("confidence")
     trust = sure.get("layout", 1.0) if isinstance(sure, dict) else 1.0
     return trust >= SURE and has_knots(entry)
 
 
-def has_knots(entry: Elements) -> bool:
+def has_knots(entry: ElementAnalysis) -> bool:
     """Return whether a texture is connected and has as many knots as a net needs, far enough from each other."""
     return entry.layout != Layout.DISJOINT and len(entry.points) >= FEWEST and spacing(entry.points) >= LEAST
 
 
 def splice_nets(
-    a: Elements,
-    b: Elements,
+    a: ElementAnalysis,
+    b: ElementAnalysis,
     cells: Cells | None,
     size: tuple[int, int],
     *,
@@ -82,7 +82,7 @@ def splice_nets(
 
     Parameters
     ----------
-    a, b : Elements
+    a, b : ElementAnalysis
         The textures.
     cells : Cells, optional
         Those of B, whose centres are its points then.
@@ -138,7 +138,7 @@ def splice_nets(
 
 
 def grow_rest(
-    a: Elements, laid: Laid, mine: Floats, theirs: Floats, unit: float, seed: int, watch: Progress
+    a: ElementAnalysis, laid: Laid, mine: Floats, theirs: Floats, unit: float, seed: int, watch: Progress
 ) -> NDArray[np.int32]:
     """Return places in which what no knot covers is grown from patches, around what is there."""
     free = laid.target == FREE
@@ -170,7 +170,7 @@ def _code(said: Floats) -> NDArray[np.int16]:
 
 
 def _report(
-    a: Elements, wanted: Targets, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp], unit: float
+    a: ElementAnalysis, wanted: Targets, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp], unit: float
 ) -> dict[str, Any]:
     """Say what was wanted and what has become of it, in JSON types."""
     size, source = places.shape[:2], laid.source[shown]
@@ -191,7 +191,7 @@ def _report(
     }
 
 
-def _find_places(a: Elements, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
+def _find_places(a: ElementAnalysis, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
     """Return where each knot is in the output, as the source map has it; NaN where it is not shown."""
     found: Points = laid.found[shown]
     size = np.array(places.shape[:2])

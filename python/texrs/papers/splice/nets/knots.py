@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, guidance
 from texrs._engine.stitcher import FREE, Pasting, Samples
 from texrs._typing import Bools, Floats, Progress
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 
 __all__ = ["Laid", "lay_knots"]
 
@@ -85,13 +85,13 @@ class Window:
 
 
 def lay_knots(
-    a: Elements, mine: Floats, targets: Points, theirs: Floats, unit: float, seed: int, watch: Progress
+    a: ElementAnalysis, mine: Floats, targets: Points, theirs: Floats, unit: float, seed: int, watch: Progress
 ) -> Laid:
     """Lay a knot at each target.
 
     Parameters
     ----------
-    a : Elements
+    a : ElementAnalysis
         The texture.
     mine : (h, w, 4) float32
         Where in its net each of its pixels lies (`describe_places`).

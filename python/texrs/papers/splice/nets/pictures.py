@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.papers.splice.nets.graph import join_knots
 from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, draw_lines, draw_outlines, mark_points, to_picture
 
@@ -16,7 +16,9 @@ Picture = NDArray[np.uint8]
 Points = NDArray[np.float64]
 
 
-def draw_net_stages(a: Elements, b: Elements, targets: Points, label: NDArray[np.uint32], image: Array) -> Stages:
+def draw_net_stages(
+    a: ElementAnalysis, b: ElementAnalysis, targets: Points, label: NDArray[np.uint32], image: Array
+) -> Stages:
     """Return the stages of a splice by nets."""
     return Stages(
         {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs.elements import Elements
+from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.papers.splice.cells.tessellation import take_cells
@@ -51,8 +51,8 @@ class Targets:
 
 
 def take_points(
-    a: Elements,
-    b: Elements,
+    a: ElementAnalysis,
+    b: ElementAnalysis,
     cells: Cells | None,
     size: tuple[int, int],
     unit: float,
@@ -100,7 +100,7 @@ def measure_gain(mine: Points, theirs: Points) -> float:
     return max(1.0, ROOM * needed / max(there, 1e-6))
 
 
-def take_own_points(a: Elements, size: tuple[int, int], unit: float) -> Targets:
+def take_own_points(a: ElementAnalysis, size: tuple[int, int], unit: float) -> Targets:
     """Take A's own knots as they lie around the middle of the output."""
     layout, offset = lay_out(a, beyond=True), (np.array(size) - a.mask.shape) // 2
     low, high = -AROUND * unit - offset, np.array(size) - 1 + AROUND * unit - offset

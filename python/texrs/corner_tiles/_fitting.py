@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array, Floats
+from texrs.corner_tiles._step import Draw
 from texrs.kernels.patch_search import PatchIndex
-from texrs.tile_set._step import Draw
 
 __all__ = ["Fit", "Pictures", "Place", "Places", "look_up"]
 

@@ -6,8 +6,8 @@ there. So neighbours agree along their edges and at their corners, nothing repea
 wherever it is.
 
 The flow: several cyclic pictures are designed (`texrs.design_variants`); strips between each two corners are cut from them,
-and the inside of each tile is cut into its ring of strips, once along all edges (`texrs.tile_set._cutting`). Of the places
-most like what is known (`texrs.tile_set._fitting`) those are taken whose cuts show least; cuts through elements cost more.
+and the inside of each tile is cut into its ring of strips, once along all edges (`texrs.corner_tiles._cutting`). Of the places
+most like what is known (`texrs.corner_tiles._fitting`) those are taken whose cuts show least; cuts through elements cost more.
 Where the exemplar repeats on a lattice, tiles hold whole periods of it, and all their pieces are cut in step. The paper has
 neither the search nor the step, and strips twice as wide, in which more is seen again.
 
@@ -35,6 +35,11 @@ from texrs._chunks.parts import InParts, Part
 from texrs._chunks.reading import Channel
 from texrs._progress import listen, stage
 from texrs._typing import Array, Floats, Path, Progress
+from texrs.corner_tiles._corners import TILES, TORUS, draw_colours, number_tiles
+from texrs.corner_tiles._cutting import cut_tiles
+from texrs.corner_tiles._fitting import Pictures, look_up
+from texrs.corner_tiles._shaders import write_shaders
+from texrs.corner_tiles._step import choose_side, find_step
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.io._files import as_path
@@ -42,17 +47,12 @@ from texrs.materials import Material
 from texrs.papers.design import design_variants
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
-from texrs.tile_set._corners import TILES, TORUS, draw_colours, number_tiles
-from texrs.tile_set._cutting import cut_tiles
-from texrs.tile_set._fitting import Pictures, look_up
-from texrs.tile_set._shaders import write_shaders
-from texrs.tile_set._step import choose_side, find_step
 
-__all__ = ["TileSet"]
+__all__ = ["CornerTiles"]
 
 FAR = 10**15
 """Coordinates of the world are within so many pixels."""
-LARGER = "texrs.TileSet.to_zarr and to_dask give it in parts"
+LARGER = "texrs.CornerTiles.to_zarr and to_dask give it in parts"
 """How what is too large for one array is had."""
 IMAGE = "image"
 KEEP = 4.0
@@ -60,7 +60,7 @@ KEEP = 4.0
 DEPTH = 3.0
 
 
-class TileSet(InParts):
+class CornerTiles(InParts):
     """An unbounded design: 81 corner tiles, and which one lies where.
 
     Parameters
@@ -89,7 +89,7 @@ class TileSet(InParts):
     Examples
     --------
     >>> import texrs
-    >>> stones = texrs.TileSet(texrs.samples.dots((64, 64)).image, 64, seed=1, variants=1)
+    >>> stones = texrs.CornerTiles(texrs.samples.dots((64, 64)).image, 64, seed=1, variants=1)
     >>> far = stones.window((10**12, -5), (40, 60))
     >>> far.image.shape, bool((far.image == stones[10**12 : 10**12 + 40, -5:55]).all())
     ((40, 60, 3), True)
@@ -118,7 +118,7 @@ class TileSet(InParts):
         self._side, self._seed = tile_size, as_seed(seed)
         if {"size", "wrap", "count"} & options.keys():
             raise InvalidInput(f"{min({'size', 'wrap', 'count'} & options.keys())}: is given by tile_size and variants")
-        check_work("TileSet", [known.pixels], (9 * tile_size, 9 * tile_size), "tile_size")
+        check_work("CornerTiles", [known.pixels], (9 * tile_size, 9 * tile_size), "tile_size")
         given = exemplar if isinstance(exemplar, Material) else known
         made = list(
             design_variants(
@@ -209,7 +209,7 @@ class TileSet(InParts):
         Examples
         --------
         >>> import texrs
-        >>> tiles = texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
+        >>> tiles = texrs.CornerTiles(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
         >>> tiles.index((0, 0), (2, 3)).shape
         (2, 3)
 
@@ -255,7 +255,7 @@ class TileSet(InParts):
         Examples
         --------
         >>> import texrs
-        >>> tiles = texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
+        >>> tiles = texrs.CornerTiles(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
         >>> tiles.window((-10, 10**9), (40, 50)).image.shape
         (40, 50, 3)
 
@@ -326,7 +326,7 @@ class TileSet(InParts):
         --------
         >>> import tempfile
         >>> import texrs
-        >>> tiles = texrs.TileSet(texrs.samples.dots((64, 64)).image, 32, variants=1)
+        >>> tiles = texrs.CornerTiles(texrs.samples.dots((64, 64)).image, 32, variants=1)
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in tiles.save(folder, 16)]
         ['image.png', 'index.png', 'tiles.glsl', 'tiles.gdshader']
@@ -358,7 +358,7 @@ class TileSet(InParts):
 class _Reader:
     """Reads parts of tiles, whose first pixel is at an origin."""
 
-    tiles: TileSet
+    tiles: CornerTiles
     origin: tuple[int, int]
 
     @property

@@ -8,23 +8,23 @@ import pytest
 
 import texrs
 from texrs import io, samples
+from texrs.corner_tiles._corners import COLOURS, TILES, TORUS, draw_colours, number_tiles
+from texrs.corner_tiles._step import Draw, choose_side, find_step
 from texrs.exemplar.regularity import Lattice
-from texrs.tile_set._corners import COLOURS, TILES, TORUS, draw_colours, number_tiles
-from texrs.tile_set._step import Draw, choose_side, find_step
 
 DOTS = samples.dots((64, 64)).image
 FAR = 10**12
 
 
 @pytest.fixture(scope="module")
-def tiles() -> texrs.TileSet:
-    return texrs.TileSet(DOTS, 48, seed=1, variants=2)
+def tiles() -> texrs.CornerTiles:
+    return texrs.CornerTiles(DOTS, 48, seed=1, variants=2)
 
 
 @pytest.fixture(scope="module")
-def stones() -> texrs.TileSet:
+def stones() -> texrs.CornerTiles:
     maps = {"albedo": DOTS, "height": DOTS[..., 1].astype(np.float32) / 255, "labels": DOTS[..., 0] > 128}
-    return texrs.TileSet(texrs.Material(maps), 32, seed=2, variants=1)
+    return texrs.CornerTiles(texrs.Material(maps), 32, seed=2, variants=1)
 
 
 def test_the_torus_holds_each_tile_once() -> None:
@@ -42,7 +42,7 @@ def test_colours_are_even_and_hang_on_the_place_alone() -> None:
     assert np.allclose(pairs, 1 / 3, atol=0.02)
 
 
-def test_windows_agree_wherever_they_are(tiles: texrs.TileSet) -> None:
+def test_windows_agree_wherever_they_are(tiles: texrs.CornerTiles) -> None:
     for row, column in ((0, 0), (-1000, 7), (FAR, -FAR)):
         whole = tiles[row : row + 200, column : column + 160]
         assert whole.shape == (200, 160, 3)
@@ -57,7 +57,7 @@ def _measure_steps(image: np.ndarray, axis: int, side: int) -> np.ndarray:
     return np.asarray(steps[:-side].reshape(-1, side).mean(axis=0))
 
 
-def test_tiles_agree_along_their_edges(tiles: texrs.TileSet) -> None:
+def test_tiles_agree_along_their_edges(tiles: texrs.CornerTiles) -> None:
     """A strip lies on both sides of an edge, so that nothing is seen there."""
     side = tiles.tile_size
     image = tiles[0 : 12 * side, 0 : 12 * side].astype(float)
@@ -72,7 +72,7 @@ def test_tiles_agree_along_their_edges(tiles: texrs.TileSet) -> None:
     assert tiles.source_map.shape == tiles.atlas.shape[:2] == (9 * side, 9 * side)
 
 
-def test_the_source_map_shows_the_window(tiles: texrs.TileSet) -> None:
+def test_the_source_map_shows_the_window(tiles: texrs.CornerTiles) -> None:
     made = tiles.window((FAR + 5, -77), (90, 130))
     shown = made.source_map.render(DOTS).astype(int)
     # But for colours that the design blended.
@@ -81,7 +81,7 @@ def test_the_source_map_shows_the_window(tiles: texrs.TileSet) -> None:
     assert made.report["origin"] == [FAR + 5, -77]
 
 
-def test_materials_stay_in_register(stones: texrs.TileSet) -> None:
+def test_materials_stay_in_register(stones: texrs.CornerTiles) -> None:
     made = stones.window((-40, FAR), (70, 90))
     assert made.material is not None
     assert {name: (m.pixels.shape, str(m.pixels.dtype)) for name, m in made.material.items()} == {
@@ -95,7 +95,7 @@ def test_materials_stay_in_register(stones: texrs.TileSet) -> None:
     assert stones.material["height"].pixels.shape == (288, 288)
 
 
-def test_nothing_repeats_as_a_whole(tiles: texrs.TileSet) -> None:
+def test_nothing_repeats_as_a_whole(tiles: texrs.CornerTiles) -> None:
     index = tiles.index((0, 0), (60, 60))
     assert len(np.unique(index)) == TILES
     for step in (1, 2, 9, 16, 32):
@@ -103,17 +103,17 @@ def test_nothing_repeats_as_a_whole(tiles: texrs.TileSet) -> None:
         assert (index[:, step:] == index[:, :-step]).mean() < 0.05
 
 
-def test_same_bytes_again_in_threads_and_after_travelling(tiles: texrs.TileSet) -> None:
+def test_same_bytes_again_in_threads_and_after_travelling(tiles: texrs.CornerTiles) -> None:
     with texrs.threads(1):
-        again = texrs.TileSet(DOTS, 48, seed=1, variants=2)
+        again = texrs.CornerTiles(DOTS, 48, seed=1, variants=2)
     assert again.key == tiles.key
     assert np.array_equal(again.source_map.coordinates, tiles.source_map.coordinates)
     back = pickle.loads(pickle.dumps(tiles))
     assert np.array_equal(back[FAR : FAR + 60, 0:60], tiles[FAR : FAR + 60, 0:60])
-    assert texrs.TileSet(DOTS, 48, seed=2, variants=1).key != tiles.key
+    assert texrs.CornerTiles(DOTS, 48, seed=2, variants=1).key != tiles.key
 
 
-def test_dask_and_zarr(stones: texrs.TileSet, tmp_path: Path) -> None:
+def test_dask_and_zarr(stones: texrs.CornerTiles, tmp_path: Path) -> None:
     pytest.importorskip("dask")
     pytest.importorskip("zarr")
     lazily = stones.to_dask((100, 70), 32, origin=(FAR, 5), map="height")
@@ -125,7 +125,7 @@ def test_dask_and_zarr(stones: texrs.TileSet, tmp_path: Path) -> None:
     assert stones.to_zarr(tmp_path / "t.zarr", (100, 70), 64, origin=(FAR, 5)).made == 0
 
 
-def test_engines_read_what_is_saved(stones: texrs.TileSet, tmp_path: Path) -> None:
+def test_engines_read_what_is_saved(stones: texrs.CornerTiles, tmp_path: Path) -> None:
     """What the shader does, in NumPy: the same pixels as a window; and the index goes around."""
     files = stones.save(tmp_path, (8, 12))
     assert [f.name for f in files] == [
@@ -153,12 +153,12 @@ def test_engines_read_what_is_saved(stones: texrs.TileSet, tmp_path: Path) -> No
     assert "shader_type spatial" in (tmp_path / "tiles.gdshader").read_text()
 
 
-def test_wrong_arguments(tiles: texrs.TileSet) -> None:
+def test_wrong_arguments(tiles: texrs.CornerTiles) -> None:
     for call, message in (
-        (lambda: texrs.TileSet(DOTS, 30), "tile_size: needs an integer from 32"),
-        (lambda: texrs.TileSet(DOTS, 50), "tile_size: needs a multiple of 4"),
-        (lambda: texrs.TileSet(DOTS, 48, variants=0), "variants"),
-        (lambda: texrs.TileSet(DOTS, 48, wrap=True), "wrap: is given by tile_size"),
+        (lambda: texrs.CornerTiles(DOTS, 30), "tile_size: needs an integer from 32"),
+        (lambda: texrs.CornerTiles(DOTS, 50), "tile_size: needs a multiple of 4"),
+        (lambda: texrs.CornerTiles(DOTS, 48, variants=0), "variants"),
+        (lambda: texrs.CornerTiles(DOTS, 48, wrap=True), "wrap: is given by tile_size"),
         (lambda: tiles.window((0, 10**16), 5), "origin"),
         (lambda: tiles.window(0, (5, 0)), "size"),
         (lambda: tiles[0:5], "index: needs ranges"),
@@ -171,7 +171,7 @@ def test_wrong_arguments(tiles: texrs.TileSet) -> None:
 
 def test_what_repeats_does_so_in_whole_periods() -> None:
     """Each tile lies as those beside it do, though no two show the same."""
-    tiles = texrs.TileSet(samples.weave((96, 96)).image, seed=1, variants=2)
+    tiles = texrs.CornerTiles(samples.weave((96, 96)).image, seed=1, variants=2)
     light = tiles[0 : 4 * tiles.tile_size, 0 : 4 * tiles.tile_size].mean(axis=-1)
     for axis in (0, 1):
         after, before = np.split(light, [tiles.tile_size], axis)[1], np.split(light, [-tiles.tile_size], axis)[0]

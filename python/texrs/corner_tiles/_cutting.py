@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs.corner_tiles._corners import COLOURS, TILES
+from texrs.corner_tiles._fitting import Fit, Pictures, Place, Places
+from texrs.corner_tiles._step import Draw, Step
 from texrs.kernels.seam import cut, cut_strip
-from texrs.tile_set._corners import COLOURS, TILES
-from texrs.tile_set._fitting import Fit, Pictures, Place, Places
-from texrs.tile_set._step import Draw, Step
 
 __all__ = ["cut_tiles"]
 
