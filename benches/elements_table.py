@@ -75,7 +75,7 @@ def main(folder: Path, pictures: Path | None) -> None:
                 row.append("yes" if met else "no")
             print("| " + " | ".join(map(str, row)) + " |", flush=True)
             if pictures is not None:
-                for name, picture in elements.pictures(found).items():
+                for name, picture in elements.draw(found).items():
                     io.write(pictures / f"{texture.name}-{start}-{name}.png", picture)
     for start, (met, count, right) in totals.items():
         print(f"{start}: S1 met on {met} of {count}; layout right on {right}")

@@ -28,7 +28,7 @@ from texrs import Plane, io, planes
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from plane_checks import dress, look, squeeze, turn_between
-from texrs.planes._choose import measure_scale
+from texrs.planes._choose import measure_known_scale
 
 NAMES = ("bricks", "setts", "pebbles", "dots", "weave", "beans", "scales")
 SIZE = (256, 320)
@@ -67,7 +67,7 @@ def print_maps(folder: str | None) -> None:
     for path in sorted(Path(folder).rglob("*-scale.npy")) if folder else ():
         image = io.read(path.with_name(path.name.replace("-scale.npy", ".png")))
         truth = np.log(np.load(path).astype(np.float64))
-        mine = np.log(measure_scale(image, np.ones(image.shape[:2], np.bool_)).scale[::2, ::2])
+        mine = np.log(measure_known_scale(image, np.ones(image.shape[:2], np.bool_)).scale[::2, ::2])
         print(f"| {path.stem} | {np.corrcoef(mine.ravel(), truth.ravel())[0, 1]:.4f} |")
 
 

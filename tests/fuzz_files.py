@@ -56,7 +56,7 @@ def limited(read: Callable[..., object]) -> Reader:
 def make_files(folder: Path) -> Iterator[tuple[Path, list[Reader]]]:
     """Write a small file of every kind, and yield how each is read."""
     image, floats = make.picture((24, 20, 3)), np.abs(make.picture((24, 20, 3), "float32"))
-    either = [limited(tio.read), limited(tio.read_volume), tio.read_notes]
+    either = [limited(tio.read), limited(tio.read_volume), tio.read_metadata]
     for suffix in WRITABLE:
         path = folder / f"a{suffix}"
         tio.write(path, floats if suffix in (".exr", ".hdr") else image)

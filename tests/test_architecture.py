@@ -21,7 +21,7 @@ LAYERS = (
     ("_arrays",),
     ("_colours",),
     ("_evidence", "_light", "_show", "_threads", "kernels"),
-    ("_chunks", "_evening", "_html", "_viewer"),
+    ("_chunks", "_lighting_correction", "_html", "_viewer"),
     ("_engine",),
     ("source_map",),
     ("blending",),

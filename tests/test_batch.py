@@ -50,7 +50,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def said(path: str | Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(io.read_notes(path).made or "{}")
+    found: dict[str, Any] = json.loads(io.read_metadata(path).made or "{}")
     return found
 
 
@@ -103,7 +103,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     # What is missing, was changed, or is made otherwise now is made again.
     Path("maps/dots-still-3.npz").unlink()
     io.write("made/weave-still-3.png", np.zeros((48, 48, 3), np.uint8))
-    io.annotate("made/weave-still-3.png", io.Notes(made=io.read_notes("made/weave-turned-3.png").made))
+    io.write_metadata("made/weave-still-3.png", io.Metadata(made=io.read_metadata("made/weave-turned-3.png").made))
     assert main(["batch", "all.toml", "--force"]) == 0
     err = capsys.readouterr().err.splitlines()
     assert [line for line in err if "wrote" in line] == [

@@ -214,7 +214,7 @@ def test_files_that_a_batch_writes_are_not_inputs(here: Path) -> None:
     for _ in range(2):
         assert main(["batch", "design", "in", "-o", "in/{name}-big.png", *words]) == 0
         assert made("in") == ["a-big.png", "a.npz", "a.png"]
-    assert json.loads(io.read_notes("in/a.npz").made or "")["verb"] == "design"
+    assert json.loads(io.read_metadata("in/a.npz").made or "")["verb"] == "design"
 
 
 def test_a_cluster_returns_notices(here: Path, capsys: Capture) -> None:

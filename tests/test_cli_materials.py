@@ -328,7 +328,7 @@ def test_a_profile_that_a_folder_loses_is_reported(here: Path, capsys: pytest.Ca
     lab = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
     srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     for profile, count in ((srgb, 0), (lab, 1), (b"damaged" * 40, 1)):
-        io.annotate("rock/rock_albedo.png", io.Notes(profile=profile))
+        io.write_metadata("rock/rock_albedo.png", io.Metadata(profile=profile))
         assert main(["info", "rock"]) == 0
         assert capsys.readouterr().err.count("ICC profile") == count
 
@@ -339,14 +339,14 @@ def test_primaries_and_gamma_that_a_folder_loses_are_reported(here: Path, capsys
     png, exr = Path("rock/rock_albedo.png"), Path("rock/rock_diffuse.exr")
     io.write(exr, io.read(png).astype(np.float32))
     for file, notes, words in (
-        (png, io.Notes(primaries=wide), "the primaries 0.713, 0.293, 0.165, 0.83, 0.128, 0.044 are not used"),
-        (exr, io.Notes(primaries=wide), "the primaries 0.713, 0.293, 0.165, 0.83, 0.128, 0.044 are not used"),
-        (png, io.Notes(gamma=1 / 1.8), "the gamma 0.556 is not used"),
-        (png, io.Notes(primaries=plain, gamma=1 / 2.2), ""),
-        (exr, io.Notes(primaries=plain), ""),
+        (png, io.Metadata(primaries=wide), "the primaries 0.713, 0.293, 0.165, 0.83, 0.128, 0.044 are not used"),
+        (exr, io.Metadata(primaries=wide), "the primaries 0.713, 0.293, 0.165, 0.83, 0.128, 0.044 are not used"),
+        (png, io.Metadata(gamma=1 / 1.8), "the gamma 0.556 is not used"),
+        (png, io.Metadata(primaries=plain, gamma=1 / 2.2), ""),
+        (exr, io.Metadata(primaries=plain), ""),
     ):
         kept = file.read_bytes()
-        io.annotate(file, notes)
+        io.write_metadata(file, notes)
         assert main(["info", "rock"]) == 0
         said = capsys.readouterr().err
         assert (f"{file}: {words}" in said) if words else (str(file) not in said)

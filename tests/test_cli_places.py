@@ -123,7 +123,7 @@ def test_records_without_an_order_mean_rows_first(here: Path, capsys: Capture) -
         for command in commands:
             assert main(command) == 0
     for command in commands:
-        made = json.loads(io.read_notes(command[3]).made or "")
+        made = json.loads(io.read_metadata(command[3]).made or "")
         assert "places" not in made
         assert main(["rerun", command[3], "-q"]) == 0
         assert "the same bytes" in capsys.readouterr().out
@@ -132,7 +132,7 @@ def test_records_without_an_order_mean_rows_first(here: Path, capsys: Capture) -
     # What is made now says x,y, and is made again so.
     words = " ".join(f"{column},{row}" for row, column in CORNERS)
     assert main(["rectify", "wall.png", "-o", "new.png", "--corners", words, "-q"]) == 0
-    assert json.loads(io.read_notes("new.png").made or "")["places"] == "x,y"
+    assert json.loads(io.read_metadata("new.png").made or "")["places"] == "x,y"
     assert main(["rerun", "new.png", "-q"]) == 0
     assert "the same bytes" in capsys.readouterr().out
     np.testing.assert_array_equal(io.read("new.png"), io.read("old.png"))

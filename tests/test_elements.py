@@ -374,7 +374,7 @@ def test_entries_that_cannot_be_read(tmp_path: Path, entry: ElementAnalysis) -> 
 
 
 def test_pictures(entry: ElementAnalysis) -> None:
-    made = elements.pictures(entry)
+    made = elements.draw(entry)
     assert all(p.dtype == np.uint8 for p in made.values())
     assert made["points"].shape == made["mask"].shape == IMAGE.shape
     row, column = np.rint(entry.points[0]).astype(int)

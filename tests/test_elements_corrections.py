@@ -108,11 +108,11 @@ def test_what_is_doubtful_is_said_and_what_to_give() -> None:
 
 
 def test_names_do_not_leave_their_place(found: ElementAnalysis) -> None:
-    assert "<script>alert" not in elements.page(found, "<script>alert(1)</script>")
+    assert "<script>alert" not in elements.to_html(found, "<script>alert(1)</script>")
 
 
 def test_numbers_are_seen_on_their_elements(found: ElementAnalysis) -> None:
-    picture = elements.pictures(found)["numbers"]
+    picture = elements.draw(found)["numbers"]
     assert picture.shape == (192, 192, 3)
     for row, column in np.rint(2 * found.points).astype(int):
         part = picture[max(0, row - 5) : row + 6, max(0, column - 8) : column + 9]

@@ -236,7 +236,7 @@ def test_the_arrangement_is_known(name: str, regular: bool, rows: bool) -> None:
     assert found.darker == bool(np.median(light[~entry.mask]) < np.median(light[entry.mask]))
     words = found.describe(entry.layout)
     assert ("lattice" in words) == regular
-    assert words in elements.page(entry)
+    assert words in elements.to_html(entry)
 
 
 def test_courses_of_unequal_stones_are_found_and_a_heap_has_none() -> None:

@@ -43,7 +43,7 @@ readers = {
     "read": io.read, "read_volume": io.read_volume,
     # Whatever they are said to be, these read.
     "read_vectors": partial(io.read_vectors, limit=2**22), "read_arrays": partial(io.read_arrays, limit=2**22),
-    "read_headers": io.read_headers, "read_notes": io.read_notes, "SourceMap": texrs.SourceMap.load,
+    "read_headers": io.read_headers, "read_notes": io.read_metadata, "SourceMap": texrs.SourceMap.load,
     "Exemplar": texrs.Exemplar.load, "elements": elements.load, "database": database, "info": info,
 }
 small = Path(sys.argv[1]).with_name("small.npz")

@@ -111,7 +111,7 @@ def test_psd(tmp_path):
     profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     icc = b"8BIM" + struct.pack(">HHI", 1039, 0, len(profile)) + profile + b"\0" * (len(profile) & 1)
     path.write_bytes(make.psd(COLOURS, resources=icc))
-    assert tio.read_notes(path).profile == profile
+    assert tio.read_metadata(path).profile == profile
 
 
 @pytest.mark.skipif(not features.check("avif"), reason="this Pillow has no AVIF")
@@ -191,7 +191,7 @@ def test_inks_are_converted_by_their_profile(tmp_path, kind):
     # CIELAB (65, 40, 60) is this orange; the formula gives cyan.
     assert_allclose(back[8, 8].astype(int), (239, 127, 43), atol=6)
     # The profile of inks is not said of the colours that are written.
-    assert tio.read_notes(path).fit(3).profile is None
+    assert tio.read_metadata(path).fit(3).profile is None
 
 
 def test_a_damaged_profile_of_inks_is_not_used(tmp_path):

@@ -194,7 +194,7 @@ def test_a_drawn_layout_serves_a_database_and_a_net(tmp_path: Path) -> None:
 def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     said = {"layout": "courses", "size": [96, 96], "height": [16, 24], "length": 40}
-    assert (layouts.make(said).labels == layouts.courses((96, 96), [16, 24], 40).labels).all()
+    assert (layouts.from_dict(said).labels == layouts.courses((96, 96), [16, 24], 40).labels).all()
     io.write("panes.png", (np.add.outer(3 * (np.arange(96) // 32), np.arange(96) // 32) + 1).astype(np.uint8))
     (tmp_path / "panes.json").write_text(json.dumps({"layout": "cells", "labels": "panes.png"}))
     WALL.save("bricks.npz")
@@ -227,9 +227,9 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         (lambda: layouts.courses(64, [], 20), "height: needs one or more"),
         (lambda: layouts.courses(64, 20, 20, vary=1), "vary: needs a number"),
         (lambda: layouts.courses(64, 20, 20, joint=15), "joint: needs a number"),
-        (lambda: layouts.make({"layout": "spiral"}), "layout: needs a mapping"),
-        (lambda: layouts.make({"layout": "courses", "size": 64, "height": 20}), "courses needs 'length'"),
-        (lambda: layouts.make({"layout": "courses", "size": 64, "tall": 20}), "courses has no 'tall'"),
+        (lambda: layouts.from_dict({"layout": "spiral"}), "layout: needs a mapping"),
+        (lambda: layouts.from_dict({"layout": "courses", "size": 64, "height": 20}), "courses needs 'length'"),
+        (lambda: layouts.from_dict({"layout": "courses", "size": 64, "tall": 20}), "courses has no 'tall'"),
         (lambda: ElementAnalysis.of_labels(DOTS.image, np.ones((4, 4), int)), "labels: needs whole numbers"),
         (
             lambda: ElementAnalysis.of_labels(DOTS.image, 1 + np.arange(128 * 128).reshape(128, 128)),

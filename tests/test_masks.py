@@ -338,7 +338,7 @@ def test_nodata_is_what_the_file_states(tmp_path: Path, dtype: type, value: floa
     heights[DISC] = value
     path = tmp_path / "heights.tif"
     tifffile.imwrite(path, heights, extratags=[(42113, 2, len(text) + 1, text, True)])
-    assert io.read_notes(path).nodata == pytest.approx(value, nan_ok=True)
+    assert io.read_metadata(path).nodata == pytest.approx(value, nan_ok=True)
     for hole in ("nodata", float(text)):
         np.testing.assert_array_equal(texrs.inpaint(path, hole).image, expected)
     tifffile.imwrite(path, heights)
@@ -508,7 +508,7 @@ def test_words_after_a_name_say_how_a_mask_is_read(here: Path, capsys: Capture) 
         )
         == 0
     )
-    assert "../unseen.png" in json.loads(str(io.read_notes("other/o.png").made))["inputs"]
+    assert "../unseen.png" in json.loads(str(io.read_metadata("other/o.png").made))["inputs"]
     assert main(["rerun", "other/o.png"]) == 0
     assert main([*f"{view} no.png".split(), "--ground", "seen.png:grow=much"]) == 2
     assert "--grow: needs a number, as in grow=2; got 'much'" in capsys.readouterr().err
@@ -523,6 +523,6 @@ def test_samples_without_a_header_are_made_again_from_another_folder(
     np.tile(BRICKS[:16, :16, 0], (16, 1, 1)).tofile("a.raw")
     Path("other").mkdir()
     assert main(["solid", "a.raw:16x16x16:uint8", "--size", "16x16x16", "--quality", "fast", "-o", "other/o.tif"]) == 0
-    assert "../a.raw" in json.loads(str(io.read_notes("other/o.tif").made))["inputs"]
+    assert "../a.raw" in json.loads(str(io.read_metadata("other/o.tif").made))["inputs"]
     monkeypatch.chdir("other")
     assert main(["rerun", "o.tif"]) == 0

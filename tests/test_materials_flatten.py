@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import Material, _evening
+from texrs import Material, _lighting_correction
 from texrs._colours import decode_srgb, encode_srgb
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.materials import flatten
+from texrs.materials import flatten_lighting
 
 ROWS, COLUMNS = 120, 160
 GRAIN = 100 + 25 * np.random.default_rng(4).random((ROWS, COLUMNS, 3))
@@ -32,15 +32,15 @@ def test_light_is_evened_and_the_rest_stays(light: Array, wrap: bool, dtype: str
     kind = np.dtype(dtype)
     most = np.iinfo(kind).max / 255 if kind.kind == "u" else 1 / 255
     lit = (GRAIN * light * most).astype(kind)
-    even = flatten(lit, wrap=wrap, space="srgb")
+    even = flatten_lighting(lit, wrap=wrap, space="srgb")
     assert (even.dtype, even.shape) == (lit.dtype, lit.shape)
     assert vary(lit) > 0.1
     assert vary(even) < vary(lit) / 6
     # Grain is as strong as it was, in even light.
     assert 0.85 < even.std() / (GRAIN * most).std() < 1.2
-    half = vary(flatten(lit, 0.5, wrap=wrap, space="srgb"))
+    half = vary(flatten_lighting(lit, 0.5, wrap=wrap, space="srgb"))
     assert vary(even) + 0.02 < half < vary(lit) - 0.02
-    assert np.abs(flatten(lit, 0, wrap=wrap, space="srgb").astype(float) - lit).max() <= 0.01 * most
+    assert np.abs(flatten_lighting(lit, 0, wrap=wrap, space="srgb").astype(float) - lit).max() <= 0.01 * most
 
 
 def test_more_flowers_are_no_more_light() -> None:
@@ -50,11 +50,11 @@ def test_more_flowers_are_no_more_light() -> None:
         for column in range(4, COLUMNS, 8 if row < ROWS // 2 else 32):
             picture[row : row + 5, column : column + 4] = (230, 225, 220)
     spots = picture[..., 0] > 100
-    even = flatten(picture).astype(float)
+    even = flatten_lighting(picture).astype(float)
     assert np.abs(even - picture).max() < 12
     # In uneven light they become alike.
     lit = (picture * (0.6 + 0.35 * COLUMN / COLUMNS)[..., np.newaxis]).astype(np.uint8)
-    better = flatten(lit).astype(float)
+    better = flatten_lighting(lit).astype(float)
     assert better[spots].std() / better[spots].mean() < 0.35 * lit[spots].std() / lit[spots].mean()
 
 
@@ -62,11 +62,11 @@ def test_more_flowers_are_no_more_light() -> None:
 def test_what_differs_by_chance_alone_stays(seed: int) -> None:
     """Flowers are scattered, so that there are more of them here and there; nothing says that it is light."""
     meadow = texrs.samples.leaves_and_flowers((256, 256), seed=seed).image
-    assert (flatten(meadow) == meadow).all()
+    assert (flatten_lighting(meadow) == meadow).all()
     # Of what they are lit by, most goes.
     light = np.exp(0.8 * (np.arange(256) / 256 - 1))[:, np.newaxis]
     lit = np.maximum(meadow * light / 255, 1e-3)
-    left = np.log(flatten(lit, space="srgb") / lit) + np.log(light)
+    left = np.log(flatten_lighting(lit, space="srgb") / lit) + np.log(light)
     assert left.mean(axis=(0, 2)).std() < 0.3 * np.log(light).std()
 
 
@@ -91,9 +91,9 @@ def test_a_tile_is_in_even_light() -> None:
 
 def test_borders_that_meet_still_do() -> None:
     lit = (GRAIN * (1 + 0.3 * np.sin(2 * np.pi * (ROW / ROWS + COLUMN / COLUMNS)))[..., np.newaxis]).astype(np.uint8)
-    even = flatten(lit, wrap=True)
+    even = flatten_lighting(lit, wrap=True)
     for moved in ((30, 0), (0, 50), (60, 80)):
-        again = flatten(np.roll(lit, moved, (0, 1)), wrap=True)
+        again = flatten_lighting(np.roll(lit, moved, (0, 1)), wrap=True)
         assert np.abs(np.roll(even, moved, (0, 1)).astype(int) - again).max() <= 1
     gain = even.mean(axis=-1) / lit.mean(axis=-1)
     assert np.abs(gain[0] - gain[-1]).max() < 0.05
@@ -102,18 +102,18 @@ def test_borders_that_meet_still_do() -> None:
 def test_hues_and_transparency_stay() -> None:
     lit = (np.array([1, 0.6, 0.3]) * GRAIN * RAMP).astype(np.uint8)
     alpha = np.where(COLUMN > 80, 255, 20).astype(np.uint8)
-    even = flatten(np.dstack([lit, alpha]))
+    even = flatten_lighting(np.dstack([lit, alpha]))
     assert (even[..., 3] == alpha).all()
     ratio = even[..., 0].astype(float) / even[..., 2] - lit[..., 0].astype(float) / lit[..., 2]
     assert np.abs(ratio).max() < 0.25
-    assert flatten(np.full((9, 7), 80, np.uint8)).tolist() == np.full((9, 7), 80).tolist()
-    assert flatten(np.zeros((1, 1, 3), np.float32)).tolist() == [[[0, 0, 0]]]
+    assert flatten_lighting(np.full((9, 7), 80, np.uint8)).tolist() == np.full((9, 7), 80).tolist()
+    assert flatten_lighting(np.zeros((1, 1, 3), np.float32)).tolist() == [[[0, 0, 0]]]
 
 
 def test_linear_light_is_the_same_picture() -> None:
     lit = np.clip(GRAIN * RAMP / 255, 0, 1).astype(np.float32)
-    encoded = flatten(lit, space="srgb")
-    np.testing.assert_allclose(encode_srgb(flatten(decode_srgb(lit))), encoded, atol=1e-4)
+    encoded = flatten_lighting(lit, space="srgb")
+    np.testing.assert_allclose(encode_srgb(flatten_lighting(decode_srgb(lit))), encoded, atol=1e-4)
 
 
 @pytest.mark.parametrize("dtype", ["float16", "float32", "float64"])
@@ -124,28 +124,28 @@ def test_no_light_is_endless(dtype: str, space: Any, highest: float) -> None:
     kind = np.dtype(dtype)
     lit = (GRAIN / 200 * RAMP**2).astype(kind)
     lit[::9, ::11] = min(highest, float(np.finfo(kind).max))
-    assert np.isfinite(flatten(lit, space=space)).all()
+    assert np.isfinite(flatten_lighting(lit, space=space)).all()
     if kind.itemsize > 2:
         lit[3, 4] = -1.1e15
         with pytest.raises(InvalidInput, match=r"image: .*up to 1e\+15.*got 1\.1e\+15"):
-            flatten(lit, space=space)
+            flatten_lighting(lit, space=space)
 
 
 def test_strips_are_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     lit = (GRAIN * RAMP).astype(np.uint8)
-    whole = flatten(lit)
-    monkeypatch.setattr(_evening, "STRIP", 7 * COLUMNS)
-    assert (flatten(lit) == whole).all()
+    whole = flatten_lighting(lit)
+    monkeypatch.setattr(_lighting_correction, "STRIP", 7 * COLUMNS)
+    assert (flatten_lighting(lit) == whole).all()
 
 
 def test_materials_are_flattened_by_their_roles() -> None:
     lit = (GRAIN * RAMP).astype(np.uint8)
     stones = Material({"albedo": lit, "height": lit[..., 0], "emission": lit})
-    even = stones.flatten()
-    assert (even["albedo"].pixels == flatten(lit)).all()
+    even = stones.flatten_lighting()
+    assert (even["albedo"].pixels == flatten_lighting(lit)).all()
     assert even["height"].pixels is stones["height"].pixels or (even["height"].pixels == lit[..., 0]).all()
     assert (even["emission"].pixels == lit).all()
-    assert texrs.materials.flatten is flatten
+    assert texrs.materials.flatten_lighting is flatten_lighting
 
 
 @pytest.mark.parametrize(
@@ -159,6 +159,6 @@ def test_materials_are_flattened_by_their_roles() -> None:
 )
 def test_bad_options_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
-        flatten(GRAIN.astype(np.uint8), **options)
+        flatten_lighting(GRAIN.astype(np.uint8), **options)
     with pytest.raises(InvalidInput, match="needs colours, got bool"):
-        flatten(np.ones((8, 8), np.bool_))
+        flatten_lighting(np.ones((8, 8), np.bool_))

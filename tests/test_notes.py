@@ -37,9 +37,9 @@ def test_notes_come_back_and_change_no_pixel(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     io.write(path, KINDS[name])
     before = io.read(path)
-    io.annotate(path, io.Notes(profile=PROFILE, density=(3000.0, 2000.0), primaries=PRIMARIES, made=MADE))
+    io.write_metadata(path, io.Metadata(profile=PROFILE, density=(3000.0, 2000.0), primaries=PRIMARIES, made=MADE))
     assert (io.read(path) == before).all()
-    found = io.read_notes(path)
+    found = io.read_metadata(path)
     suffix = path.suffix
     assert (found.profile == PROFILE) == (suffix in (".png", ".jpg", ".webp", ".tif", ".tiff"))
     if suffix in (".png", ".jpg", ".bmp", ".tif", ".tiff", ".exr"):
@@ -52,8 +52,8 @@ def test_notes_come_back_and_change_no_pixel(tmp_path: Path, name: str) -> None:
     beside = path.with_name(name + ".json")
     assert beside.exists() == (suffix in (".webp", ".bmp", ".npy", ".hdr"))
     whole = path.read_bytes()
-    io.annotate(path, io.Notes(made=MADE))
-    assert io.read_notes(path) == found
+    io.write_metadata(path, io.Metadata(made=MADE))
+    assert io.read_metadata(path) == found
     assert suffix == ".npz" or path.read_bytes() == whole
 
 
@@ -61,13 +61,13 @@ def test_notes_come_back_and_change_no_pixel(tmp_path: Path, name: str) -> None:
 def test_a_changed_file_is_told_from_what_was_made(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     io.write(path, KINDS[name])
-    io.annotate(path, io.Notes(made=MADE))
+    io.write_metadata(path, io.Metadata(made=MADE))
     other = tmp_path / f"other{path.suffix}"
     io.write(other, KINDS[name][::-1])
-    made = io.read_notes(path).made
+    made = io.read_metadata(path).made
     assert made is not None
-    io.annotate(other, io.Notes(made=made))
-    assert io.read_notes(other).made == made
+    io.write_metadata(other, io.Metadata(made=made))
+    assert io.read_metadata(other).made == made
     assert not is_unchanged(other, made)
 
 
@@ -75,10 +75,10 @@ def test_a_changed_file_is_told_from_what_was_made(tmp_path: Path, name: str) ->
 def test_volumes_say_how_they_were_made(tmp_path: Path, suffix: str) -> None:
     path, volume = tmp_path / f"v{suffix}", np.arange(5 * 6 * 7 * 3, dtype=np.uint16).reshape(5, 6, 7, 3)
     io.write_volume(path, volume)
-    io.annotate(path, io.Notes(made=MADE))
+    io.write_metadata(path, io.Metadata(made=MADE))
     if suffix != ".vti":
         assert (io.read_volume(path) == volume).all()
-    made = io.read_notes(path).made
+    made = io.read_metadata(path).made
     assert made is not None
     assert is_unchanged(path, made)
 
@@ -87,8 +87,8 @@ def test_pages_and_reports_say_how_they_were_made(tmp_path: Path) -> None:
     for name, text in (("p.html", "<p>--</p>\n"), ("r.json", '{\n  "a": [1, 2.5]\n}\n'), ("e.json", "{}\n")):
         path = tmp_path / name
         path.write_text(text)
-        io.annotate(path, io.Notes(made=MADE))
-        made = io.read_notes(path).made
+        io.write_metadata(path, io.Metadata(made=MADE))
+        made = io.read_metadata(path).made
         assert made is not None
         assert is_unchanged(path, made)
         text = path.read_text()
@@ -100,7 +100,7 @@ def test_pages_and_reports_say_how_they_were_made(tmp_path: Path) -> None:
 def test_other_readers_find_the_notes(tmp_path: Path) -> None:
     for name in ("a.png", "b.png", "c.jpg", "f.tif", "d.webp"):
         io.write(tmp_path / name, KINDS[name])
-        io.annotate(tmp_path / name, io.Notes(profile=PROFILE, density=(3000.0, 2000.0), made=MADE))
+        io.write_metadata(tmp_path / name, io.Metadata(profile=PROFILE, density=(3000.0, 2000.0), made=MADE))
         with Image.open(tmp_path / name) as picture:
             picture.load()
             assert picture.info["icc_profile"] == PROFILE
@@ -121,7 +121,7 @@ def test_what_other_writers_say_is_read(tmp_path: Path) -> None:
         exif[274] = 6
         more = {} if suffix == "webp" else {"dpi": (72, 144)}
         picture.save(path, icc_profile=PROFILE, exif=exif, **more)
-        found = io.read_notes(path)
+        found = io.read_metadata(path)
         assert found.profile == PROFILE, suffix
         if more:
             # The picture is turned upright when it is read, and its density with it.
@@ -132,29 +132,35 @@ def test_what_other_writers_say_is_read(tmp_path: Path) -> None:
     data = plain.getvalue()
     extra = b"".join(struct.pack(">I", len(c) - 4) + c + struct.pack(">I", zlib.crc32(c)) for c in chunks)
     (tmp_path / "linear.png").write_bytes(data[:33] + extra + data[33:])
-    found = io.read_notes(tmp_path / "linear.png")
+    found = io.read_metadata(tmp_path / "linear.png")
     assert (found.gamma, found.srgb) == (1.0, True)
-    io.annotate(tmp_path / "linear.png", io.Notes(gamma=1.0))
-    assert io.read_notes(tmp_path / "linear.png") == io.Notes(gamma=1.0)
+    io.write_metadata(tmp_path / "linear.png", io.Metadata(gamma=1.0))
+    assert io.read_metadata(tmp_path / "linear.png") == io.Metadata(gamma=1.0)
 
 
 def test_profiles_fit_channels() -> None:
     grey = PROFILE[:16] + b"GRAY" + PROFILE[20:]
-    assert [io.Notes(profile=PROFILE).fit(n).profile is not None for n in range(1, 6)] == [
+    assert [io.Metadata(profile=PROFILE).fit(n).profile is not None for n in range(1, 6)] == [
         False,
         False,
         True,
         True,
         False,
     ]
-    assert [io.Notes(profile=grey).fit(n).profile is not None for n in range(1, 6)] == [True, True, False, False, False]
+    assert [io.Metadata(profile=grey).fit(n).profile is not None for n in range(1, 6)] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+    ]
 
 
 @pytest.mark.parametrize("name", KINDS)
 def test_damaged_files_say_nothing_wrong(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     io.write(path, KINDS[name])
-    io.annotate(path, io.Notes(profile=PROFILE, density=(3000.0, 2000.0), primaries=PRIMARIES))
+    io.write_metadata(path, io.Metadata(profile=PROFILE, density=(3000.0, 2000.0), primaries=PRIMARIES))
     whole = path.read_bytes()
     random = np.random.default_rng(1)
     for _ in range(60):
@@ -162,7 +168,7 @@ def test_damaged_files_say_nothing_wrong(tmp_path: Path, name: str) -> None:
         for at in random.integers(0, min(len(bent), 400), 4):
             bent[at] = random.integers(256)
         path.write_bytes(bytes(bent))
-        assert io.read_notes(path).made is None
+        assert io.read_metadata(path).made is None
     path.write_bytes(b"")
-    assert io.read_notes(path) == io.Notes()
-    assert io.read_notes(tmp_path / "no such file") == io.Notes()
+    assert io.read_metadata(path) == io.Metadata()
+    assert io.read_metadata(tmp_path / "no such file") == io.Metadata()

@@ -135,7 +135,7 @@ def test_palettes_come_back(tmp_path, suffix, clear):
         assert after.getpalette()[:18] == before.getpalette()[:18]
         assert after.info.get("transparency") == before.info.get("transparency")
         assert find_colours(after.convert("RGBA")) <= find_colours(before.convert("RGBA"))
-    assert io.read_notes(out).palette == io.read_notes(source).palette
+    assert io.read_metadata(out).palette == io.read_metadata(source).palette
     assert main(["rerun", str(out), "-q"]) == 0
 
 

@@ -11,14 +11,14 @@ from plane_checks import bend, bulge, look, look_twice, roll
 from texrs import Plane, io, planes, samples
 from texrs.cli import main
 from texrs.errors import InvalidInput
-from texrs.planes._choose import measure_scale
+from texrs.planes._choose import measure_known_scale
 from texrs.planes._sizes import SURE, agree, weigh_bands
 
 
 @pytest.mark.parametrize("name", ["weave", "dots", "pebbles"])
 def test_a_bulge_is_no_plane(name: str) -> None:
     picture, truth = bend(name, (256, 320), bulge)
-    found = planes.measure(picture)
+    found = planes.measure_scale(picture)
     assert (found.shape, found.scale.kind) == ("curved", "area")
     assert found.confidence >= SURE
     off = np.log(found.scale) - np.log(truth)
@@ -29,7 +29,7 @@ def test_a_bulge_is_no_plane(name: str) -> None:
 
 def test_a_column_is_no_plane() -> None:
     picture, truth = bend("weave", (256, 320), roll)
-    found = planes.measure(picture)
+    found = planes.measure_scale(picture)
     assert found.shape == "curved"
     assert np.corrcoef(np.log(found.scale).ravel(), np.log(truth).ravel())[0, 1] > 0.93
     # What goes on along it is as large everywhere.
@@ -38,7 +38,7 @@ def test_a_column_is_no_plane() -> None:
 
 @pytest.mark.parametrize(("slant", "tilt"), [(0, 90), (30, 200), (55, 90)])
 def test_a_plane_is_one(slant: float, tilt: float) -> None:
-    found = planes.measure(look("weave", Plane((256, 320), slant, tilt)))
+    found = planes.measure_scale(look("weave", Plane((256, 320), slant, tilt)))
     assert (found.shape, found.scale.kind) == ("plane", "width")
     assert found.plane is not None
     assert found.confidence == found.plane.confidence
@@ -47,7 +47,7 @@ def test_a_plane_is_one(slant: float, tilt: float) -> None:
 
 def test_few_things_that_differ_by_chance_are_no_curve() -> None:
     for seed in (0, 1):
-        found = planes.measure(look("bricks", Plane((256, 320), 0, 90), seed=seed))
+        found = planes.measure_scale(look("bricks", Plane((256, 320), 0, 90), seed=seed))
         assert found.shape in ("even", "plane")
         assert np.abs(found.scale - 1).max() < 0.05
     slope = np.linspace(-0.5, 0.5, 200)
@@ -56,19 +56,19 @@ def test_few_things_that_differ_by_chance_are_no_curve() -> None:
 
 
 def test_what_nobody_knows_is_even_and_said() -> None:
-    found = planes.measure(look_twice())
+    found = planes.measure_scale(look_twice())
     assert found.shape == "even"
     assert found.confidence < SURE
     assert found.scale.min() == found.scale.max() == 1
     with pytest.warns(UserWarning, match="no plane was found surely.*little in common"):
-        measure_scale(look_twice(), np.ones((192, 224), np.bool_))
+        measure_known_scale(look_twice(), np.ones((192, 224), np.bool_))
 
 
 def test_verbs_say_what_was_measured_and_how_surely(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     floor = samples.tilted_discs((128, 128)).image
     hole = np.zeros((128, 128), np.bool_)
     hole[60:80, 50:70] = True
-    found = planes.measure(floor)
+    found = planes.measure_scale(floor)
     grown = texrs.perspective(floor, size=64)
     assert grown.report["measured"] == found.as_dict() == json.loads(json.dumps(grown.report["measured"]))
     assert (found.as_dict()["shape"], found.as_dict()["scale_kind"]) == ("plane", "width")
@@ -103,7 +103,7 @@ def test_a_voice_the_other_way_round_is_outvoted() -> None:
 def test_small_pictures_are_doubtful() -> None:
     floor = samples.tilted_discs((56, 56))
     with pytest.warns(UserWarning, match="too little to measure in more than one way"):
-        scale = measure_scale(floor.image, np.ones((56, 56), np.bool_)).scale
+        scale = measure_known_scale(floor.image, np.ones((56, 56), np.bool_)).scale
     assert scale.shape == (56, 56)
 
 
@@ -113,12 +113,12 @@ def test_what_is_not_known_does_not_count() -> None:
     known[:, :70] = False
     covered = picture.copy()
     covered[:, :70] = np.random.default_rng(0).integers(0, 255, (256, 70, 3))
-    one, other = (planes.measure(p, known=known) for p in (picture, covered))
+    one, other = (planes.measure_scale(p, known=known) for p in (picture, covered))
     np.testing.assert_allclose(np.log(one.scale), np.log(other.scale), atol=0.02)
 
 
 def test_nothing_to_measure_gets_a_sentence() -> None:
     with pytest.raises(InvalidInput, match="one colour"):
-        planes.measure(np.zeros((128, 128), np.uint8))
+        planes.measure_scale(np.zeros((128, 128), np.uint8))
     with pytest.raises(InvalidInput, match="known"):
-        planes.measure(samples.dots().image, known=np.zeros((3, 3), bool))
+        planes.measure_scale(samples.dots().image, known=np.zeros((3, 3), bool))

@@ -43,7 +43,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def said(path: str | Path) -> dict[str, Any]:
-    made = io.read_notes(path).made
+    made = io.read_metadata(path).made
     assert made is not None, path
     found: dict[str, Any] = json.loads(made)
     return found
@@ -115,7 +115,7 @@ def test_commands_replace_what_they_made(here: Path, capsys: Capture, name: str)
     if target.endswith(".png"):
         picture = io.read(target)
         io.write(target, picture[::-1].copy())
-        io.annotate(target, io.Notes(made=json.dumps(said_before(first, here))))
+        io.write_metadata(target, io.Metadata(made=json.dumps(said_before(first, here))))
         changed = files(here)
         assert main(command) == 2
         assert "was changed since" in capsys.readouterr().err
@@ -180,21 +180,21 @@ def test_maps_stages_and_pages_are_not_replaced(here: Path, capsys: Capture) -> 
 
 def test_colours_and_density_go_through(here: Path) -> None:
     deep = (io.read("in.png").astype(np.uint16)) * 257
-    known = io.Notes(profile=PROFILE, density=(3000.0, 2000.0))
+    known = io.Metadata(profile=PROFILE, density=(3000.0, 2000.0))
     for name, pixels in (("p.png", deep), ("p.tif", deep), ("p.jpg", io.read("in.png"))):
         io.write(name, pixels)
-        io.annotate(name, known)
+        io.write_metadata(name, known)
         for out in ("o.png", "o.tif", *(["o.jpg"] if pixels.dtype == np.uint8 else [])):
             assert main(["tile", name, "-o", out, "-q", "--force"]) == 0
-            found = io.read_notes(out)
+            found = io.read_metadata(out)
             assert found.profile == PROFILE, (name, out)
             assert found.density == pytest.approx((3000, 2000), rel=0.01)
             assert io.read(out).dtype == pixels.dtype
     assert main(["apply", "map.npz", "p.png", "-o", "applied.png", "-q"]) == 0
-    assert io.read_notes("applied.png").profile == PROFILE
-    io.annotate("in.png", io.Notes(gamma=1.0))
+    assert io.read_metadata("applied.png").profile == PROFILE
+    io.write_metadata("in.png", io.Metadata(gamma=1.0))
     assert main(["tile", "in.png", "-o", "linear.png", "-q"]) == 0
-    assert io.read_notes("linear.png").gamma == 1.0
+    assert io.read_metadata("linear.png").gamma == 1.0
     # What lies on its side is turned upright, and says no more that it is not.
     picture = Image.fromarray(io.read("in.png")[:, :48])
     exif = picture.getexif()
@@ -358,7 +358,7 @@ def test_what_changed_is_named(here: Path, capsys: Capture) -> None:
     os.rename("kept.png", "hole.png")
     # A result that was painted over, and still says how it was made.
     io.write("r.png", picture)
-    io.annotate("r.png", io.Notes(made=json.dumps(said_before(whole, here))))
+    io.write_metadata("r.png", io.Metadata(made=json.dumps(said_before(whole, here))))
     assert main(["info", "r.png"]) == 0
     assert "changed since it was made" in capsys.readouterr().out
     assert main(["rerun", "r.png", "-o", "former.png", "-q"]) == 0

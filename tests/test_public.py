@@ -111,10 +111,10 @@ UNIT = re.compile(
 )
 """A number has a unit, a range, or counts something."""
 RAISE_NOTHING = {
-    "texrs.elements.page",
-    "texrs.elements.pictures",
+    "texrs.elements.to_html",
+    "texrs.elements.draw",
     "texrs.exemplar.Segmentation.measure_depth",
-    "texrs.io.Notes.fit",
+    "texrs.io.Metadata.fit",
 }
 """What takes results and numbers of texrs' own making, and checks nothing."""
 

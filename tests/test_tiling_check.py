@@ -227,5 +227,5 @@ def test_only_colours_of_a_material_are_evened():
     assert made.report["flatten_lighting"] is True
     at = made.source_map.coordinates.astype(int)
     np.testing.assert_array_equal(made.material["height"].pixels, material["height"].pixels[at[..., 0], at[..., 1]])
-    even = material.flatten()["albedo"].pixels
+    even = material.flatten_lighting()["albedo"].pixels
     np.testing.assert_array_equal(made.material["albedo"].pixels, even[at[..., 0], at[..., 1]])

@@ -128,11 +128,11 @@ def find_value(pixels: Array, value: float, axes: int) -> Bools:
 
 def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
     """Report pixels that have the nodata value of their file, if they are used as values."""
-    from texrs.io import read_notes
+    from texrs.io import read_metadata
 
     if os.path.splitext(path)[1].lower() not in (".tif", ".tiff"):
         return
-    value = read_notes(path).nodata
+    value = read_metadata(path).nodata
     count = 0 if value is None or not np.isfinite(value) else int(np.count_nonzero(find_value(pixels, value, 2)))
     if count:
         name = os.path.basename(path)

@@ -94,7 +94,7 @@ def takes_materials(
             materials = _check(several, used)
             check(given.arguments)
             lit = given.arguments.get("flatten_lighting")
-            guides = iter(guide_materials([m.flatten() for m in materials] if lit is True else materials))
+            guides = iter(guide_materials([m.flatten_lighting() for m in materials] if lit is True else materials))
             for name in used:
                 value = given.arguments[name]
                 if analysed:

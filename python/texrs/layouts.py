@@ -1,7 +1,7 @@
 """Layouts that are drawn, not found: points, lattices, cells and courses that elements are brought into.
 
 Each is an entry like that of a picture (`texrs.elements.ElementAnalysis`), whose picture is a drawing of the layout. All that
-takes the arrangement of a texture takes it: the second argument of `texrs.splice`, and a `texrs.TextureDatabase`. `make` makes
+takes the arrangement of a texture takes it: the second argument of `texrs.splice`, and a `texrs.TextureDatabase`. `from_dict` makes
 one of a description in plain JSON types, as the command line does.
 """
 
@@ -19,7 +19,7 @@ from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.point_sets import nearest_distances
 
-__all__ = ["cells", "courses", "lattice", "make", "points"]
+__all__ = ["cells", "courses", "from_dict", "lattice", "points"]
 
 Points = NDArray[np.float64]
 
@@ -251,7 +251,7 @@ def courses(
     return cells(labels)
 
 
-def make(description: Mapping[str, Any]) -> ElementAnalysis:
+def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
     """Make a layout of a description in plain JSON types.
 
     Parameters
@@ -272,7 +272,7 @@ def make(description: Mapping[str, Any]) -> ElementAnalysis:
     Examples
     --------
     >>> import texrs
-    >>> texrs.layouts.make({"layout": "lattice", "size": 96, "first": [0, 24], "second": [24, 0]})
+    >>> texrs.layouts.from_dict({"layout": "lattice", "size": 96, "first": [0, 24], "second": [24, 0]})
     Elements(9 of box (17, 17) in 96 x 96, disjoint)
 
     """

@@ -30,8 +30,8 @@ from texrs._arrays import (
     as_ndarray,
     as_wrap,
 )
-from texrs._evening import flatten
 from texrs._light import divide_out, measure_lights
+from texrs._lighting_correction import flatten_lighting
 from texrs._masks import Mask
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Progress
@@ -124,7 +124,7 @@ def blend(
         The map of a volume; another number of exemplars, or of another size, than the map was made from; an option out
         of range.
 
-    Notes
+    Metadata
     -----
     Some values have no meaning between them, and come back as `SourceMap.render` gives them: the last of two or of four
     channels (transparency), and whatever is bool, signed integers or ``interpolation="nearest"`` (labels).
@@ -266,7 +266,7 @@ def _look_up(
     if map_type == "label":
         return source.render(several, interpolation="nearest")
     if how is not None and how.flatten_lighting and map_type == "colour":
-        several = [flatten(as_ndarray(each, "exemplars")) for each in several]
+        several = [flatten_lighting(as_ndarray(each, "exemplars")) for each in several]
     if (
         how is not None
         and how.light is not None

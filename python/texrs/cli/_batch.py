@@ -285,7 +285,7 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
             if not is_folder_done(record, path, 1 if packed else job.maps):
                 return False
             continue
-        made = io.read_notes(path).made if os.path.isfile(path) else None
+        made = io.read_metadata(path).made if os.path.isfile(path) else None
         if made is None or not is_unchanged(path, made):
             return False
         said, wanted = json.loads(made), json.loads(record.tell(path, output=option))
@@ -299,7 +299,7 @@ def is_folder_done(record: _provenance.Record, folder: str, least: int) -> bool:
     """Return whether so many maps or more are in a folder, all made as they would be now."""
     count = 0
     for path in _provenance.list_folder(folder):
-        made = io.read_notes(path).made
+        made = io.read_metadata(path).made
         if made is None:
             continue
         said, wanted = json.loads(made), json.loads(record.tell(path, inside=True))

@@ -27,8 +27,8 @@ from texrs.cli._readers import read_picture
 from texrs.cli._stacks import Roles, read_roles
 from texrs.cli._texts import About
 from texrs.database import TextureDatabase
-from texrs.elements import analyse, pictures
-from texrs.elements import page as draw_page
+from texrs.elements import analyse, draw
+from texrs.elements import to_html as draw_page
 from texrs.errors import FileError, InvalidInput
 from texrs.materials import Material
 from texrs.materials._single import SingleMap
@@ -92,7 +92,7 @@ def analyse_command(
         entry.save(temporary)
     if stages is not None:
         with _outputs.write_folder(stages, "stages") as pictured:
-            for name, picture in pictures(entry).items():
+            for name, picture in draw(entry).items():
                 io.write(pictured / f"{name}.png", picture)
     if page is not None:
         with _outputs.write_output(page, "page") as temporary:

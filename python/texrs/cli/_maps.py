@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from texrs import io
 from texrs._arrays import as_float, as_int
-from texrs._evening import flatten
+from texrs._lighting_correction import flatten_lighting
 from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs, _provenance
@@ -78,14 +78,14 @@ def apply_command(
             images = [read(path) for path in paths]
             _outputs.check_output(target, images[0], places.shape)
             channels = images[0].shape[places.axes] if images[0].ndim > places.axes else 1
-            like = replace(io.read_notes(paths[0]).fit(channels), made=None)
+            like = replace(io.read_metadata(paths[0]).fit(channels), made=None)
             temporary = stack.enter_context(_outputs.write_output(target, like=like, made=made))
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
                 image = make_map(paths[0], images, places, values, fit(finish, paths, given))
             if places.axes == 2:
                 packed = find_packed(paths[0]) is not None
                 coloured = not packed and read_kind(paths[0], images, places, values)[0] == "colour"
-                io.write(temporary, image, notes=io.Notes(multiplied=like.multiplied if coloured else None))
+                io.write(temporary, image, notes=io.Metadata(multiplied=like.multiplied if coloured else None))
             else:
                 _outputs.write_like(temporary, image, _outputs.find_volume(paths[0], 3))
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
@@ -111,7 +111,7 @@ def store_map(
     images = [read(path) for path in paths]
     kind, green = read_kind(paths[0], images, places, values)
     if finish.flatten_lighting and kind == "colour":
-        images = [flatten(image) for image in images]
+        images = [flatten_lighting(image) for image in images]
     how: dict[str, Any] = {"interpolation": finish.interpolation, "antialias": finish.antialias}
     how |= {"interpolation": "nearest"} if kind == "label" else {"map_type": kind, "green": green}
     running = _provenance.RUNNING.get()

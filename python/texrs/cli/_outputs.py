@@ -286,7 +286,7 @@ def write_output(
     option: str = "out",
     *,
     inside: bool = False,
-    like: io.Notes | None = None,
+    like: io.Metadata | None = None,
     suffix: str = "",
     made: _provenance.Record | None = None,
 ) -> Iterator[Path]:
@@ -302,10 +302,10 @@ def write_output(
         try:
             yield temporary
             running = made or RUNNING.get()
-            notes = like or io.Notes()
+            notes = like or io.Metadata()
             if running is not None:
                 notes = replace(notes, made=running.tell(path, output=option, inside=inside, suffix=suffix))
-            io.annotate(temporary, notes, os.path.realpath(path))
+            io.write_metadata(temporary, notes, os.path.realpath(path))
         except TexrsError as error:
             message = str(error).replace(str(temporary), path)
             if message.startswith("array:"):
@@ -326,7 +326,9 @@ def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.
             target = os.path.join(path, file.name)
             check_free(target, option)
             if running is not None:
-                io.annotate(file, io.Notes(made=running.tell(target, output=option, inside=True, suffix=suffix)))
+                io.write_metadata(
+                    file, io.Metadata(made=running.tell(target, output=option, inside=True, suffix=suffix))
+                )
             if (beside := name_sidecar(file)).exists():
                 put(beside, name_sidecar(Path(target)))
             put(file, Path(target))
@@ -376,7 +378,7 @@ def deliver(
     result: Synthesis,
     paths: Mapping[str, str | None],
     *,
-    like: io.Notes | None = None,
+    like: io.Metadata | None = None,
     volume: str | None = None,
     spacing: Sequence[float] | None = None,
     made: _provenance.Record | None = None,

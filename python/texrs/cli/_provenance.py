@@ -294,7 +294,7 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
         needs_sidecar(Path(real))
         and status is None
         and read_status(beside) is not None
-        and io.read_notes(beside).made is None
+        and io.read_metadata(beside).made is None
     ):
         raise InvalidInput(
             f"{as_flag(option)}: {beside}, which is to say how {path} was made, is there already; --force replaces it"
@@ -304,7 +304,7 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
 
 def _find_other(running: Record, path: str) -> str:
     """Return why a file that is there is not this command's own."""
-    made = io.read_notes(path).made
+    made = io.read_metadata(path).made
     if made is None:
         return "is there already, and no texrs command says that it made it"
     if not is_unchanged(path, made):

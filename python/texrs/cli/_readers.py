@@ -257,7 +257,7 @@ def read_layout(text: str, about: About) -> Any:
     said = read_json(text, about.option)
     if isinstance(said, dict) and isinstance(said.get("labels"), str):
         said = {**said, "labels": io.read(said["labels"])}
-    return layouts.make(said)
+    return layouts.from_dict(said)
 
 
 def read_labels(path: str, about: About) -> Array:

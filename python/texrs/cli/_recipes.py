@@ -175,7 +175,7 @@ def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
         for job in jobs:
             written = [after for word, after in itertools.pairwise(job.words) if word in flags]
             made |= {os.path.realpath(path): source for path in written}
-    if recipe.sheet is not None and '"verb": "batch"' in (io.read_notes(recipe.sheet).made or ""):
+    if recipe.sheet is not None and '"verb": "batch"' in (io.read_metadata(recipe.sheet).made or ""):
         made[os.path.realpath(recipe.sheet)] = Source("", "")
     taken: dict[str, Source] = {}
     total = 0

@@ -63,7 +63,7 @@ class Recipe:
     @classmethod
     def read(cls, path: str) -> Recipe | None:
         """Return what a file says; None where it says nothing."""
-        text = io.read_notes(path).made
+        text = io.read_metadata(path).made
         if text is None:
             return None
         said = json.loads(text)
@@ -211,7 +211,7 @@ def read_recipes(output: str) -> list[Recipe]:
 def check_same(path: str, recipe: Recipe) -> None:
     """Check that nothing is lost when a file is written to ``path``."""
     if os.path.lexists(path) and not (os.path.isfile(path) and os.path.getsize(path) == 0):
-        made = io.read_notes(path).made if os.path.isfile(path) else None
+        made = io.read_metadata(path).made if os.path.isfile(path) else None
         if made is None or json.loads(made) != json.loads(recipe.text) or not is_unchanged(path, made):
             raise InvalidInput(f"--out: {path} is there already, and is something else; --force replaces it")
 
@@ -219,7 +219,7 @@ def check_same(path: str, recipe: Recipe) -> None:
 def compare(recipe: Recipe, made: str) -> None:
     """Say whether the file that was made is the one that is there."""
     now, then = hash_file(made), hash_file(recipe.path)
-    again = io.read_notes(made).made
+    again = io.read_metadata(made).made
     if now == then and again is not None and json.loads(again) == json.loads(recipe.text):
         say(f"{recipe.path}: the same bytes, SHA-256 {now}")
         return
@@ -250,7 +250,7 @@ def info_command(
     recipe = Recipe.read(file)
     for line in describe_file(file, recipe):
         say(line)
-    notes = io.read_notes(file)
+    notes = io.read_metadata(file)
     if notes.profile is not None:
         say(f"colours: ICC profile of {len(notes.profile)} bytes")
     elif notes.srgb or notes.gamma is not None:
@@ -300,7 +300,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
     if axes == 3:
         return [describe_volume(file, image)]
     what = "scale map" if recipe is not None and recipe.verb == "scale-map" else "image"
-    frames, palette = count_frames(Path(file), detect_kind(Path(file))), io.read_notes(file).palette
+    frames, palette = count_frames(Path(file), detect_kind(Path(file))), io.read_metadata(file).palette
     also = [f"animation: {frames} frames, the first is read"] * (frames > 1)
     also += [] if palette is None else [f"palette: {len(palette) // 4} colours"]
     return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}", *also]

@@ -169,7 +169,7 @@ class Stack:
         result: Synthesis,
         paths: Mapping[str, str | None],
         *,
-        like: io.Notes | None = None,
+        like: io.Metadata | None = None,
         made: _provenance.Record | None = None,
         option: str = "out",
     ) -> None:

@@ -121,8 +121,8 @@ def tiles_command(
     with name_arguments(size="--size", origin="--origin"):
         made = tiles.window(asked.origin, sides)
     if made.material is None or single:
-        notes = io.read_notes(given["exemplar"]) if os.path.isfile(given["exemplar"]) else io.Notes()
-        like = io.Notes(profile=notes.profile, srgb=notes.srgb, multiplied=notes.multiplied)
+        notes = io.read_metadata(given["exemplar"]) if os.path.isfile(given["exemplar"]) else io.Metadata()
+        like = io.Metadata(profile=notes.profile, srgb=notes.srgb, multiplied=notes.multiplied)
         with _outputs.write_output(out, like=like) as temporary:
             io.write(temporary, made.image, notes=like)
     else:

@@ -191,11 +191,11 @@ class Verb:
         # Analysed elements hold theirs, and materials have one that shows them.
         return np.asarray(first.base if isinstance(first, Material) else getattr(first, "image", first))
 
-    def read_colours(self, given: Mapping[str, Any], out: str) -> io.Notes:
+    def read_colours(self, given: Mapping[str, Any], out: str) -> io.Metadata:
         """Return what the first input says of its colours, which are those of the result, and of its pixels."""
         first = given[next(o.name for o in self.options if o.argument)]
         name = first[0] if isinstance(first, list) else first
-        notes = io.read_notes(name) if os.path.isfile(name) else io.Notes()
+        notes = io.read_metadata(name) if os.path.isfile(name) else io.Metadata()
         if self.fills and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
             ignore(f"{os.path.basename(name)}: its georeference is not written, because only TIFF holds it")
         notes = notes if self.fills else replace(notes, georeference=())

@@ -17,7 +17,7 @@ import numpy as np
 
 from texrs import io
 from texrs._typing import Array
-from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, digest, load
+from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, hash_image, load
 from texrs.errors import FileError, InvalidInput, TexrsError
 
 MANIFEST, LOCK = "manifest.json", ".lock"
@@ -229,7 +229,7 @@ def _record_of(name: str, file: str, entry: ElementAnalysis) -> Record:
     kept = entry.report.get("database", {})
     box = tuple(int(n) for n in entry.report.get("box", (0, 0, *entry.box)))
     image, options = str(kept.get("image", "")), dict(kept.get("options", {}))
-    return Record(name, file, image, digest(entry.image), FORMAT, entry.layout, box, len(entry.points), options)
+    return Record(name, file, image, hash_image(entry.image), FORMAT, entry.layout, box, len(entry.points), options)
 
 
 def _read_record(name: str, item: Mapping[str, Any]) -> Record:

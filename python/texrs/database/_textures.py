@@ -20,7 +20,7 @@ from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
 from texrs.database._sheet import Sheet
-from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, LayoutName, analyse, digest, load
+from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, LayoutName, analyse, hash_image, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
 from texrs.io._files import as_path
 from texrs.papers.splice import splice
@@ -222,7 +222,7 @@ class TextureDatabase:
             raise InvalidInput(f"name: letters, digits, '.', '_' and '-' are allowed, up to 100; got {name!r}")
         pixels = as_image(image) if file is None else io.read(file)
         if not as_bool(replace, "replace"):
-            check_free(self._folder.read(), name, digest(pixels))
+            check_free(self._folder.read(), name, hash_image(pixels))
         entry = analyse(pixels, progress=progress, **options)
         if similarity:
             entry = entry.with_similarity()
@@ -319,7 +319,7 @@ class TextureDatabase:
             if entry is None:
                 raise FileError(f"{self.path / record.file}: {reason}, and its image {record.image} is gone")
             return entry
-        if entry is not None and digest(image) == digest(entry.image):
+        if entry is not None and hash_image(image) == hash_image(entry.image):
             return entry
         self._folder.warn(f"{name}: made anew, for the entry {reason or 'is of another image'}")
         options = {k: restore_option(v) for k, v in record.options.items()}

@@ -356,7 +356,7 @@ class ElementAnalysis:
         parts: dict[str, Any] = {
             MARK: np.array(FORMAT),
             "image": self.image,
-            "hash": _encode_text(digest(self.image)),
+            "hash": _encode_text(hash_image(self.image)),
             "points": self.points,
             "mask": self.mask,
             "box": np.array(self.box, np.int64),
@@ -378,7 +378,7 @@ class ElementAnalysis:
             np.savez_compressed(file, allow_pickle=False, **parts)
 
 
-def digest(image: Array) -> str:
+def hash_image(image: Array) -> str:
     """Return a hash of an image: its shape, dtype and values.
 
     Parameters
@@ -400,7 +400,7 @@ def digest(image: Array) -> str:
     --------
     >>> import numpy as np
     >>> from texrs import elements
-    >>> len(elements.digest(np.zeros((8, 8), np.uint8)))
+    >>> len(elements.hash_image(np.zeros((8, 8), np.uint8)))
     32
 
     """
@@ -454,7 +454,7 @@ def load(path: Path) -> ElementAnalysis:
         )
     try:
         image = as_image(parts["image"])
-        if _decode_text(parts["hash"]) != digest(image):
+        if _decode_text(parts["hash"]) != hash_image(image):
             raise InvalidInput("its image is not the one that was analysed")
         layout, report = Layout(_decode_text(parts["layout"])), json.loads(_decode_text(parts["report"]))
         if not isinstance(report, dict):

@@ -13,13 +13,13 @@ from texrs._version import __version__
 from texrs.elements._drawing import Picture, draw_plain
 from texrs.elements._elements import ElementAnalysis
 from texrs.elements._layout import Layout
-from texrs.elements._pictures import pictures
+from texrs.elements._pictures import draw
 from texrs.elements._proposal import ADVICE, DOUBTFUL
 
-__all__ = ["page"]
+__all__ = ["to_html"]
 
 
-def page(entry: ElementAnalysis, title: str = "elements") -> str:
+def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
     """Return a page of HTML that shows what was found, and on which corrections can be made by clicking.
 
     Parameters
@@ -38,13 +38,13 @@ def page(entry: ElementAnalysis, title: str = "elements") -> str:
     --------
     >>> from texrs import elements, samples
     >>> sample = samples.load("dots", size=(64, 64))
-    >>> elements.page(elements.analyse(sample.image, mask=sample.mask, layout="disjoint"))[:15]
+    >>> elements.to_html(elements.analyse(sample.image, mask=sample.mask, layout="disjoint"))[:15]
     '<!doctype html>'
 
     """
     as_instance(entry, "entry", ElementAnalysis)
     as_instance(title, "title", str)
-    drawn, report = pictures(entry), entry.report
+    drawn, report = draw(entry), entry.report
     height, width = entry.image.shape[:2]
     rows = []
     for name in ("box", "layout", "background"):

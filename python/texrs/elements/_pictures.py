@@ -15,7 +15,7 @@ DIM = 0.65
 """How much of the ground's colour is that."""
 
 
-def pictures(entry: ElementAnalysis) -> dict[str, Picture]:
+def draw(entry: ElementAnalysis) -> dict[str, Picture]:
     """Draw an entry: its points on the texture, and its mask.
 
     Parameters
@@ -33,7 +33,7 @@ def pictures(entry: ElementAnalysis) -> dict[str, Picture]:
     --------
     >>> from texrs import elements, samples
     >>> sample = samples.load("dots", size=(64, 64))
-    >>> sorted(elements.pictures(elements.analyse(sample.image, mask=sample.mask, layout="disjoint")))
+    >>> sorted(elements.draw(elements.analyse(sample.image, mask=sample.mask, layout="disjoint")))
     ['mask', 'numbers', 'points']
 
     """

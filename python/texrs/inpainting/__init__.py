@@ -87,7 +87,7 @@ def inpaint(
     scale_map : {None, "auto"} or (H, W) float array, optional
         For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is
         filled with elements of the size that belongs there [2]_. "auto" measures it: that of the plane
-        which is found (`texrs.planes.find`), or else measured (`texrs.planes.measure`). In the hole it may
+        which is found (`texrs.planes.find`), or else measured (`texrs.planes.measure_scale`). In the hole it may
         be NaN; it is continued.
     exemplar_scale_map : {None, "auto"} or (h, w) float array, optional
         How large they are in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
@@ -141,7 +141,7 @@ def inpaint(
         A hole or ``allowed`` of another shape; a hole that marks nothing; an exemplar of another dtype or other channels;
         nothing to copy from; a patch larger than the pictures, with no place for it outside the hole, or given to "optimise".
 
-    Notes
+    Metadata
     -----
     Masked values of a `numpy.ma.MaskedArray` are filled too. A number or "nodata" also fills pixels that are NaN or infinite.
 

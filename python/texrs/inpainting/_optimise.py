@@ -19,7 +19,7 @@ from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
 from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
 from texrs.inpainting._holes import look_around, paint_over
 from texrs.planes import ScaleEstimate
-from texrs.planes._choose import measure_scale
+from texrs.planes._choose import measure_known_scale
 from texrs.scale_maps._kinds import Kind, find_kind, keep_kind
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
@@ -50,7 +50,7 @@ def recover_scale(
             raise InvalidInput(f"{name}: must be 'auto', a map or None; got {given!r}")
         if not known.any():
             raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
-        found = measure_scale(picture, known)
+        found = measure_known_scale(picture, known)
         return found.scale, found
     scale, holds = try_array(given), find_kind(given) or scale_kind
     if scale.shape == open_.shape and scale.dtype.kind == "f":

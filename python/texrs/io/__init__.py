@@ -47,7 +47,7 @@ without a channel axis (from ``.npy`` and ``.npz`` as it was written). ``.npz`` 
 
 Files are recognised by their content when read, TGA by its suffix, and by their suffix when written. Headers are
 compared with the limit before memory is used. What a file says beside its values, as ICC profiles, densities and
-how texrs made it, is read by `read_notes` and written by `annotate`. All files are written to a temporary name and
+how texrs made it, is read by `read_metadata` and written by `write_metadata`. All files are written to a temporary name and
 renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExceeded` or
 `~texrs.errors.InvalidInput`.
 """
@@ -82,19 +82,18 @@ from texrs.io import (
     _tiff,
     _volumes,
 )
-from texrs.io._annotation import annotate, read_notes
+from texrs.io._annotation import read_metadata, write_metadata
 from texrs.io._files import atomic, find_suffix
 from texrs.io._formats import FORMATS, READ_IMAGES, STORE, VOLUMES, as_spacing, check, detect_kind, holds_spacing
 from texrs.io._grids import READERS, read_numpy, read_spacing, read_unit
-from texrs.io._notes import Notes
+from texrs.io._notes import Metadata
 from texrs.io._npy import Header, read_arrays, read_headers
 from texrs.io._stores import is_store
 from texrs.io._vectors import read_vectors
 
 __all__ = [
     "Header",
-    "Notes",
-    "annotate",
+    "Metadata",
     "atomic",
     "is_store",
     "read",
@@ -102,11 +101,12 @@ __all__ = [
     "read_description",
     "read_fov",
     "read_headers",
-    "read_notes",
+    "read_metadata",
     "read_spacing",
     "read_vectors",
     "read_volume",
     "write",
+    "write_metadata",
     "write_slabs",
     "write_surface",
     "write_volume",
@@ -311,7 +311,7 @@ def write(
     *,
     overwrite: bool = True,
     description: str | None = None,
-    notes: Notes | None = None,
+    notes: Metadata | None = None,
 ) -> None:
     """Write an image, whole or not at all.
 
@@ -325,9 +325,9 @@ def write(
         Whether a file that exists may be replaced.
     description : str, optional
         What the file is to say of itself, in letters of ASCII: PNG and TIFF keep it (`read_description`), the others do not.
-    notes : Notes, optional
-        Metadata that `annotate` cannot write. TIFF files keep the georeference. Colours are multiplied by alpha in EXR files
-        and divided by it in other files, if ``multiplied`` does not say that they already are. Default: None.
+    notes : Metadata, optional
+        Metadata that `write_metadata` cannot write. TIFF files keep the georeference. Colours are multiplied by alpha in EXR
+        files and divided by it in other files, if ``multiplied`` does not say that they already are. Default: None.
 
     Raises
     ------
@@ -349,7 +349,7 @@ def write(
     """
     if description is not None and not (isinstance(description, str) and description.isascii()):
         raise InvalidInput(f"description: needs letters of ASCII, got {description!r}")
-    said = Notes(multiplied=None) if notes is None else as_instance(notes, "notes", Notes)
+    said = Metadata(multiplied=None) if notes is None else as_instance(notes, "notes", Metadata)
     array = _alpha.adapt(array, _files.as_path(path), said.multiplied)
     _write(path, array, 2, overwrite, None, description, said.georeference)
 

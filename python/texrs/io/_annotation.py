@@ -16,7 +16,7 @@ from texrs._typing import Path as PathLike
 from texrs.errors import FileError
 from texrs.io import _chunks, _files, _pillow, _tags, _texts
 from texrs.io._formats import detect_kind
-from texrs.io._notes import Notes
+from texrs.io._notes import Metadata
 from texrs.io._stores import is_store
 
 BLOCK = 2**20
@@ -39,7 +39,7 @@ _READERS: dict[str, Callable[[Path], dict[str, object]]] = {
     "json": _texts.read_json,
     **{kind: partial(_pillow.read_notes, kind=kind) for kind in ("psd", "avif", "jxl")},
 }
-_WRITERS: dict[str, Callable[[Path, Notes], None]] = {
+_WRITERS: dict[str, Callable[[Path, Metadata], None]] = {
     "png": _chunks.write_png,
     "jpeg": _chunks.write_jpeg,
     "webp": _chunks.write_webp,
@@ -79,7 +79,7 @@ _SUFFIXES = {
 }
 
 
-def read_notes(path: PathLike) -> Notes:
+def read_metadata(path: PathLike) -> Metadata:
     """Return what a file says beside its values.
 
     Parameters
@@ -89,7 +89,7 @@ def read_notes(path: PathLike) -> Notes:
 
     Returns
     -------
-    texrs.io.Notes
+    texrs.io.Metadata
         How its colours and its pixels are to be understood, and how texrs made it, where that is so: from the file, or
         from the file of the same name and ``.json`` beside it.
 
@@ -106,8 +106,8 @@ def read_notes(path: PathLike) -> Notes:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = pathlib.Path(folder, "grey.png")
     ...     io.write(path, np.zeros((8, 8), np.uint8))
-    ...     io.annotate(path, io.Notes(gamma=1.0))
-    ...     io.read_notes(path).gamma
+    ...     io.write_metadata(path, io.Metadata(gamma=1.0))
+    ...     io.read_metadata(path).gamma
     1.0
 
     """
@@ -126,17 +126,17 @@ def read_notes(path: PathLike) -> Notes:
     if "made" not in found:
         with suppress(Exception):
             found |= _texts.read_json(name_sidecar(Path(os.path.realpath(name))))
-    return Notes(**found)  # type: ignore[arg-type]
+    return Metadata(**found)  # type: ignore[arg-type]
 
 
-def annotate(path: PathLike, notes: Notes, beside: PathLike | None = None) -> Path | None:
+def write_metadata(path: PathLike, notes: Metadata, beside: PathLike | None = None) -> Path | None:
     """Let a file say something beside its values; what its format has no place for is left out.
 
     Parameters
     ----------
     path : path_like
         A file that was just written: it is changed where it lies.
-    notes : Notes
+    notes : Metadata
         What it is to say. ``"content": "000...0"`` in ``made``, of 64 zeros, becomes the SHA-256 of all else in the file.
     beside : path_like, optional
         The name that the file is to have, where ``path`` is a temporary one: a file of that name and ``.json`` takes
@@ -160,14 +160,14 @@ def annotate(path: PathLike, notes: Notes, beside: PathLike | None = None) -> Pa
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = pathlib.Path(folder, "grey.tif")
     ...     io.write(path, np.zeros((8, 8), np.uint8))
-    ...     io.annotate(path, io.Notes(density=(2835.0, 2835.0)))
-    ...     [round(d) for d in io.read_notes(path).density]
+    ...     io.write_metadata(path, io.Metadata(density=(2835.0, 2835.0)))
+    ...     [round(d) for d in io.read_metadata(path).density]
     [2835, 2835]
 
     """
     name = _files.as_path(path)
     kind = _SUFFIXES.get(name.suffix.lower(), "")
-    made = as_instance(notes, "notes", Notes).made
+    made = as_instance(notes, "notes", Metadata).made
     apart = (
         kind in _SIDECAR
         or (kind == "exr" and not _tags.takes_exr(name))
@@ -178,13 +178,13 @@ def annotate(path: PathLike, notes: Notes, beside: PathLike | None = None) -> Pa
         notes = replace(notes, palette=None)
         first = notes if kind in _IN_PLACE and not apart else replace(notes, made=None)
         kind = "" if apart and kind == "exr" else kind
-        if kind in _WRITERS and first != Notes():
+        if kind in _WRITERS and first != Metadata():
             _WRITERS[kind](name, first)
         if made is None:
             return None
         made = made.replace(BLANK, f'"content": "{digest(name)}"') if BLANK in made else made
         if not apart:
-            _WRITERS[kind](name, Notes(made=made))
+            _WRITERS[kind](name, Metadata(made=made))
             return None
     there = name_sidecar(_files.as_path(beside if beside is not None else path))
     with _files.atomic(there) as temporary:

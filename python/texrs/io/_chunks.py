@@ -10,7 +10,7 @@ from typing import Any
 
 from texrs import _rust
 from texrs.io import _tags
-from texrs.io._notes import Notes
+from texrs.io._notes import Metadata
 
 KEYWORD = b"texrs"
 MOST = 2**24
@@ -62,7 +62,7 @@ def read_png(path: Path) -> dict[str, Any]:
     return turn(found, turned)
 
 
-def write_png(path: Path, notes: Notes) -> None:
+def write_png(path: Path, notes: Metadata) -> None:
     """Put what is to be said after the header, in place of what was said of the same."""
     data, new = path.read_bytes(), []
     if notes.profile is not None:
@@ -138,7 +138,7 @@ def read_jpeg(path: Path) -> dict[str, Any]:
     return turn(found, turned)
 
 
-def write_jpeg(path: Path, notes: Notes) -> None:
+def write_jpeg(path: Path, notes: Metadata) -> None:
     """Put segments after the first, and the density into it."""
     data, new = path.read_bytes(), []
     if notes.profile is not None:
@@ -199,7 +199,7 @@ def read_webp(path: Path) -> dict[str, Any]:
     return turn(found, turned)
 
 
-def write_webp(path: Path, notes: Notes) -> None:
+def write_webp(path: Path, notes: Metadata) -> None:
     """Make a simple file of one chunk an extended one with a profile."""
     data = path.read_bytes()
     if notes.profile is None or data[12:16] != b"VP8L":
@@ -220,7 +220,7 @@ def read_bmp(path: Path) -> dict[str, Any]:
     return {"density": (float(down), float(across))} if data[14] >= 40 and across > 0 and down > 0 else {}
 
 
-def write_bmp(path: Path, notes: Notes) -> None:
+def write_bmp(path: Path, notes: Metadata) -> None:
     """Put the density into the header."""
     if notes.density is not None:
         data = path.read_bytes()
@@ -242,7 +242,7 @@ def read_gif(path: Path) -> dict[str, Any]:
     return {"made": text.decode("utf-8")}
 
 
-def write_gif(path: Path, notes: Notes) -> None:
+def write_gif(path: Path, notes: Metadata) -> None:
     """Put a comment before the end."""
     if notes.made is None:
         return

@@ -13,7 +13,7 @@ NODATA = 42113
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Notes:
+class Metadata:
     """What a file says beside its values.
 
     Attributes
@@ -41,8 +41,8 @@ class Notes:
 
     Examples
     --------
-    >>> from texrs.io import Notes
-    >>> Notes(density=(11811.0, 11811.0), srgb=True).srgb
+    >>> from texrs.io import Metadata
+    >>> Metadata(density=(11811.0, 11811.0), srgb=True).srgb
     True
 
     """
@@ -65,7 +65,7 @@ class Notes:
             return float(text)  # type: ignore[arg-type]
         return None
 
-    def fit(self, channels: int) -> Notes:
+    def fit(self, channels: int) -> Metadata:
         """Return what is true of a picture of so many channels: a profile is of grey or of colours.
 
         Parameters
@@ -75,13 +75,13 @@ class Notes:
 
         Returns
         -------
-        texrs.io.Notes
+        texrs.io.Metadata
             Without the profile where that is of the other kind.
 
         Examples
         --------
-        >>> from texrs.io import Notes
-        >>> colours = Notes(profile=bytes(16) + b"RGB " + bytes(108))
+        >>> from texrs.io import Metadata
+        >>> colours = Metadata(profile=bytes(16) + b"RGB " + bytes(108))
         >>> colours.fit(3).profile is None, colours.fit(1).profile is None
         (False, True)
 

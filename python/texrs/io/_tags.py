@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from texrs.errors import FileError
-from texrs.io._notes import NODATA, Notes
+from texrs.io._notes import NODATA, Metadata
 
 INCH = 0.0254
 SOFTWARE, ORIENTATION, ACROSS, DOWN, UNIT, EXIF, PROFILE, SPACE = 305, 274, 282, 283, 296, 0x8769, 34675, 0xA001
@@ -134,7 +134,7 @@ def read_exif(data: bytes) -> dict[str, Any]:
     return found
 
 
-def write_tiff(path: Path, notes: Notes) -> None:
+def write_tiff(path: Path, notes: Metadata) -> None:
     """Write the first directory again, at the end of the file, with what is to be said."""
     new: list[tuple[int, int, bytes]] = []
     with path.open("r+b") as file:
@@ -241,7 +241,7 @@ def read_exr(path: Path) -> dict[str, Any]:
     return found
 
 
-def write_exr(path: Path, notes: Notes) -> None:
+def write_exr(path: Path, notes: Metadata) -> None:
     """Put attributes at the end of the header, and let the table of places know."""
     data = path.read_bytes()
     attributes, end = _walk_exr(data)

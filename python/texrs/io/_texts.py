@@ -8,7 +8,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-from texrs.io._notes import Notes
+from texrs.io._notes import Metadata
 
 MEMBER = "texrs.json"
 _BEGIN, _END = b"<!-- texrs ", b" -->\n"
@@ -31,7 +31,7 @@ def read_json(path: Path) -> dict[str, Any]:
     return {"made": json.dumps(made)} if isinstance(made, dict) else {}
 
 
-def write_json(path: Path, notes: Notes) -> None:
+def write_json(path: Path, notes: Metadata) -> None:
     """Add to a report how it was made."""
     values = json.loads(path.read_text(encoding="utf-8"))
     if notes.made is not None and isinstance(values, dict):
@@ -57,7 +57,7 @@ def read_npz(path: Path) -> dict[str, Any]:
         return {"made": archive.read(MEMBER).decode("utf-8")}
 
 
-def write_npz(path: Path, notes: Notes) -> None:
+def write_npz(path: Path, notes: Metadata) -> None:
     """Add a member to an archive, or put it in place of the one that was added last."""
     if notes.made is None:
         return
@@ -91,7 +91,7 @@ def read_html(path: Path) -> dict[str, Any]:
     return {"made": path.read_bytes()[span[0] + len(_BEGIN) : span[1] - len(_END)].decode("utf-8")}
 
 
-def write_html(path: Path, notes: Notes) -> None:
+def write_html(path: Path, notes: Metadata) -> None:
     """Put a comment at the end of a page."""
     if notes.made is None:
         return

@@ -167,7 +167,7 @@ def cut(
         Shapes that differ, values that are not finite, negative penalties, a core outside its
         image, or cores that share a pixel.
 
-    Notes
+    Metadata
     -----
     Costs are rounded to multiples of 2^-16, or coarser where the largest exceeds 2^10. Time grows
     with the bounding box of the overlap. Where one connected core of B lies on a plane, and what is
@@ -389,7 +389,7 @@ def binary_labels(
         Shapes that do not fit, negative or infinite pairwise costs, NaN, or a point at which both
         labels are forbidden.
 
-    Notes
+    Metadata
     -----
     Costs are float32, rounded to multiples of the power of two of which the largest pairwise cost
     is 2^25 to 2^26.

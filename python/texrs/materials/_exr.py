@@ -30,7 +30,7 @@ from texrs._colours import encode_srgb, to_light, to_pixels
 from texrs._notices import assume, ignore
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
-from texrs.io import read_notes
+from texrs.io import read_metadata
 from texrs.io._files import as_path
 from texrs.io._layers import read_layers, write_layers
 from texrs.materials._files import report_colours, shorten, show_names
@@ -186,7 +186,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
     for line in lines:
         ignore(f"{path}: {line}")
     if any(each.role.coloured for each in maps.values()):
-        report_colours(path, read_notes(path), "linear")
+        report_colours(path, read_metadata(path), "linear")
     for why, names in taken.items():
         assume(f"{path}: {show_names(names)} read as {why}")
     weights = {name: told["weight"] for name, told in known.items() if "weight" in told and name in maps}

@@ -152,7 +152,7 @@ def read_map(file: FilePath, role: Role, axes: int) -> Map:
     pixels = (io.read if axes == 2 else io.read_volume)(file)
     space = find_space(role, pixels.dtype)
     if role.coloured:
-        notes = io.read_notes(file)
+        notes = io.read_metadata(file)
         if space == "srgb" and notes.gamma == 1 and not notes.srgb:
             space = "linear"
         report_colours(file, notes, space)
@@ -176,7 +176,7 @@ def restore_z(file: FilePath, pixels: Array) -> Array:
     return np.dstack([pixels[..., :2], np.rint((z + 1) * 127.5).astype(np.uint8)])
 
 
-def report_colours(file: Path, notes: io.Notes, space: Space) -> None:
+def report_colours(file: Path, notes: io.Metadata, space: Space) -> None:
     """Report the colour space that a file states, if it is not sRGB."""
     stated = []
     if notes.profile is not None and (title := name_profile(notes.profile)) is not None:

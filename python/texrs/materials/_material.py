@@ -354,7 +354,7 @@ class Material(Exports):
         changed = {name: replace(each, pixels=maps[name]) if name in maps else each for name, each in self.items()}
         return Material(changed, weights=self._weights, axes=self._axes)
 
-    def flatten(
+    def flatten_lighting(
         self, amount: float = 1.0, *, wrap: bool | tuple[bool, bool] = False, size: float | None = None
     ) -> Material:
         """Return the material with its colours in even light; other maps stay.
@@ -366,7 +366,7 @@ class Material(Exports):
         wrap : bool or (bool, bool)
             Along which axes the maps are cyclic, so that they stay so.
         size : float, optional
-            Pixels: what is larger is evened (see `texrs.materials.flatten`).
+            Pixels: what is larger is evened (see `texrs.materials.flatten_lighting`).
 
         Returns
         -------
@@ -382,16 +382,16 @@ class Material(Exports):
         >>> import numpy as np
         >>> import texrs
         >>> ramp = np.tile(np.linspace(100, 180, 64).astype(np.uint8), (48, 1))
-        >>> lawn = texrs.Material({"albedo": ramp, "height": ramp}).flatten()
+        >>> lawn = texrs.Material({"albedo": ramp, "height": ramp}).flatten_lighting()
         >>> int(np.ptp(lawn["albedo"].pixels)) <= 4, int(np.ptp(lawn["height"].pixels))
         (True, 80)
 
         """
-        from texrs._evening import flatten
+        from texrs._lighting_correction import flatten_lighting
 
         self._check_flat()
         even = {
-            name: flatten(each.pixels, amount, wrap=wrap, size=size, space=each.space)
+            name: flatten_lighting(each.pixels, amount, wrap=wrap, size=size, space=each.space)
             for name, each in self.items()
             if each.role is Role.COLOUR
         }
@@ -483,7 +483,7 @@ def apply_materials(materials: Sequence[Material], source: SourceMap, progress: 
     finish = source.finish
     if finish is not None and finish.flatten_lighting:
         # Colours alone are lit, and each map says how it encodes light.
-        materials, finish = [m.flatten() for m in materials], replace(finish, flatten_lighting=False)
+        materials, finish = [m.flatten_lighting() for m in materials], replace(finish, flatten_lighting=False)
     names = list(first)
 
     def make(name: str, watch: Callable[[float], object]) -> Array:

@@ -13,10 +13,10 @@ from texrs.errors import InvalidInput
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
 from texrs.planes._plane import Plane
-from texrs.planes._sizes import SURE, ScaleEstimate, measure
+from texrs.planes._sizes import SURE, ScaleEstimate, measure_scale
 from texrs.planes._view import PlaneView
 
-__all__ = ["SURE", "Seen", "as_views", "find_grounds", "follow_plane", "measure_scale", "see"]
+__all__ = ["SURE", "Seen", "as_views", "find_grounds", "follow_plane", "measure_known_scale", "see"]
 
 
 FLAT = 8.0
@@ -118,9 +118,9 @@ def find_grounds(
     return found
 
 
-def measure_scale(pixels: Array, known: Bools) -> ScaleEstimate:
+def measure_known_scale(pixels: Array, known: Bools) -> ScaleEstimate:
     """Return how large things are at each pixel of a picture, with a warning where that is not sure."""
-    found = measure(pixels, known=known)
+    found = measure_scale(pixels, known=known)
     if found.confidence < SURE:
         why = "what was measured in several ways has little in common, so all things are taken to be equally large"
         if found.shape != "even":

@@ -25,7 +25,7 @@ from texrs.planes._plane import Plane
 from texrs.scale_maps import ScaleMap
 from texrs.scale_maps._trend import follow
 
-__all__ = ["SURE", "ScaleEstimate", "Shape", "measure"]
+__all__ = ["SURE", "ScaleEstimate", "Shape", "measure_scale"]
 
 Reals = NDArray[np.float64]
 Shape: TypeAlias = Literal["plane", "curved", "free", "even"]
@@ -77,7 +77,7 @@ class ScaleEstimate:
     Examples
     --------
     >>> from texrs import planes, samples
-    >>> found = planes.measure(samples.tilted_discs((128, 128)).image)
+    >>> found = planes.measure_scale(samples.tilted_discs((128, 128)).image)
     >>> found.scale.shape, found.shape
     ((128, 128), 'plane')
 
@@ -99,7 +99,7 @@ class ScaleEstimate:
         Examples
         --------
         >>> from texrs import planes, samples
-        >>> sorted(planes.measure(samples.tilted_discs((128, 128)).image).as_dict())
+        >>> sorted(planes.measure_scale(samples.tilted_discs((128, 128)).image).as_dict())
         ['confidence', 'plane', 'scale_kind', 'shape']
 
         """
@@ -107,7 +107,7 @@ class ScaleEstimate:
         return {"shape": self.shape, "scale_kind": self.scale.kind, "confidence": self.confidence, "plane": plane}
 
 
-def measure(image: object, *, known: object = None) -> ScaleEstimate:
+def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
     """Measure how large things are all over a picture.
 
     Parameters
@@ -130,7 +130,7 @@ def measure(image: object, *, known: object = None) -> ScaleEstimate:
     Examples
     --------
     >>> from texrs import planes, samples
-    >>> found = planes.measure(samples.tilted_discs((192, 192)).image)
+    >>> found = planes.measure_scale(samples.tilted_discs((192, 192)).image)
     >>> found.shape, found.scale.kind, bool(found.scale[-1, 96] > 2 * found.scale[0, 96])
     ('plane', 'width', True)
 

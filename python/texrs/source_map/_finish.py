@@ -44,7 +44,7 @@ class RenderOptions:
     outlines : bool
         Whether the step across a seam stays where it is the outline of a thing.
     flatten_lighting : bool
-        Whether uneven light is taken out of colours before they are looked up, see `texrs.materials.flatten`.
+        Whether uneven light is taken out of colours before they are looked up, see `texrs.materials.flatten_lighting`.
     within : (rows, columns) bool, optional
         Correct only marked pixels; all others keep their values. None: correct all.
     known : tuple of (h, w) bool, optional

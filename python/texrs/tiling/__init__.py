@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_size, as_wrap, check_work
-from texrs._evening import flatten as even_light
+from texrs._lighting_correction import flatten_lighting as even_light
 from texrs._notices import assume, collect
 from texrs._palettes import find as find_palette
 from texrs._palettes import has_few_colours
@@ -99,7 +99,7 @@ def tile(
     flatten_lighting : bool, optional
         If True, uneven light is evened out first, as far as there is evidence of it. By default only if one part is lit at
         least 1.6 times brighter than another part, and no side is shorter than 128 pixels. Of a material only colours
-        are flattened. See `texrs.materials.flatten`.
+        are flattened. See `texrs.materials.flatten_lighting`.
     progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
         True shows a bar.
@@ -154,7 +154,7 @@ def tile(
         if evened is None:
             evened = len(already) < sum(cyclic) and not keeps_colours(image, weight) and is_uneven(given)
         if evened:
-            even = given.flatten() if isinstance(given, Material) else as_exemplar(even_light(given.image))
+            even = given.flatten_lighting() if isinstance(given, Material) else as_exemplar(even_light(given.image))
             already = find_tiled(even, free)
             image = image if isinstance(image, Material) else even
         if already:

@@ -6,7 +6,7 @@ import numpy as np
 
 from texrs._arrays import as_image, to_unit
 from texrs._colours import Space
-from texrs._evening import BRIGHTEST, measure_unevenness
+from texrs._lighting_correction import BRIGHTEST, measure_unevenness
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.exemplar import Exemplar

@@ -91,7 +91,7 @@ def perspective(
     scale_map : (H, W) float array, Plane, "auto" or "front"
         How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`).
         `texrs.Plane` or its words ``"plane:slant=50,tilt=90,fov=60"`` give the sizes on a plane. "auto": those of the
-        plane that is found in it (`texrs.planes.find`), or else measured (`texrs.planes.measure`). "front": all alike.
+        plane that is found in it (`texrs.planes.find`), or else measured (`texrs.planes.measure_scale`). "front": all alike.
     size : int or (int, int), optional
         Size of the result in pixels: by default that of the ``target``, else twice the exemplar's.
     target : array or Plane, optional

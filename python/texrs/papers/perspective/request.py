@@ -29,7 +29,7 @@ from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.papers.perspective.targets import Surface, as_surface, as_target, find_size, is_map, is_words, read_plane
 from texrs.planes import FOV, Plane
 from texrs.planes import ScaleEstimate as Measured
-from texrs.planes._choose import measure_scale
+from texrs.planes._choose import measure_known_scale
 from texrs.scale_maps import Measuring
 from texrs.scale_maps._jacobians import measure_sizes
 from texrs.scale_maps._kinds import AREAS, Kind, as_kind, find_kind
@@ -202,7 +202,7 @@ def find_scale(
     if as_choice(scale_map, "scale_map", ("auto", "front")) == "front":
         return Plane((exemplar.shape[0], exemplar.shape[1]), 0.0), np.ones(exemplar.shape, np.float32), None
     if scale_measurement is None:
-        found = measure_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
+        found = measure_known_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
         return None, found.scale, found
     if not isinstance(scale_measurement, Measuring):
         raise InvalidInput(f"scale_measurement: needs a texrs.scale_maps.Measuring, got {scale_measurement!r}")

@@ -33,7 +33,7 @@ STRIP = 1 << 20
 """Pixels that are brought into even light at a time."""
 
 
-def flatten(
+def flatten_lighting(
     image: Array,
     amount: float = 1.0,
     *,
@@ -74,9 +74,9 @@ def flatten(
     Examples
     --------
     >>> import numpy as np
-    >>> from texrs.materials import flatten
+    >>> from texrs.materials import flatten_lighting
     >>> ramp = np.tile(np.linspace(100, 180, 64).astype(np.uint8), (48, 1))
-    >>> even = flatten(ramp)
+    >>> even = flatten_lighting(ramp)
     >>> int(np.ptp(ramp)), int(np.ptp(even)) <= 4
     (80, True)
 
