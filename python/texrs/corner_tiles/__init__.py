@@ -50,7 +50,7 @@ from texrs.synthesis import Synthesis
 
 __all__ = ["CornerTiles"]
 
-FAR = 10**15
+MAX_COORDINATE = 10**15
 """Coordinates of the world are within so many pixels."""
 LARGER = "texrs.CornerTiles.to_zarr and to_dask give it in parts"
 """How what is too large for one array is had."""
@@ -349,8 +349,8 @@ class CornerTiles(InParts):
 
     def _as_origin(self, origin: int | Sequence[int]) -> tuple[int, int]:
         values = (origin, origin) if isinstance(origin, int | np.integer) else origin
-        pair = as_tuple(values, "origin", 2, f"2 integers within {FAR}")
-        row, column = (as_int(v, "origin", -FAR, FAR) for v in pair)
+        pair = as_tuple(values, "origin", 2, f"2 integers within {MAX_COORDINATE}")
+        row, column = (as_int(v, "origin", -MAX_COORDINATE, MAX_COORDINATE) for v in pair)
         return row, column
 
 

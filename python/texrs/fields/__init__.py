@@ -32,7 +32,7 @@ long work.
 """
 
 from texrs.fields._directions import from_directions, from_gradient, from_structure
-from texrs.fields._field import LEAST_DETERMINANT, WORST_CONDITION, Field, check
+from texrs.fields._field import LEAST_DETERMINANT, MAX_CONDITION, Field, check
 from texrs.fields._given import FieldLike, as_field, read
 from texrs.fields._parse import names, parse
 from texrs.fields._sampled import from_array, from_function, interpolate
@@ -40,7 +40,7 @@ from texrs.fields._shapes import circular, constant, identity, rotation, rotatio
 
 __all__ = [
     "LEAST_DETERMINANT",
-    "WORST_CONDITION",
+    "MAX_CONDITION",
     "Field",
     "FieldLike",
     "as_field",

@@ -22,7 +22,7 @@ from texrs.fields._picture import SIDE, choose_places, draw_arrows
 
 LEAST_DETERMINANT = 1e-3
 """Frames of a smaller determinant are refused: they are flat, and have no inverse worth the name."""
-WORST_CONDITION = 100.0
+MAX_CONDITION = 100.0
 """Frames that stretch one way so many times as much as another are refused."""
 
 FAR = 1e9
@@ -301,7 +301,7 @@ class Field(ABC):
 def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "field") -> Matrices:
     """Return the inverses of frames, or raise InvalidInput that names the first place where there is none."""
     inverse, det = inverses(frames)
-    bad = find_flat(frames, inverse, det, LEAST_DETERMINANT, WORST_CONDITION)
+    bad = find_flat(frames, inverse, det, LEAST_DETERMINANT, MAX_CONDITION)
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         axes = len(frames)
@@ -311,7 +311,7 @@ def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "fiel
         elif abs(det[i]) < LEAST_DETERMINANT:
             why = f"is flat: its determinant is {det[i]:.3g}, at least {LEAST_DETERMINANT:g} is needed"
         else:
-            why = f"stretches one way more than {WORST_CONDITION:g} times as much as another"
+            why = f"stretches one way more than {MAX_CONDITION:g} times as much as another"
         raise InvalidInput(f"{name}: the frame at {place} {why}")
     return inverse
 

@@ -7,11 +7,11 @@ finds it in a picture alone, and `find_ground` where the picture shows it. A `Pl
 
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
-from texrs.planes._plane import FOV, STEEPEST, Plane
+from texrs.planes._plane import FOV, MAX_SLANT, Plane
 from texrs.planes._sizes import ScaleEstimate, measure_scale
 from texrs.planes._view import PlaneView
 
-__all__ = ["FOV", "STEEPEST", "Plane", "PlaneView", "ScaleEstimate", "find", "find_ground", "measure_scale"]
+__all__ = ["FOV", "MAX_SLANT", "Plane", "PlaneView", "ScaleEstimate", "find", "find_ground", "measure_scale"]
 
 
 def __dir__() -> list[str]:

@@ -15,16 +15,16 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.planes._projective import along, as_places, find_focal, lift, to_digits, to_grid, transform
 from texrs.scale_maps._kinds import AREAS, ScaleMap, as_kind, find_kind
-from texrs.scale_maps._maps import LEAST, as_map
+from texrs.scale_maps._maps import MIN_SCALE, as_map
 from texrs.scale_maps._slope import Slope
 
-__all__ = ["FOV", "STEEPEST", "Plane"]
+__all__ = ["FOV", "MAX_SLANT", "Plane"]
 
 Pair = tuple[float, float]
 
 FOV = 60.0
 """Degrees that the longer side of a picture spans where nobody says: about those of a telephone, or of 30 mm on film."""
-STEEPEST = 88.0
+MAX_SLANT = 88.0
 """Degrees of slant beyond which a plane is seen edge on."""
 FIT = 0.15
 """Residual of a scale map, in natural logarithms, at which the confidence in its plane is 1 / e."""
@@ -86,7 +86,7 @@ class Plane:
         rows, columns = as_size(self.shape, "shape")
         values = {
             "shape": (rows, columns),
-            "slant": as_float(self.slant, "slant", 0, STEEPEST),
+            "slant": as_float(self.slant, "slant", 0, MAX_SLANT),
             "tilt": as_float(self.tilt, "tilt", -1e6, 1e6) % 360,
             "fov": as_float(self.fov, "fov", 1, 170),
             "rotation": (as_float(self.rotation, "rotation", -1e6, 1e6) + 180) % 360 - 180,
@@ -337,9 +337,9 @@ class Plane:
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
         steep = hypot(*rise)
         slant = degrees(atan(steep * find_focal(size, angle)))
-        if slant > STEEPEST:
+        if slant > MAX_SLANT:
             raise InvalidInput(
-                f"{name}: the plane is seen edge on, {slant:.1f} degrees; up to {STEEPEST:.0f} are allowed"
+                f"{name}: the plane is seen edge on, {slant:.1f} degrees; up to {MAX_SLANT:.0f} are allowed"
             )
         # Depth grows where the scale falls.
         tilt = degrees(np.arctan2(rise[0], -rise[1])) if steep > FLAT / max(size) else 90.0
@@ -440,8 +440,10 @@ class Plane:
 
         """
         what = as_kind(scale_kind)
-        wide = np.maximum(self.width(np.moveaxis(np.indices(self.shape), 0, -1)), LEAST)
-        return ScaleMap(np.maximum(wide if what == "width" else wide ** (1 / AREAS), LEAST).astype(np.float32), what)
+        wide = np.maximum(self.width(np.moveaxis(np.indices(self.shape), 0, -1)), MIN_SCALE)
+        return ScaleMap(
+            np.maximum(wide if what == "width" else wide ** (1 / AREAS), MIN_SCALE).astype(np.float32), what
+        )
 
     def flatten(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
         """Return where points of the picture lie on the flat plane.
@@ -469,7 +471,7 @@ class Plane:
 
         """
         given = as_places(points)
-        wide = np.maximum(self.width(given), LEAST)
+        wide = np.maximum(self.width(given), MIN_SCALE)
         return transform(self._affine, given - self.principal_point) / wide[..., np.newaxis]
 
     def project(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
@@ -551,7 +553,7 @@ class Plane:
 
         """
         away = np.moveaxis(np.indices(self.shape, np.float64), 0, -1) - self.principal_point
-        wide = np.maximum(1 + along(away, self._rise), LEAST)[..., np.newaxis, np.newaxis]
+        wide = np.maximum(1 + along(away, self._rise), MIN_SCALE)[..., np.newaxis, np.newaxis]
         flat = transform(self._affine, away)
         return np.asarray(self._affine / wide - flat[..., :, np.newaxis] * self._rise / (wide * wide), np.float64)
 

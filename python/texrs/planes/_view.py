@@ -12,7 +12,7 @@ from texrs._arrays import as_array, as_float, as_items, as_mask, as_size
 from texrs._masks import Mask
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
-from texrs.planes._plane import FOV, STEEPEST, Plane
+from texrs.planes._plane import FOV, MAX_SLANT, Plane
 
 __all__ = ["PlaneView"]
 
@@ -76,7 +76,7 @@ class PlaneView:
             raise InvalidInput("tilt: needs slant")
         if self.plane is not None and self.fov is not None:
             raise InvalidInput("fov: the plane has one already")
-        for name, least, most in (("slant", 0, STEEPEST), ("tilt", -1e6, 1e6), ("fov", 1, 170)):
+        for name, least, most in (("slant", 0, MAX_SLANT), ("tilt", -1e6, 1e6), ("fov", 1, 170)):
             value = getattr(self, name)
             object.__setattr__(self, name, None if value is None else as_float(value, name, least, most))
         if self.corners is not None:

@@ -10,9 +10,9 @@ import numpy as np
 from texrs._arrays import as_float, as_size
 from texrs.errors import InvalidInput
 from texrs.scale_maps._kinds import ScaleMap
-from texrs.scale_maps._maps import LEAST
+from texrs.scale_maps._maps import MIN_SCALE
 
-STEEPEST = 85.0
+MAX_SLANT = 85.0
 """Degrees of slant up to which a plane can be asked for."""
 
 
@@ -65,7 +65,7 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
 
     """
     size = as_size(shape, "shape")
-    lean = radians(as_float(slant, "slant", 0, STEEPEST))
+    lean = radians(as_float(slant, "slant", 0, MAX_SLANT))
     angle = radians(as_float(tilt, "tilt", -1e6, 1e6) % 360)
     right, up = cos(angle), sin(angle)
     # Of quarter turns the one component is nothing but a rounding error.
@@ -81,7 +81,7 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
     else:
         focal = max(size) / 2 / tan(radians(as_float(fov, "fov", 1, 170)) / 2)
         scale = 1 - far * (tan(lean) / focal)
-        if scale.min() < LEAST:
+        if scale.min() < MIN_SCALE:
             raise InvalidInput(
                 f"slant: at {slant:g} degrees the plane's horizon lies inside a picture that spans {fov:g} degrees; "
                 "a smaller slant, a smaller fov or a crop of the near part has none in it"

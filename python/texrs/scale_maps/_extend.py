@@ -9,7 +9,7 @@ from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.kernels import poisson
 from texrs.scale_maps._kinds import find_kind, keep_kind
-from texrs.scale_maps._maps import LARGEST, LEAST, as_map
+from texrs.scale_maps._maps import MAX_SCALE, MIN_SCALE, as_map
 from texrs.scale_maps._trend import Trend, as_trend, follow_kind
 
 
@@ -68,6 +68,6 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     nothing = np.zeros_like(logs)
     membrane = poisson.solve(logs, nothing, nothing, screening=0, boundary="free", mask=~there)
     # As the trend, no more than four times beyond what is known.
-    low, high = max(LEAST, float(values[there].min()) / 4), min(LARGEST, float(values[there].max()) * 4)
+    low, high = max(MIN_SCALE, float(values[there].min()) / 4), min(MAX_SCALE, float(values[there].max()) * 4)
     filled = np.where(there, values, np.clip(exp_single(course + membrane), np.float32(low), np.float32(high)))
     return keep_kind(filled, holds)

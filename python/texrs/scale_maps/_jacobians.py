@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_array, as_choice, check_memory, try_array
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
-from texrs.scale_maps._maps import LARGEST, LEAST
+from texrs.scale_maps._maps import MAX_SCALE, MIN_SCALE
 
 __all__ = ["as_jacobians", "jacobians_of_coordinates", "jacobians_of_normals", "measure_sizes"]
 
@@ -40,8 +40,8 @@ def as_jacobians(value: object, name: str = "jacobians") -> Jacobians:
     if flat.any():
         row, column = (int(i) for i in np.argwhere(flat)[0])
         raise InvalidInput(
-            f"{name}: {np.count_nonzero(flat)} of {flat.size} matrices are flat, or of scales outside {LEAST} to "
-            f"{LARGEST:.0f}, the first at row {row}, column {column}"
+            f"{name}: {np.count_nonzero(flat)} of {flat.size} matrices are flat, or of scales outside {MIN_SCALE} to "
+            f"{MAX_SCALE:.0f}, the first at row {row}, column {column}"
         )
     return np.asarray(given, np.float64)
 
@@ -50,7 +50,7 @@ def find_flat(jacobians: Jacobians) -> Bools:
     """Return which matrices are flat, or of scales out of range."""
     area, squares = np.abs(measure_determinants(jacobians)), (jacobians * jacobians).sum(axis=(-2, -1))
     # The larger singular value over the smaller one is about the sum of squares over the determinant.
-    return np.asarray((area < LARGEST**-2) | (area > LEAST**-2) | (squares > WORST * area), np.bool_)
+    return np.asarray((area < MAX_SCALE**-2) | (area > MIN_SCALE**-2) | (squares > WORST * area), np.bool_)
 
 
 def measure_determinants(jacobians: Jacobians) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import numpy as np
 from texrs._arrays import as_choice, power_single
 from texrs._show import as_png
 from texrs._typing import Floats
-from texrs.scale_maps._maps import LEAST, as_map
+from texrs.scale_maps._maps import MIN_SCALE, as_map
 
 __all__ = ["AREAS", "Kind", "ScaleMap", "as_kind", "describe_kind", "find_kind", "keep_kind", "parse_kind"]
 
@@ -140,7 +140,7 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
         if self.kind is None or self.kind == wanted:
             return ScaleMap(self, wanted)
         power = AREAS if wanted == "width" else 1 / AREAS
-        return ScaleMap(np.maximum(power_single(self, power), np.float32(LEAST)), wanted)
+        return ScaleMap(np.maximum(power_single(self, power), np.float32(MIN_SCALE)), wanted)
 
 
 def as_kind(value: object, name: str = "scale_kind") -> Kind:

@@ -10,7 +10,7 @@ from texrs._arrays import as_image
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
-LEAST, LARGEST = 1e-3, 1e3
+MIN_SCALE, MAX_SCALE = 1e-3, 1e3
 """Scales that a map may hold."""
 
 
@@ -20,7 +20,7 @@ def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = Non
     Raises
     ------
     InvalidInput
-        Not (rows, columns) of finite numbers within `LEAST` and `LARGEST`, or of another shape than asked.
+        Not (rows, columns) of finite numbers within `MIN_SCALE` and `MAX_SCALE`, or of another shape than asked.
 
     """
     given = as_image(value, name)
@@ -36,10 +36,10 @@ def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = Non
             f"{name}: needs shape {tuple(shape)}, got {flat.shape}; scale_maps.resample brings a map to a size"
         )
     low, high = float(flat.min()), float(flat.max())
-    if not (low >= LEAST and high <= LARGEST):
-        outside = int(np.count_nonzero((flat < LEAST) | (flat > LARGEST)))
+    if not (low >= MIN_SCALE and high <= MAX_SCALE):
+        outside = int(np.count_nonzero((flat < MIN_SCALE) | (flat > MAX_SCALE)))
         raise InvalidInput(
-            f"{name}: {outside} of {flat.size} scales are outside {LEAST} to {LARGEST:.0f} ({low:.4g} to {high:.4g}); "
+            f"{name}: {outside} of {flat.size} scales are outside {MIN_SCALE} to {MAX_SCALE:.0f} ({low:.4g} to {high:.4g}); "
             "1 is the normal size of an element, 2 twice that"
         )
     return np.ascontiguousarray(flat, dtype=np.float32)

@@ -17,7 +17,7 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.materials import Material
-from texrs.papers.solid.ranges import FAR, as_origin
+from texrs.papers.solid.ranges import MAX_COORDINATE, as_origin
 
 __all__ = ["Endless"]
 
@@ -54,8 +54,8 @@ class Endless(InParts):
     def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
         """Check where a part begins, and that it lies within the world; return what reads it."""
         start, sides = as_origin(origin, self.axes), as_sides(shape, "shape", self.axes)
-        if any(o + n > FAR for o, n in zip(start, sides, strict=True)):
-            raise InvalidInput(f"origin, shape: need to lie within {FAR}, got {start} and {sides}")
+        if any(o + n > MAX_COORDINATE for o, n in zip(start, sides, strict=True)):
+            raise InvalidInput(f"origin, shape: need to lie within {MAX_COORDINATE}, got {start} and {sides}")
         return Part(_Windows(self, start), start, IMAGE if self.material is None else self.material.base_name)
 
 

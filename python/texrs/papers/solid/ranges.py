@@ -12,9 +12,9 @@ from texrs._engine.pyramid import Region
 from texrs.errors import InvalidInput
 from texrs.papers.solid.limits import LARGER
 
-__all__ = ["FAR", "as_origin", "as_region"]
+__all__ = ["MAX_COORDINATE", "as_origin", "as_region"]
 
-FAR = 10**9
+MAX_COORDINATE = 10**9
 """Coordinates of the world are within so many voxels."""
 _ORDER = {2: "[y0:y1, x0:x1]", 3: "[z0:z1, y0:y1, x0:x1]"}
 
@@ -26,7 +26,7 @@ def as_origin(origin: object, axes: int) -> tuple[int, ...]:
         ends = [_as_end(v) for v in values]
         if None not in ends:
             return tuple(int(v) for v in values)
-    raise InvalidInput(f"origin: needs {axes} integers within {FAR}, got {origin!r}")
+    raise InvalidInput(f"origin: needs {axes} integers within {MAX_COORDINATE}, got {origin!r}")
 
 
 def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
@@ -49,7 +49,7 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
         else:
             raise InvalidInput(f"texture: takes integers and ranges, {_ORDER[axes]}; got {part!r}")
         if start is None or stop is None:
-            raise InvalidInput(f"texture: a range needs integers within {FAR}, got {_spell(part)}")
+            raise InvalidInput(f"texture: a range needs integers within {MAX_COORDINATE}, got {_spell(part)}")
         if stop <= start:
             raise InvalidInput(f"texture: the range {_spell(part)} is empty")
         origin.append(start)
@@ -60,7 +60,11 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
 
 def _as_end(value: object) -> int | None:
     """Return an integer of the world; none where it is not one."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not -FAR <= int(value) <= FAR:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, numbers.Integral)
+        or not -MAX_COORDINATE <= int(value) <= MAX_COORDINATE
+    ):
         return None
     return int(value)
 

@@ -29,7 +29,7 @@ from texrs.materials._material import apply_materials
 from texrs.papers.solid.layers import WORK, Layers
 from texrs.papers.solid.limits import LARGER, check_region, estimate_bytes
 from texrs.papers.solid.parts import Endless
-from texrs.papers.solid.ranges import FAR, as_origin, as_region
+from texrs.papers.solid.ranges import MAX_COORDINATE, as_origin, as_region
 from texrs.papers.solid.request import as_field, as_interpolation
 from texrs.papers.solid.settings import CANDIDATES, ON_DEMAND, Quality, as_quality
 from texrs.papers.solid.translated import Translated
@@ -401,8 +401,8 @@ class Texture(Endless):
         self, at: NDArray[np.float64], progress: Progress | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return the places of points between voxels, S(p) + J(p) (q - p), and the Jacobians; none where J is one."""
-        if len(at) and np.abs(at).max() > FAR:
-            raise InvalidInput(f"points: need to lie within {FAR} of the origin, got {np.abs(at).max():g}")
+        if len(at) and np.abs(at).max() > MAX_COORDINATE:
+            raise InvalidInput(f"points: need to lie within {MAX_COORDINATE} of the origin, got {np.abs(at).max():g}")
         places = np.empty(at.shape, np.float32)
         frames = None if self._field is None else np.empty((*at.shape, self.axes), np.float32)
         voxel = np.floor(at + 0.5).astype(np.int64)

@@ -11,7 +11,7 @@ from texrs._arrays import as_size
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
-from texrs.papers.solid.ranges import FAR
+from texrs.papers.solid.ranges import MAX_COORDINATE
 from texrs.papers.solid.unbounded import Texture
 from texrs.volume._values import as_direction
 from texrs.volume.pictures import as_steps
@@ -174,8 +174,8 @@ class SolidTexture(Texture):
         middle, steps = as_direction(point, "point"), as_steps(normal, axes)
         sides = as_size(size)
         reach = np.abs(middle) + np.abs(steps).T @ np.array(sides)
-        if reach.max() >= FAR:
-            raise InvalidInput(f"point, axes, size: the slice must lie within {FAR} of the origin")
+        if reach.max() >= MAX_COORDINATE:
+            raise InvalidInput(f"point, axes, size: the slice must lie within {MAX_COORDINATE} of the origin")
         image = self._exemplar.image if self._material is None else self._material.base
         out = np.empty((*sides, *image.shape[3:]), image.dtype)
         for top in range(0, sides[0], TILE):
