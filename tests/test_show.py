@@ -79,7 +79,7 @@ def open_png(data: bytes) -> Any:
         (texrs.SourceMap.identity((5, 6, 7)), (6, 7, 3)),
         (THINGS["Exemplar"], (64, 64, 3)),
         (texrs.Exemplar(VOLUME, axes=3), (36, 40, 3)),
-        (THINGS["Elements"], (96, 96, 3)),
+        (THINGS["ElementAnalysis"], (96, 96, 3)),
         (THINGS["layout"], (64, 64, 3)),
         (STONES, (64, 64, 3)),
         (texrs.Material({"albedo": VOLUME}, axes=3), (36, 40, 3)),

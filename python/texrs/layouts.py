@@ -1,8 +1,8 @@
 """Layouts that are drawn, not found: points, lattices, cells and courses that elements are brought into.
 
 Each is an entry like that of a picture (`texrs.elements.ElementAnalysis`), whose picture is a drawing of the layout. All that
-takes the arrangement of a texture takes it: the second argument of `texrs.splice`, and a `texrs.TextureDatabase`. `from_dict` makes
-one of a description in plain JSON types, as the command line does.
+takes the arrangement of a texture takes it: the second argument of `texrs.splice`, and a `texrs.TextureDatabase`. `from_dict`
+makes one of a description in plain JSON types, as the command line does.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Elements: where the repeated elements of a texture are, and what belongs to them (Liu et al. 2009, section 3).
 
 `analyse` finds them, from a box around one and a few places between them, or by itself; `correct` puts right what it got
-wrong, and `to_html` shows it; `load` reads what `ElementAnalysis.save` wrote. `ElementAnalysis.of_sample` takes over what is known of
-a generated texture. `ElementAnalysis.instances` are the elements one by one, and `ElementAnalysis.arrangement` is how they lie.
+wrong, and `to_html` shows it; `load` reads what `ElementAnalysis.save` wrote. `ElementAnalysis.of_sample` takes the truth of a
+generated texture. `ElementAnalysis.instances` are the elements one by one, and `ElementAnalysis.arrangement` is how they lie.
 `Layout` is how they are connected, and `ElementSearch` how they are looked for.
 """
 
