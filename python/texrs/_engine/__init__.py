@@ -1,1 +1,1 @@
-"""The calls of the engine that grows by corrected coordinates: fixed-point coordinates, packed windows. Private."""
+"""Private calls of the engine that grows textures by corrected coordinates: fixed-point coordinates, packed windows."""

@@ -1,4 +1,4 @@
-"""Appearance vectors of an exemplar, and what is grown from them: coherent blocks, and their correction."""
+"""Appearance vectors of an exemplar, and growth by them: coherent blocks, and their correction."""
 
 from __future__ import annotations
 
@@ -22,23 +22,24 @@ _PARTS = ("colours", "features", "basis", "bias", "gain", "spacing")
 
 
 class Demand(NamedTuple):
-    """What an output is asked to show at its points, beside looking like the exemplar.
+    """Values that an output should show at its points, in addition to similarity to the exemplar.
 
     Attributes
     ----------
     exemplar : (samples * 4) int16
-        Values of the exemplar's samples, -2048 to 2047; unused ones are zero.
+        Values of the exemplar's samples, -2048 to 2047. Unused ones are zero.
     output : (points * 4) or (points) int16
-        Values wanted at the points of the output; one a point is the first, and the others are zero.
+        Requested values at the points of the output. A single value for each point is the first; the others are then
+        zero.
     weight : (points) or (1) uint16
-        Cost of a squared difference of one, in 1/256; windows that have nothing to do with each other differ by
-        about 2 * 512^2. 0 where nothing is asked.
+        Cost of a squared difference of one, in 1/256. Unrelated windows differ by about 2 * 512^2. 0 if nothing is
+        requested.
     order : (any) uint32
-        Samples by their first value, the least first: what is drawn is drawn from those near what is asked. Empty: from
-        anywhere.
+        Samples in rising order of their first value. Random candidates are drawn from samples near the requested
+        value. If empty, they are drawn from all samples.
     excess : int
-        What it counts that a sample's first value is more than the wanted one, in 1/256 of what it counts that it is less.
-        Where it is not 256, first values alone are wanted.
+        Weight of an excess of a sample's first value over the requested one, in 1/256 of the weight of a deficit. If
+        it is not 256, only first values count.
 
     """
 
@@ -50,16 +51,16 @@ class Demand(NamedTuple):
 
 
 class Corrected(NamedTuple):
-    """Places after correction.
+    """Coordinates after correction.
 
     Attributes
     ----------
     places : (points * A) int32
-        In units of 1/4096 of a sample.
+        Source coordinates, in units of 1/4096 of a sample.
     passes : int
-        How many were made.
+        Number of passes.
     changed : float
-        Share of the points that the last two changed.
+        Share of the points that the last two passes changed.
 
     """
 
@@ -69,27 +70,27 @@ class Corrected(NamedTuple):
 
 
 class Appearance:
-    """What the surroundings of each sample of an exemplar look like, in 24 numbers.
+    """Description of the surroundings of each sample of an exemplar by 24 numbers.
 
-    Windows of colours, weighted by a Gaussian, are projected onto their leading principal components [1]_. All is
-    integer arithmetic of 12 bits, so that results are the same on any machine and for any number of threads.
+    Windows of colours, weighted by a Gaussian, are projected onto their leading principal components [1]_. All
+    arithmetic is on integers of 12 bits, so that results are the same on any processor and for any number of threads.
 
     Parameters
     ----------
     colours : (..., C) array
-        Colours that windows are compared by, up to four channels of any scale. Shape (rows, columns[, C]) or
-        (planes, rows, columns[, C]).
+        Colours for the comparison of windows, up to four channels of any scale. Shape (rows, columns[, C]) or (planes,
+        rows, columns[, C]).
     axes : int
         2 or 3.
     wrap : bool or one an axis
         Axes along which the exemplar repeats.
     radius : int
-        Of a window; its side is 2 radius + 1.
+        Radius of a window; its side is 2 radius + 1.
 
     Raises
     ------
     InvalidInput
-        Sides below 2 radius + 2, more than four channels, or windows of more than 2048 numbers.
+        If a side is below 2 radius + 2, there are more than four channels, or windows have more than 2048 numbers.
 
     References
     ----------
@@ -134,24 +135,24 @@ class Appearance:
     def spacing(self) -> float:
         """Median squared distance from a window to the nearest other one, in variances of all windows.
 
-        It is the natural unit of what is good enough.
+        It is the natural unit for the acceptance threshold.
         """
         return self._inner.spacing
 
     def arrays(self) -> dict[str, Array]:
-        """Return the analysis as plain arrays, to be kept; `from_arrays` takes them back."""
+        """Return the analysis as plain arrays for storage. `from_arrays` reads them."""
         kept: dict[str, Any] = dict(zip(_PARTS, self._inner.parts(), strict=True))
         kept |= {"shape": self.shape, "wrap": self.wrap, "radius": self.radius, "channels": self._inner.channels}
         return {name: np.asarray(value) for name, value in kept.items()}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Array]) -> Appearance:
-        """Take back what `arrays` gave.
+        """Restore an analysis from the arrays of `arrays`.
 
         Raises
         ------
         InvalidInput
-            Arrays that are missing or do not belong together.
+            If arrays are missing or do not belong together.
 
         """
         missing = {*_PARTS, "shape", "wrap", "radius", "channels"} - set(arrays)
@@ -179,7 +180,7 @@ class Appearance:
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel as plain arrays."""
+        """Pickle as plain arrays."""
         return Appearance.from_arrays, (self.arrays(),)
 
     def blocks(
@@ -205,47 +206,48 @@ class Appearance:
         Parameters
         ----------
         region : Region
-            What to fill.
+            Region to fill.
         frames : (1 or points, A, A) int16
             Jacobians over the region (see `texrs._engine.pyramid.to_fixed`).
         cell : int
             Side of a cell in points, 2 to 256.
         rounds : int
-            Half-rounds of choosing, 1 to 64: cells of even and of odd parity take turns.
+            Number of half-rounds of choosing, 1 to 64. Cells of even and odd parity alternate.
         candidates : int
-            Places that a cell tries in each, 1 to 65535.
+            Number of candidates of a cell in each half-round, 1 to 65535.
         contrast : float
-            How far misfits are divided by the contrast of the pieces, 0 to 1. At 0 bland pieces are favoured, for they are
-            near everything on average.
+                        Division of misfits by the contrast of the pieces, 0 (none) to 1 (full). A value of 0 prefers
+            pieces of low contrast, because they are near every piece on average.
         continuation : float
-            Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces, 0 to 4. At 0 the exemplar is
-            copied in large pieces.
+                        Cost of continuing exactly where a neighbour ends, in misfits of unrelated pieces, 0 to 4. A
+            value of 0 copies the exemplar in large pieces.
         repetition : float
-            Cost of showing what one of the cells around shows, in the same units, 0 to 4.
+            Cost of showing the same samples as a neighbouring cell, in the same units, 0 to 4.
         seed : int
-            Chooses the texture. What is drawn belongs to the place in the world, not to the region.
+            Seed of the random choices. Random numbers belong to positions in the world, not to the region.
         margin : int
-            Points along the borders, up to 2^20, that will be cut off: cells that nothing else hangs on are not chosen.
+            Number of points along the borders that will be cut off, up to 2^20. Cells that only affect these points
+            are not chosen.
         held : (points) bool, optional
-            Points that keep their places, around which the others are chosen.
+            Fixed points. The others are chosen to fit them.
         given : (points * A) int32, optional
-            The places of the held points; those of others do not count.
+            Coordinates of the fixed points. Others are ignored.
         demand : Demand, optional
-            What else the points are to show.
+            Values that the points should show.
         progress : callable, optional
-            Called with the share that is done; raising stops the work.
+            Called with the completed share. An exception that it raises stops the work.
 
         Returns
         -------
         (points * A) int32
-            Places in units of 1/4096 of a sample.
+            Source coordinates, in units of 1/4096 of a sample.
 
         Raises
         ------
         InvalidInput
-            An option out of its range, or arrays of other sizes than the region's.
+            If an option is out of its range, or arrays do not have the size of the region.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         """
         self.check(region)
@@ -286,37 +288,39 @@ class Appearance:
         overwrite: bool = False,
         progress: Report | None = None,
     ) -> Corrected:
-        """Correct places until every window of the output is like one of the exemplar.
+        """Correct coordinates until every window of the output resembles one of the exemplar.
 
         Parameters
         ----------
         places : (points * A) int32
-            In units of 1/4096 of a sample.
+            Source coordinates, in units of 1/4096 of a sample.
         region, frames
             As for `blocks`.
         passes : int
-            At most so many, up to 1000; each corrects every other point, as on a chess board.
+            Maximum number of passes, up to 1000. Each corrects every other point, as on a chess board.
         first : int
-            Number of the first one, for work that is done in parts.
+            Number of the first pass, for work that is done in parts.
         exhaustive : bool
-            Whether to compare each window with all of the exemplar's in each pass: for small exemplars.
+            If True, each pass compares each window with all windows of the exemplar. For small exemplars.
         reach : int
-            How far the neighbours are whose matches are tried, 1 or 2.
+            Distance of the neighbours whose matches are tried, 1 or 2 points.
         acceptance : float
-            How much better than the present a drawn match must be, in units of `spacing`, 0 to 100: what is good enough stays.
+            Required improvement of a drawn match over the present one, in units of `spacing`, 0 to 100. Good matches
+            are kept.
         coherence : float
-            What each neighbour costs whose piece of the exemplar is another, in units of `spacing`, 0 to 100: pieces
-            stay whole where several fit equally well.
+            Cost of each neighbour that shows another piece of the exemplar, in units of `spacing`, 0 to 100. It keeps
+            pieces whole if several candidates fit equally well.
         vote : int
-            Radius within which windows vote on the place of a point, up to `radius`; at 0 each takes its own match.
+                        Radius within which windows vote on the coordinates of a point, up to `radius`. If 0, each
+            point takes its own match.
         settled : float
-            Stop when two passes change less than this share of the points. The result then hangs on the whole region.
+            Share of points. Stop when two passes change fewer. The result then depends on the whole region.
         seed : int
-            Chooses what is drawn.
+            Seed of the random choices.
         held : (points) bool, optional
-            Points that keep their places.
+            Points whose coordinates are fixed.
         overwrite : bool
-            Write the result over ``places``, which saves 4 bytes for each of their numbers.
+            If True, write the result over ``places``, which saves 4 bytes for each number.
         demand, progress
             As for `blocks`.
 
@@ -327,9 +331,9 @@ class Appearance:
         Raises
         ------
         InvalidInput
-            An option out of its range, or arrays of other sizes than the region's.
+            If an option is out of its range, or arrays do not have the size of the region.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         """
         self.check(region)
@@ -356,6 +360,6 @@ class Appearance:
         return Corrected(places, passes, changed)
 
     def check(self, region: Region) -> None:
-        """Check that a region has as many axes as the exemplar."""
+        """Check that a region has the number of axes of the exemplar."""
         if len(region.shape) != len(self.shape):
             raise InvalidInput(f"region: the exemplar has {len(self.shape)} axes, got {region.shape}")

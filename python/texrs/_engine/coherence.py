@@ -1,4 +1,4 @@
-"""k-coherence: samples that look alike, and points that choose among those their neighbours know."""
+"""k-coherence: similar samples, and points that choose among the samples that their neighbours suggest."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ Report = Callable[[float], object]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Similarity:
-    """What each sample of an exemplar may be replaced by.
+    """Sets of samples that may replace each sample of an exemplar.
 
     Attributes
     ----------
     sets : (samples, k) uint32
-        Row-major positions, the sample's own first; all its own where its window does not lie inside the exemplar.
+        Row-major positions, the sample itself first. All entries are the sample itself if its window is not inside the
+        exemplar.
     numbers : int
-        Numbers of the appearance vectors that are compared.
+        Number of components of the appearance vectors that are compared.
 
     """
 
@@ -37,36 +38,36 @@ class Similarity:
 
     @property
     def k(self) -> int:
-        """Samples of a set."""
+        """Number of samples in a set."""
         return int(self.sets.shape[1])
 
     @property
     def nbytes(self) -> int:
-        """Memory that the sets take."""
+        """Bytes of the sets."""
         return self.sets.nbytes
 
 
 def find_similar(
     appearance: Appearance, *, k: int = 3, n: int = 7, numbers: int = 8, progress: Report | None = None
 ) -> Similarity:
-    """Find the samples of an exemplar that look most like each one, far from it and from each other.
+    """Find the samples of an exemplar most similar to each one, far from it and from each other.
 
-    C_1 is the sample itself. Each further C_j is the nearest, by squared distance of appearance vectors, of those that
-    are more than (n - 1) / 2 samples from every earlier one along some axis [1]_. The whole exemplar is searched, and
-    the result is exact: of equally near samples the first is taken.
+        C_1 is the sample itself. Each further C_j is the sample with the nearest appearance vector that is far enough
+    from all earlier ones: more than (n - 1) / 2 samples along some axis [1]_. The whole exemplar is searched,
+    and the result is exact. The first of equally near samples is used.
 
     Parameters
     ----------
     appearance : Appearance
-        Of the exemplar.
+        Appearance of the exemplar.
     k : int
-        Samples of a set, 1 to 16.
+        Number of samples in a set, 1 to 16.
     n : int
-        Side of the box around each chosen sample from which no other is chosen; odd.
+        Side of the box around each chosen sample that excludes other samples; odd.
     numbers : {8, 24}
-        How many of the leading numbers of the vectors are compared.
+        Number of leading components of the vectors that are compared.
     progress : callable, optional
-        Called with the share that is done; raising stops the work.
+        Called with the completed share. An exception that it raises stops the work.
 
     Returns
     -------
@@ -75,9 +76,9 @@ def find_similar(
     Raises
     ------
     InvalidInput
-        An option out of its range, or an exemplar too small for ``k`` samples so far apart.
+        If an option is out of its range, or the exemplar is too small for ``k`` samples at this distance.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     References
     ----------
@@ -111,36 +112,36 @@ def correct(
     kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None = None,
     progress: Report | None = None,
 ) -> NDArray[np.int32]:
-    """Correct places by k-coherence: each point takes what makes its diagonal neighbours look right.
+    """Correct coordinates by k-coherence: each point fits the appearance of its diagonal neighbours.
 
-    A pass goes over the 2^A classes of points of the same parity along each axis, in fixed order [1]_. Candidates
-    are what the samples of a point's 2^A diagonal neighbours, warped by the frames, are similar to, brought back to the
-    point; they are compared by the appearance vectors of the neighbours. The first of equally good ones wins.
+    A pass visits the 2^A classes of points of the same parity along each axis, in fixed order [1]_. Candidates are the
+    samples similar to those of a point's 2^A diagonal neighbours, warped by the frames and shifted back to the point.
+    They are compared by the appearance vectors of the neighbours. The first of equally good candidates is used.
 
     Parameters
     ----------
     appearance : Appearance
-        Of the exemplar.
+        Appearance of the exemplar.
     similarity : Similarity
-        Of the same exemplar.
+        Similarity sets of the same exemplar.
     places : (points * A) int32
-        In units of 1/4096 of a sample.
+        Source coordinates, in units of 1/4096 of a sample.
     region : Region
-        Where the points lie.
+        Region of the points.
     frames : (1 or points, A, A) int16
         Jacobians over the region (see `texrs._engine.pyramid.to_fixed`).
     passes : int
-        0 to 1000.
+        Number of passes, 0 to 1000.
     compensated : bool
-        Whether neighbours are read where the diagonal leads in the exemplar, as released code has it [1]_, and not
-        only where the lattice makes it end.
+        If True, neighbours are read at the end of the diagonal in the exemplar, as released code does [1]_. Otherwise
+        they are read at the lattice point only.
     held : (points) bool, optional
-        Points that keep their places.
+        Points whose coordinates are fixed.
     kinds : (samples) uint8 and (points) uint8, optional
-        The kind of each sample, and the kind that each point takes; 255 takes any. A point that is offered none keeps
-        its place.
+        Class of each sample, and the class that each point requires; 255 allows any class. A point without a suitable
+        candidate keeps its coordinates.
     progress : callable, optional
-        Called with the share that is done; raising stops the work.
+        Called with the completed share. An exception that it raises stops the work.
 
     Returns
     -------
@@ -149,9 +150,9 @@ def correct(
     Raises
     ------
     InvalidInput
-        An option out of its range, or arrays that do not belong together.
+        If an option is out of its range, or arrays do not belong together.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     References
     ----------
@@ -195,20 +196,20 @@ def jitter(
     level: int = 0,
     held: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int32]:
-    """Displace places by noise that belongs to their points in the world.
+    """Displace coordinates by noise that depends on the positions of their points in the world.
 
     Parameters
     ----------
     places : (points * A) int32
-        In units of 1/4096 of a sample.
+        Source coordinates, in units of 1/4096 of a sample.
     region : Region
-        Where the points lie.
+        Region of the points.
     reach : float
-        Largest displacement along an axis, in samples, 0 to 65536.
+        Maximum displacement along an axis, in samples, 0 to 65536.
     seed, level : int
-        Choose the noise.
+        Seed and level of the noise.
     held : (points) bool, optional
-        Points that keep their places.
+        Points whose coordinates are fixed.
 
     Returns
     -------
@@ -217,7 +218,7 @@ def jitter(
     Raises
     ------
     InvalidInput
-        An option out of its range, or arrays that are not of the region.
+        If an option is out of its range, or arrays do not belong to the region.
 
     Examples
     --------

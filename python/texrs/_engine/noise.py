@@ -1,4 +1,4 @@
-"""Counter-based noise: a value belongs to a seed and a position, never to a stream."""
+"""Counter-based noise: a value depends on a seed and a position, not on a stream."""
 
 from __future__ import annotations
 

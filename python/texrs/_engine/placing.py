@@ -1,4 +1,4 @@
-"""Elements as distances to their outlines, and where they come to when they are moved."""
+"""Elements as distances to their outlines, and elements after a motion."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def measure_outlines(labels: Labels, windows: Sequence[Window]) -> list[Floats |
     Parameters
     ----------
     labels : (H, W) int32
-        Whose edges go on for ever.
+        Labels of the image, whose edge values continue beyond it.
     windows : sequence of (label, (row, column), (rows, columns))
-        Which label, where its window begins, and how large that is; it may reach beyond the image.
+        Label, first pixel of its window, and size of the window, which may reach beyond the image.
 
     Returns
     -------
     list of (rows, columns) float32, or None
-        The distance in pixels from each pixel to the nearest one on the other side of the outline, negative outside; None
-        where the window has no other side.
+        Distance in pixels from each pixel to the nearest one on the other side of the outline, negative outside. None
+        if all pixels of the window are on one side.
 
     Examples
     --------
@@ -45,24 +45,24 @@ def measure_outlines(labels: Labels, windows: Sequence[Window]) -> list[Floats |
 
 
 class Moved(NamedTuple):
-    """A shape where it has come to.
+    """A shape after a motion.
 
     Attributes
     ----------
     window : (slice, slice)
-        The part of the canvas that it may cover: h rows, w columns.
+        Part of the canvas that the shape may cover: h rows, w columns.
     coordinates : (h, w, 2) float32
-        Where each pixel of the window comes from.
+        Source coordinates of each pixel of the window.
     distance : (h, w) float32
-        To the outline, in pixels of where it comes from.
+        Distance to the outline, in pixels of the source.
     inside : (h, w) bool
-        Whether the canvas has the place where it comes from.
+        Mask of the pixels whose source coordinates are on the canvas.
     deep : (h, w) bool
-        What is inside, and deeper in the shape than was asked.
+        Mask of the pixels that are inside, and deeper in the shape than the requested depth.
     pixels : int
-        How many are inside, and of the shape.
+        Number of pixels that are inside and in the shape.
     inverse : (2, 2) float64
-        The linear part of the way back.
+        Linear part of the inverse map.
 
     """
 
@@ -84,22 +84,22 @@ def move_shape(
     canvas: tuple[int, int],
     depth: float,
 ) -> Moved | None:
-    """Move a shape by ``p -> centre + shift + matrix (p - centre)``; None where it leaves the canvas.
+    """Move a shape by ``p -> centre + shift + matrix (p - centre)``. Return None if it leaves the canvas.
 
     Parameters
     ----------
     distance : (rows, columns) float32
-        Signed distance to its outline, positive inside.
+        Signed distance to the outline, positive inside.
     origin : (row, column)
-        Where that begins.
+        First pixel of this array.
     centre, shift : (row, column)
-        See above. Where the map brings whole pixels to whole pixels, they stay samples.
+        See above. If the map takes whole pixels to whole pixels, samples are kept exactly.
     matrix : (2, 2) floats
         See above; it must have an inverse.
     canvas : (rows, columns)
-        Size of what the shape is taken from, and of what it is moved on.
+        Size of the canvas that the shape comes from and moves on.
     depth : float
-        Depth in pixels from which on it is deep inside.
+        Minimum depth in pixels of the mask ``deep``.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Parts of endless lattices, and the way from one resolution to the next."""
+"""Parts of infinite lattices, and the step from one resolution to the next."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from texrs.errors import InvalidInput
 __all__ = ["ONE", "Region", "flatten", "halve", "to_fixed", "upsample"]
 
 ONE = 4096
-"""Places are kept in fixed point: this is one sample. Every step is then exact, on any machine and in any order."""
+"""One sample in fixed point. Fixed-point coordinates make every step exact, on any processor and in any order."""
 
 _SLAB = 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A part of an endless lattice.
+    """A part of an infinite lattice.
 
     Attributes
     ----------
     shape : tuple of int
-        Points along each axis.
+        Number of points along each axis.
     origin : tuple of int
         World coordinates of the first point, on the lattice of its own resolution.
     wrap : tuple of bool
-        Axes along which the lattice closes.
+        Axes along which the lattice is periodic.
 
     Examples
     --------
@@ -62,9 +62,9 @@ class Region:
         return int(np.prod(self.shape, dtype=np.int64))
 
     def parents(self) -> Region:
-        """Return the region of half the resolution that holds p // 2 for every point p.
+        """Return the region of half the resolution that contains p // 2 for every point p.
 
-        The last parent of a closed axis of odd length has three children.
+        The last parent of a periodic axis of odd length has three children.
         """
         shape, origin = [], []
         for n, first, closed in zip(self.shape, self.origin, self.wrap, strict=True):
@@ -74,51 +74,51 @@ class Region:
         return Region(tuple(shape), tuple(origin), self.wrap)
 
     def grown(self, margin: int) -> Region:
-        """Return the region with so many points more on each side of the axes that do not close."""
+        """Return the region extended by a number of points on each side of the axes that are not periodic."""
         pads = [0 if w else margin for w in self.wrap]
         shape = tuple(n + 2 * pad for n, pad in zip(self.shape, pads, strict=True))
         return Region(shape, tuple(o - pad for o, pad in zip(self.origin, pads, strict=True)), self.wrap)
 
     def inside(self, outer: Region) -> tuple[slice, ...]:
-        """Return where this region lies in a larger one, as slices."""
+        """Return the position of this region in a larger one, as slices."""
         starts = [o - p for o, p in zip(self.origin, outer.origin, strict=True)]
         if any(s < 0 or s + n > m for s, n, m in zip(starts, self.shape, outer.shape, strict=True)):
             raise InvalidInput(f"region: {self} does not lie inside {outer}")
         return tuple(slice(s, s + n) for s, n in zip(starts, self.shape, strict=True))
 
     def check_places(self, places: NDArray[np.int32]) -> None:
-        """Check that there is a place for each point."""
+        """Check that there are coordinates for each point."""
         count = self.points * len(self.shape)
         if places.dtype != np.int32 or places.shape != (count,):
             raise InvalidInput(f"places: needs int32 of {count} numbers, got {places.dtype} {places.shape}")
 
 
 def flatten(mask: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
-    """Return a mask of points as the compiled code takes it: in one row, and empty where it is none."""
+    """Return a mask of points as the compiled code takes it: flat, and empty for None."""
     return np.zeros(0, np.bool_) if mask is None else np.ascontiguousarray(mask.reshape(-1))
 
 
 def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.int16]:
-    """Return the Jacobians of a region in fixed point: one where they are all the same, else one a point.
+    """Return the Jacobians of a region in fixed point: one if all are the same, else one for each point.
 
     Parameters
     ----------
     field : Field, optional
-        Of `texrs.fields`; none leaves everything in place.
+        Field of `texrs.fields`. None is the identity.
     region : Region
-        Of the lattice whose points are ``step`` voxels apart: point i lies at (i + 1/2) step - 1/2.
+        Region of the lattice with points ``step`` voxels apart: point i is at (i + 1/2) step - 1/2.
     step : int
-        1, 2, 4 ...
+        Distance of the points: 1, 2, 4 ...
 
     Returns
     -------
     (1 or points, A, A) int16
-        In units of 1/4096.
+        Jacobians in units of 1/4096.
 
     Raises
     ------
     InvalidInput
-        A singular frame, or one that makes features less than an eighth as large.
+        If a frame is singular, or makes features less than an eighth as large.
 
     Examples
     --------
@@ -153,7 +153,7 @@ def _round_frames(frames: Array) -> NDArray[np.int16]:
 def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) -> Floats:
     """Return an image or a volume at half the resolution.
 
-    Each axis is filtered with (1, 3, 3, 1) / 8; sample i of the result lies between samples 2 i and 2 i + 1. The last
+    Each axis is filtered with (1, 3, 3, 1) / 8. Sample i of the result is between samples 2 i and 2 i + 1. The last
     sample of an odd axis is left out.
 
     Parameters
@@ -161,9 +161,9 @@ def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) 
     image : (..., [C]) array
         Any real dtype; sides of at least 2.
     wrap : bool or one an axis
-        Which axes are cyclic; along the others the border repeats.
+        Axes along which the image is periodic. Along the others the border repeats.
     axes : int
-        Axes without channels, 2 or 3.
+        Number of axes without channels, 2 or 3.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) 
     Raises
     ------
     InvalidInput
-        Not an image, or too small.
+        If it is not an image, or is too small.
 
     Examples
     --------
@@ -194,28 +194,28 @@ def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) 
 def upsample(
     places: NDArray[np.int32], parents: Region, region: Region, frames: NDArray[np.int16]
 ) -> NDArray[np.int32]:
-    """Return the places of a region from those of the region of half the resolution.
+    """Return the coordinates of a region from those of the region of half the resolution.
 
     S(p) = 2 S'(p // 2) + 1/2 + J (p mod 2 - 1/2): a copy stays a copy [1]_.
 
     Parameters
     ----------
     places : (points of the parents * A) int32
-        In units of 1/4096 of a sample of the coarser exemplar.
+        Coordinates in units of 1/4096 of a sample of the coarser exemplar.
     parents, region : Region
-        The coarser lattice's part, which must hold p // 2 for every p, and the finer one's.
+        Parts of the coarser and of the finer lattice. The coarser part must contain p // 2 for every p.
     frames : (1 or points, A, A) int16
         Jacobians over the region (see `to_fixed`).
 
     Returns
     -------
     (points * A) int32
-        In units of 1/4096 of a sample of the finer exemplar.
+        Coordinates in units of 1/4096 of a sample of the finer exemplar.
 
     Raises
     ------
     InvalidInput
-        Parents that do not hold those of the region, or arrays of other sizes.
+        If the parents do not contain those of the region, or arrays have other sizes.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Arrays smoothed by Gaussians, as `scipy.ndimage` does it, byte for byte, and several times as fast."""
+"""Gaussian smoothing of arrays: the same bytes as `scipy.ndimage`, several times as fast."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def smooth(
     Parameters
     ----------
     values : array of float32 or float64
-        Of any shape; sums run in double precision.
+        Array of any shape. Sums are computed in double precision.
     sigma : float or sequence
-        Standard deviation, in samples, for all axes or for each; 0 leaves an axis as it is.
+        Standard deviation, in samples, as one number or one an axis. 0 leaves an axis unchanged.
     mode : str or sequence
-        What lies beyond the ends of axes, as in `scipy.ndimage.gaussian_filter`; beyond them "constant" is 0.
+        Continuation beyond the ends of axes, as in `scipy.ndimage.gaussian_filter`. "constant" is 0 there.
     truncate : float
-        Standard deviations beyond which nothing counts.
+        Radius of the kernel, in standard deviations.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def smooth(
 
 
 def _list_weights(sigma: float, truncate: float) -> list[float]:
-    """Return what values count that are 0, 1, ... samples away."""
+    """Return the weights of values at distances of 0, 1, ... samples."""
     if sigma <= 1e-15:
         return []
     reach = int(truncate * sigma + 0.5)

@@ -1,4 +1,4 @@
-"""The stitcher: patches of an exemplar pulled into the output through any map, and cut where it shows least."""
+"""The stitcher: patches of an exemplar are mapped into the output and cut along the least visible seams."""
 
 from __future__ import annotations
 
@@ -19,28 +19,29 @@ from texrs.errors import InvalidInput
 __all__ = ["FREE", "Pasting", "Samples", "Shown", "Stitched", "Stitcher", "Weights"]
 
 FREE = 2**32 - 1
-"""What a pixel shows that shows nothing yet."""
+"""Value of a pixel that shows nothing yet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """What a seam costs: each 0 to 100.
+    """Costs of a seam, each 0 to 100.
 
     Attributes
     ----------
     colour : float
-        Squared differences of the colours on both sides, in the exemplar's standard deviations.
+        Cost of squared colour differences across the seam, in the exemplar's standard deviations.
     contact, jump, depth, joint : float
-        Two elements in contact, of whatever colours; an element that is cut off; a seam inside of one; elements nearer
-        than two samples.
+        contact: two touching elements. jump: an element that is cut off. depth: a seam inside an element. joint:
+        elements less than two samples apart.
     presence : float
-        A point that shows no element: cuts around elements are shorter, and would leave too few of them.
+        Cost of a point without an element. Cuts around elements are shorter, and would leave too few elements without
+        this cost.
     surprise : float
-        Colours that are seldom seen side by side.
+        Cost of colours that are rarely adjacent.
     distortion : float
-        A point whose patch is bent against the field.
+        Cost of a point whose patch is bent against the field.
     guide : float
-        A point that does not show what is asked.
+        Cost of a point that does not show the requested value.
 
     """
 
@@ -56,20 +57,20 @@ class Weights:
 
 
 class Stitched(NamedTuple):
-    """What has been stitched.
+    """Result of the stitcher.
 
     Attributes
     ----------
     places : (points * A) int32
-        In units of 1/4096 of a sample.
+        Source coordinates, in units of 1/4096 of a sample.
     patches : (points) uint32
-        The patch that each point shows; beyond the last for points that were given.
+        Patch of each point. Given points have numbers after the last patch.
     frames : (patches, A, A) int16
-        The Jacobian at the centre of each, in units of 1/4096.
+        Jacobian at the centre of each patch, in units of 1/4096.
     seams : float
         Mean cost of the seams at a point.
     healed : int
-        Moves by which elements were made whole, or given up.
+        Number of moves that repaired or removed torn elements.
 
     """
 
@@ -81,21 +82,21 @@ class Stitched(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What a part of something larger shows: arrays in one row.
+    """Content of a part of a larger output, as flat arrays.
 
     Attributes
     ----------
     places : (points * A) int32
-        In units of 1/4096 of a sample.
+        Source coordinates, in units of 1/4096 of a sample.
     patches : (points) uint32
-        The patch that each point shows, a row of the table.
+        Patch of each point, a row of the table.
     seams : (points * A) float32
         Cost of the seam from each point to the next one along each axis.
     distortion : (points) float32
-        How far the patch is from the field; empty where one frame serves all.
+        Difference of the patch from the field. Empty if all points have one frame.
     table : (patches, K) int32
-        Of each patch: its centre, seen from the part's first point; where that looks; the Jacobian there; the side in units
-        of 1/4096 of a sample; and whether it is rigid.
+                Data of each patch: its centre, relative to the first point of the part; the source coordinates and the
+        Jacobian of the centre. Then the side, in units of 1/4096 of a sample, and whether it is rigid.
 
     """
 
@@ -117,24 +118,25 @@ class Stitcher:
     Parameters
     ----------
     colours : (..., C) float32
-        Up to four channels of any scale, of two or three axes.
+        Up to four channels of any scale, on two or three axes.
     wrap : one bool an axis
         Axes along which the exemplar repeats.
     classes : uint8 array
         Class of each sample.
     costs : (K, K) float32
-        How surprising two classes side by side are.
+        Cost of two adjacent classes: higher for rarer pairs.
     labels : uint32 array, optional
-        Number of the element of each sample, from 1; 0 for none.
+        Element of each sample, from 1; 0 for none.
     depth : float32 array, optional
         Distance of each sample to the background.
     sure : bool
-        Whether the elements were found for sure. Those that may be some are kept whole by what cuts cost, and not healed.
+        If True, the elements are reliable. Unreliable elements are kept whole by the costs of cuts, and are not
+        repaired.
 
     Raises
     ------
     InvalidInput
-        Arrays that do not belong together.
+        If the arrays do not belong together.
 
     """
 
@@ -189,38 +191,39 @@ class Stitcher:
         Parameters
         ----------
         region : Region
-            What to fill.
+            Region to fill.
         frames : (1 or points, A, A) int16
             Jacobians over the region (see `texrs._engine.pyramid.to_fixed`).
         patch : float
             Side of a patch in samples of the exemplar, 4 to 4096.
         overlap : float
-            Share of it by which neighbours overlap, 0 to 0.8.
+            Overlap of neighbours, as a share of the patch side, 0 to 0.8.
         candidates : int
-            Places that are cut in, of which the cheapest stays; 1 to 64.
+            Number of positions that are cut in for each patch, 1 to 64. The cheapest is kept.
         bend : bool
-            Whether patches bend with the field, or are turned and scaled as a whole.
+            If True, patches bend with the field. Otherwise they are rotated and scaled as a whole.
         recover : float
-            Patches that cover the worst seams again, as a share of all, 0 to 4. They stay where seams cost less then.
+            Number of patches that cover the worst seams again, as a share of all patches, 0 to 4. They are kept if
+            they lower the cost.
         heal : bool
-            Whether torn elements are grown whole, or given up.
+            If True, torn elements are completed or removed.
         weights : Weights
-            What seams cost.
+            Costs of a seam.
         repetition, continuation : float
-            Cost of places that have been shown more often than others, and of going on exactly where a neighbour ends, 0
-            to 100; places that have nothing to do with each other differ by 2.
+            Cost of positions that were used more often than others, and of continuing exactly where a neighbour ends,
+            0 to 100. Unrelated positions differ by 2.
         seed : int
-            Chooses the texture.
+            Seed of the random choices.
         held : (points) bool, optional
-            Points that keep their places.
+            Points whose coordinates are fixed.
         given : (points * A) int32, optional
-            The places of the held points; those of others do not count.
+            Coordinates of the fixed points. Others are ignored.
         loose : (points) bool, optional
-            Which of the held points patches may take all the same, where seams show less then.
+            Fixed points that patches may still replace if this lowers the cost of seams.
         demand : Demand, optional
-            What else the points are to show.
+            Values that the points should show.
         progress : callable, optional
-            Called with the share that is done; raising stops the work.
+            Called with the completed share. An exception that it raises stops the work.
 
         Returns
         -------
@@ -229,9 +232,9 @@ class Stitcher:
         Raises
         ------
         InvalidInput
-            An option out of its range, or arrays of other sizes than the region's.
+            If an option is out of its range, or arrays do not have the size of the region.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         """
         axes = len(self.shape)
@@ -266,23 +269,23 @@ class Stitcher:
     def judge(
         self, region: Region, places: NDArray[np.int32], patches: NDArray[np.uint32], weights: Weights = Weights()
     ) -> NDArray[np.float32]:
-        """Return what seams cost: (points * A), from each point to the next one along each axis that shows another patch.
+        """Return the costs of seams, (points * A).
 
         Parameters
         ----------
         region : Region
-            Where they are.
+            Region of the points.
         places : (points * A) int32
-            Where each point looks.
+            Source coordinates of each point.
         patches : (points) uint32
-            Which patch it shows.
+            Patch of each point.
         weights : Weights
-            What seams cost.
+            Costs of a seam.
 
         Raises
         ------
         InvalidInput
-            Arrays of other sizes than the region's.
+            If arrays do not have the size of the region.
 
         """
         return self._inner.judge(region.place, places, patches, list(astuple(weights)))
@@ -304,24 +307,24 @@ class Stitcher:
         balance: float = 4.0,
         progress: Report | None = None,
     ) -> Shown:
-        """Cut a patch into a part of something larger, whose ends stay as they are.
+        """Cut a patch into a part of a larger output, whose borders stay unchanged.
 
-        What becomes of it hangs on what it shows and on its frames alone.
+        The result depends only on the content and the frames of the part.
 
         Parameters
         ----------
         region : Region
             The part.
         frames : (1 or points, A, A) int16
-            Jacobians over it.
+            Jacobians over the part.
         shown : Shown
-            What it shows before.
+            Content of the part before the call.
         patch : float
-            Side of a patch in samples of the exemplar, at most; where it does not fill the part there are several.
+            Maximum side of a patch in samples of the exemplar. If one does not fill the part, several are used.
         candidates, bend, recover, heal, weights, repetition, continuation, progress
-            As for `stitch`; what is charged are the patches that the part shows already.
+            As for `stitch`. Repetition is charged against the patches that the part shows already.
         balance : float
-            Cost of points of classes in excess, as many as a side of a patch has.
+            Cost of points of overrepresented classes. The unit is the number of points on a patch side.
 
         Returns
         -------
@@ -330,9 +333,9 @@ class Stitcher:
         Raises
         ------
         InvalidInput
-            An option out of its range, or arrays of other sizes than the region's.
+            If an option is out of its range, or arrays do not have the size of the region.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         """
         made = self._inner.cover(
@@ -365,11 +368,11 @@ class Pasting:
     Attributes
     ----------
     shown : (h, w) uint32
-        The sample that each pixel shows, or `FREE`.
+        Sample of each pixel, or `FREE`.
     seams : (h, w, 2) float32
         Cost of the seam from each pixel to the next one along each axis.
     mask, core : (h, w) bool
-        Pixels that a patch covers, and those that must take it.
+        Pixels that a patch covers, and pixels that must take it.
 
     """
 
@@ -379,22 +382,22 @@ class Pasting:
     core: Bools
 
     def pack(self) -> tuple[tuple[int, ...], NDArray[np.uint32], Floats, Bools, Bools]:
-        """Return the shape, and the arrays in a row."""
+        """Return the shape, and the arrays as one flat array."""
         shown, seams = np.ascontiguousarray(self.shown), np.ascontiguousarray(self.seams)
         return self.shown.shape, shown.reshape(-1), seams.reshape(-1), self.mask.reshape(-1), self.core.reshape(-1)
 
 
 class Samples:
-    """Samples of pictures in one row, from which patches are cut that another search has found and that lie as they are.
+    """Samples of images in one row. Patches found by another search are cut from them without a warp.
 
     Parameters
     ----------
     colours : (n, C) float32
         Up to four channels of any scale.
     depth : (n) float32
-        How deep inside of an element each lies, in pixels; 0 between elements.
+        Depth of each sample inside an element, in pixels; 0 between elements.
     weights : (float, float)
-        What a seam costs by colour and depth, as in `Weights`.
+        Costs of a seam by colour and by depth, as in `Weights`.
 
     """
 
@@ -402,19 +405,19 @@ class Samples:
         self.inner: Final = _rust.PatchSamples(np.ascontiguousarray(colours), np.ascontiguousarray(depth), weights)
 
     def judge(self, pasting: Pasting, patches: NDArray[np.uint32]) -> list[float]:
-        """Return what the seams of a window cost once each of some patches is cut into it, alone.
+        """Return the cost of the window's seams after cutting in each of some patches separately.
 
         Parameters
         ----------
         pasting : Pasting
-            What they are cut into.
+            Window that they are cut into.
         patches : (k, h, w) uint32
-            The sample that each pixel would show; of pixels outside the mask any.
+            Sample of each pixel. Pixels outside the mask may have any value.
 
         """
         return self.inner.judge(pasting.pack(), patches.reshape(len(patches), -1))
 
     def cut(self, pasting: Pasting, patch: NDArray[np.uint32]) -> tuple[Bools, Floats]:
-        """Cut a patch (h, w) into a window: the pixels that take it, and the window's seams as they are then."""
+        """Cut a patch (h, w) into a window. Return the mask of its pixels, and the new seams of the window."""
         take, seams = self.inner.cut(pasting.pack(), patch.reshape(-1))
         return take.reshape(patch.shape), seams.reshape(*patch.shape, 2)

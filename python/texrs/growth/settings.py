@@ -28,7 +28,8 @@ class Settings:
     cell, rounds, candidates : int
         Patch-based initialisation: side of a cell, number of half-rounds of choosing, and candidates of each choice.
     contrast, continuation, repetition : float
-        Patch-based initialisation. Share of the contrast by which misfits are divided; cost of continuing exactly where a
+                Patch-based initialisation. Division of misfits by the contrast of the pieces; cost of continuing
+        exactly where a
         neighbour ends; cost of showing the same samples as a neighbour.
     acceptance : float
         Acceptance threshold: the required improvement of a drawn match over the present one.

@@ -1,6 +1,6 @@
-"""Kernels on plain arrays, one module each: checked, documented wrappers of the compiled code, for reuse.
+"""Kernels on plain arrays, one module each: checked and documented wrappers of the compiled code.
 
-Each is a noun of the literature and knows nothing of the papers that use it.
+Each kernel is a standard term of the literature and does not depend on the papers that use it.
 """
 
 from texrs.kernels import (

@@ -14,7 +14,7 @@ from texrs.errors import InvalidInput
 __all__ = ["gather"]
 
 EXACT = 2**53
-"""Up to this float64 holds all integers."""
+"""Largest integer up to which float64 represents all integers."""
 
 
 def __dir__() -> list[str]:
@@ -31,33 +31,34 @@ def gather(
 ) -> Array:
     """Return samples of exemplars at coordinates.
 
-    A coordinate that falls on a sample gives that sample, bit for bit, whatever the interpolation. ``"cubic"``
+    A coordinate that falls on a sample returns this sample, bit for bit, for every interpolation. ``"cubic"``
     (Catmull-Rom [1]_) is clipped to the range of its taps, so it neither rings nor leaves the range of the data.
 
     Parameters
     ----------
     exemplars : (h, w[, C]) or (d, h, w[, C]) array_like, or a list or tuple of them
-        Bool, integers, floats of 16, 32 or 64 bit, finite where they are looked up; several must agree in dtype and
-        channels, not in size.
+        Bool, integers, or floats of 16, 32 or 64 bit, finite at the coordinates. Several exemplars must agree in dtype
+        and channels, but not in size.
     coordinates : (..., 2) or (..., 3) array_like
-        (row, column) or (plane, row, column), in samples, as float32; sample centres are at the integers. Finite.
+        (row, column) or (plane, row, column), in samples, as float32. Sample centres are at the integers. Must be
+        finite.
     which : (...) array_like of int, optional
-        The exemplar of each pixel, counted from 0; by default the first for all.
+        Index of the exemplar of each pixel, from 0. Default: the first exemplar for all.
     interpolation : {"nearest", "linear", "cubic"}
-        How values between samples are made. Integers are rounded to the nearest; among integers beyond 2^53 nothing is made,
-        the nearest sample is taken.
+        Interpolation between samples. Integers are rounded to the nearest. Integers beyond 2^53 are not interpolated:
+        the nearest sample is used. Default: "nearest".
     wrap : bool or one an axis
-        Axes along which the exemplars are cyclic; along the others the edge repeats.
+        Axes along which the exemplars are periodic. Along the other axes the edge repeats.
 
     Returns
     -------
     (..., [C]) ndarray
-        In the dtype of the exemplars; with channels if they have a channel axis.
+        Samples in the dtype of the exemplars, with channels if they have a channel axis.
 
     Raises
     ------
     InvalidInput
-        Coordinates or samples that are not finite, an index beyond the exemplars, or exemplars that do not agree.
+        If coordinates or samples are not finite, an index is beyond the exemplars, or the exemplars do not agree.
 
     References
     ----------
@@ -97,7 +98,7 @@ def gather(
         [_to_kernel(e, how) for e in images], as_wrap(wrap, axes=axes), index.reshape(-1), points.reshape(-1, axes), how
     )
     if out.dtype.kind == "f" and not np.isfinite(out).all():
-        # Seen by what came out, for a few pixels of a large exemplar are soon looked up, and all of it is not soon read.
+        # Check the result instead of the exemplar: a few pixels are read faster than the whole of a large exemplar.
         for image in images:
             check_finite(image, "exemplars")
     if dtype == np.bool_ or out.dtype == np.uint32:
@@ -109,13 +110,13 @@ def gather(
 
 
 def _find_exact(interpolation: str, images: Sequence[Array], points: Floats) -> str:
-    """Return how 64-bit integers are looked up: by the nearest sample if float64 cannot hold them: they are names."""
+    """Return the interpolation for 64-bit integers: nearest if float64 cannot represent all of them."""
     large = any(int(e.min()) < -EXACT or int(e.max()) > EXACT for e in images)
     return "nearest" if large or (points == np.rint(points)).all() else interpolation
 
 
 def _to_kernel(array: Array, interpolation: str) -> Array:
-    """Return the values in a dtype that the kernel takes: bool as uint8, float16 as float32, 64-bit integers as halves."""
+    """Return the values in a dtype that the kernel accepts."""
     if array.dtype == np.bool_:
         return array.view(np.uint8)
     if array.dtype.kind in "ui" and array.itemsize == 8:

@@ -23,18 +23,18 @@ def __dir__() -> list[str]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inpainting:
-    """A picture without holes, and where its new pixels come from.
+    """An image without holes, and the sources of its new pixels.
 
     Attributes
     ----------
     colours : (H, W, C) float32
-        The picture.
+        The filled image.
     label : (H, W) int32
-        The patch that a pixel comes from, counted from 0 in the order of pasting; -1 where the picture was kept.
+        Patch of each pixel, counted from 0 in the order of pasting; -1 for pixels that were kept.
     source : (patches,) int
-        The exemplar of each patch.
+        Exemplar of each patch.
     coordinates : (H, W, 2) float32
-        The place in that exemplar, (row, column); 0 where the picture was kept.
+        Source coordinates in that exemplar, (row, column); 0 for pixels that were kept.
 
     Examples
     --------
@@ -72,55 +72,57 @@ def inpaint(
     shown: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Inpainting:
-    """Return a picture whose unknown pixels are filled from the hole boundary inwards, patch by patch.
+    """Fill the unknown pixels of an image from the hole boundary inwards, patch by patch.
 
-    At each step: good matches of the known pixels in a window on the boundary [1]_, less those that would repeat or
-    mirror what lies near; the three most promising are joined to the known pixels by a minimum cut [2]_, and the cheapest
-    is pasted.
+    Each step searches good matches of the known pixels in a window on the boundary [1]_. Matches that would repeat or
+    mirror their surroundings are dropped. The three best are joined to the known pixels by a minimum cut [2]_, and the
+    cheapest is pasted.
 
     Parameters
     ----------
     colours : (H, W, C) array_like
-        The picture, of any real dtype, as float32 in the units of the exemplars; anything where it is unknown.
+        The image, of any real dtype, read as float32 in the units of the exemplars. Unknown pixels may have any value.
     known : (H, W) array_like of bool
-        False at the holes.
+        False in the holes.
     index : PatchIndex
-        The exemplars that patches are taken from, of C channels.
+        Index of the exemplars that patches are taken from, with C channels.
     patch_size : int or (rows, columns)
-        Size of a patch in pixels, 1 to that of the picture, of an exemplar and of ``index.max_patch``.
+        Size of a patch in pixels, from 1 to the size of the image, of an exemplar and of ``index.max_patch``.
     keep : (H, W) array_like of bool, optional
-        Known pixels that no patch may replace; by default seams may run through all of them.
+        Known pixels that no patch may replace. By default seams may run through all known pixels.
     count : int
-        How many matches are considered, 1 to 1000.
+        Number of matches to consider, 1 to 1000.
     separation : int
-        Matches in one exemplar are more than this many pixels apart, 0 to 2^31.
+        Minimum distance between matches in one exemplar, in pixels, 0 to 2^31.
     ratio : float
-        No match considered costs more than this times the best, 1 to 1e9.
+        Maximum cost of a match, as a multiple of the best one, 1 to 1e9.
     wrap : bool or (rows, columns)
-        Axes along which the picture is cyclic.
+        Axes along which the image is periodic.
     seed : int
-        0 to 2^64 - 1; chooses patches where nothing is known.
+        Seed, 0 to 2^64 - 1. It chooses patches if no pixel is known.
     paper : bool
-        As Shen, Jin, Mao and Feng (2006) print it: holes in scan order, windows centred on them instead of those with
-        the best share of known pixels, all known pixels of one weight instead of more beside the hole, the exact best
-        matches, all of them cut, and plain cut costs. With ``count=1`` that is their completion.
+        If True, fill as Shen, Jin, Mao and Feng (2006) state it. Holes are filled in scan order, with windows centred
+        on them instead of those with the best share of known pixels. All known pixels have one weight, instead of more
+        next to the hole. The exact best matches are all cut, with plain cut costs. With ``count=1`` this is their
+        completion.
     shown : int, optional
-        The image of ``index``, from 0, that the picture shows in place, if it does: what lies beside a hole is then not
-        repeated or mirrored in it. Patches know of each other in any case, and which images of ``index`` are mirrors of others.
+        Index of the image in ``index`` that the image itself shows in place, if any. The surroundings of a hole are
+        then not repeated or mirrored in it. Patches avoid each other in any case, and mirror images in ``index`` are
+        recognised.
     progress : callable, optional
-        Called with the share of the holes that is filled, 0 to 1; raising stops the work.
+        Called with the filled share of the holes, 0 to 1. An exception that it raises stops the work.
 
     Returns
     -------
     Inpainting
-        The filled picture and its sources.
+        The filled image and its sources.
 
     Raises
     ------
     InvalidInput
-        Shapes that do not agree, a patch that does not fit, values that are not finite or out of range.
+        If shapes do not agree, a patch does not fit, or values are not finite or out of range.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     References
     ----------
@@ -144,7 +146,7 @@ def inpaint(
         raise InvalidInput(f"index: needs a PatchIndex, got {type(index).__name__}")
     picture = as_array(colours, "colours", np.float32, ("rows", "columns", "channels"))
     mask = as_mask(known, "known", picture.shape[:2])
-    # In a quarter of the time of `np.where`, which spreads the mask over the channels.
+    # This takes a quarter of the time of `np.where`, which spreads the mask over the channels.
     picture = picture.copy()
     picture[~mask] = 0
     if not np.isfinite(picture).all():
@@ -170,7 +172,7 @@ def inpaint(
         as_progress(progress),
     )
     coordinates = np.zeros((*mask.shape, 2), np.float32)
-    # In a tenth of the time of `np.nonzero`, which looks at each axis apart.
+    # This takes a tenth of the time of `np.nonzero`, which processes each axis separately.
     new = np.unravel_index(np.flatnonzero(label >= 0), label.shape)
     of = patches[label[new]]
     for axis, (at, length) in enumerate(zip(new, mask.shape, strict=True)):

@@ -30,43 +30,43 @@ def mean_shift(
     wrap: bool | tuple[bool, bool] = False,
     progress: Progress | None = None,
 ) -> Array:
-    """Return an image of the modes of the joint spatial and range density, one a pixel.
+    """Filter an image by mean shift: each pixel becomes the mode of its density.
 
-    Each pixel moves to the mean position and colour of the pixels of a square window whose colour
-    is within a range of its own, until it stays (Comaniciu and Meer [1]_, flat kernels). The
-    result is close to that of ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``, for any dtype and
-    any number of channels, and the same for any number of threads and any CPU.
+        Each pixel moves to the mean position and colour of a square window until it stays. Only pixels whose colours
+    are within a range of its own count (Comaniciu and Meer [1]_, flat kernels). The result is close to that of
+    ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. It supports any dtype and any number of channels, and does not
+    depend on the number of threads or the processor.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype but 64-bit integers, of values up to 1e15.
+        Any real dtype except 64-bit integers, with values up to 1e15.
     radius : int
         Half the side of the window in pixels, without the middle; 0 to 1024.
     range : float
         Radius of the ball of colours, in the units of the image; 0 to 1e15.
     max_iterations : int
-        Steps that a pixel takes at most, 0 to 2^31 - 1. Five, as in OpenCV, are enough for most.
+        Maximum number of steps of a pixel, 0 to 2^31 - 1. Five, as in OpenCV, are enough for most pixels.
     tolerance : float, optional
-        A pixel has arrived when its rounded position stays and its colour moves by at most this, 0 to
-        1e15. By default it is enough that the position stays, as in OpenCV; a twentieth of the range
-        goes on until the colour is at its mode too, at about twice the cost.
+        Maximum colour change, 0 to 1e15, of a pixel that has arrived. Its rounded position must also stay. By default a
+        constant position is enough, as in OpenCV. A twentieth of the range continues until the colour is at its mode
+        too, at about twice the cost.
     wrap : bool or (bool, bool)
-        Which axes are cyclic.
+        Axes along which the image is periodic.
     progress : callable, optional
-        Called with the name of the stage and the share that is done; raising stops the work.
+        Called with the name of the stage and its completed share. An exception that it raises stops the work.
 
     Returns
     -------
     ndarray
-        Shape and dtype of the image; integers are rounded.
+        Filtered image, with the shape and dtype of the image. Integers are rounded.
 
     Raises
     ------
     InvalidInput
-        Not an image, one that is not finite, or another argument out of range.
+        If the image is not an image or not finite, or another argument is out of range.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     References
     ----------
@@ -75,7 +75,7 @@ def mean_shift(
 
     Examples
     --------
-    Noise goes, the step between two regions stays:
+    Noise disappears, and the step between two regions stays:
 
     >>> import numpy as np
     >>> image = np.full((16, 16), 50.0)

@@ -1,4 +1,4 @@
-"""Normalised cross-correlation: how alike a template and each window of an image are."""
+"""Normalised cross-correlation: the similarity of a template to each window of an image."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ def __dir__() -> list[str]:
 
 
 class Correlation:
-    """An image made ready to be compared with many templates, whatever their brightness and contrast.
+    """An image prepared for comparison with many templates of any brightness and contrast.
 
-    Each channel is compared for itself. Numerators are products of spectra, and mean and variance of the windows come
-    from running sums [1]_, so the time hardly hangs on the size of a template.
+    Each channel is compared separately. Numerators are products of spectra, and the mean and variance of the windows
+    come from running sums [1]_. The time therefore hardly depends on the size of a template.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype but 64-bit integers; finite.
+        Any real dtype except 64-bit integers; finite.
 
     Raises
     ------
     InvalidInput
-        Not an image, or values beyond what float32 holds.
+        If it is not an image, or has values beyond the range of float32.
 
     References
     ----------
@@ -57,23 +57,23 @@ class Correlation:
         return f"Correlation(shape={self.shape})"
 
     def maps(self, template: object) -> Floats:
-        """Return how alike a template and each window of the image are.
+        """Return the similarity of a template to each window of the image.
 
         Parameters
         ----------
         template : (h, w) or (h, w, C) array_like
-            Any real dtype but 64-bit integers; finite. With the channels of the image, no larger than it.
+            Any real dtype except 64-bit integers; finite. It has the channels of the image and is not larger.
 
         Returns
         -------
         (H - h + 1, W - w + 1, C) float32
-            For each window, named by its first row and column, the correlation coefficient of each channel, -1 to 1;
-            0 where the window or the template is flat. Rounded to 20 bits after the point.
+            Correlation coefficient of each window and channel, -1 to 1, at the first row and column of the window. 0
+            if the window or the template is constant. Rounded to 20 bits after the point.
 
         Raises
         ------
         InvalidInput
-            Not an image, larger than the image, or of other channels.
+            If it is not an image, is larger than the image, or has other channels.
 
         Examples
         --------

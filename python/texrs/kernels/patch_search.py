@@ -37,16 +37,16 @@ _MOST = 2**31 - 1
 
 @dataclass(frozen=True, slots=True, order=True)
 class Match:
-    """A position and its cost; sorts by cost, then by position.
+    """A position and its cost. Matches sort by cost, then by position.
 
     Attributes
     ----------
     cost : float
         Weighted sum of squared differences, in the units of the images; at least 0.
     exemplar : int
-        Which of the images, counted from 0.
+        Index of the image, from 0.
     row, column : int
-        Of the top-left corner of the patch in that image, in pixels.
+        Top-left corner of the patch in this image, in pixels.
 
     Examples
     --------
@@ -63,31 +63,31 @@ class Match:
 
 
 class PatchIndex:
-    """An index of images, to be searched for many patches.
+    """An index of images for the search of many patches.
 
-    The cost of a position is ``sum(weight * (patch - window) ** 2)`` over the pixels and channels.
-    All positions are filtered by Fourier correlation as in Kwatra et al. [1]_; those that could be
-    the minimum within the error bound of the filter are scored again in float64. So results are
-    exact, the same for any number of threads and any CPU, and ties go to the lowest (exemplar,
-    row, column).
+    The cost of a position is ``sum(weight * (patch - window) ** 2)`` over the pixels and channels. All positions are
+    filtered by Fourier correlation as in Kwatra et al. [1]_. Positions that could be the minimum within the error
+    bound of the filter are scored again in float64. Results are therefore exact, and the same for any number of
+    threads and any processor. Ties go to the lowest (exemplar, row, column).
 
     Parameters
     ----------
     images : (H, W) or (H, W, C) array_like, or a list or tuple of them
-        One image, or several that agree in channels, not in size. Any real dtype but
-        64-bit integers; compared as float32, in the units given.
+        One image, or several that agree in channels but not in size. Any real dtype except 64-bit integers. They are
+        compared as float32, in the given units.
     allowed : (H, W) array_like of bool, or a list or tuple of them, optional
-        Which positions (top-left corners of patches) may be used. One mask for a single image; for
-        several images one each, in which None allows all.
+        Mask of the positions (top-left corners of patches) that may be used. One mask for a single image. For several
+        images one mask each, where None allows all positions.
     max_patch : int or (rows, columns), optional
-        Size of the largest patch that will be looked for, in pixels. The smaller, the less there is
-        to compute. By default 64, or what fits into the images.
+        Size of the largest patch to search for, in pixels. Smaller values need less work. Default: 64, or the largest
+        that fits into the images.
 
     Raises
     ------
     InvalidInput
-        No images, values that float32 does not hold, different numbers of channels, or a mask that
-        does not fit its image.
+                If images are missing, values are beyond the range of float32, different numbers of channels, or a mask
+        that does
+        not fit its image.
 
     References
     ----------
@@ -102,7 +102,7 @@ class PatchIndex:
     >>> index.best(image[20:36, 50:66])
     [Match(cost=0.0, exemplar=0, row=20, column=50)]
 
-    Pixels without weight are not looked at:
+    Pixels without weight are ignored:
 
     >>> patch = image[20:36, 50:66].astype(float)
     >>> known = np.ones((16, 16))
@@ -133,26 +133,26 @@ class PatchIndex:
         return f"PatchIndex(shapes={self.shapes}, max_patch={self.max_patch})"
 
     def again(self, *, allowed: object = None, max_patch: int | tuple[int, int] | None = None) -> PatchIndex:
-        """Return an index of the same images for patches of another size, or where other positions may be used.
+        """Return an index of the same images for another patch size or other allowed positions.
 
-        What hangs on the images alone is worked out once for all.
+        Data that depend on the images only are computed once and shared.
 
         Parameters
         ----------
         allowed : (H, W) array_like of bool, or a list or tuple of them, optional
-            Which positions may be used; by default all.
+            Mask of the positions that may be used. By default all positions.
         max_patch : int or (rows, columns), optional
-            Size of the largest patch that will be looked for, in pixels. By default 64, or what fits into the images.
+            Size of the largest patch to search for, in pixels. Default: 64, or the largest that fits into the images.
 
         Returns
         -------
         PatchIndex
-            It finds what one that is made anew finds.
+            Index that returns the same matches as a new one.
 
         Raises
         ------
         InvalidInput
-            A mask that does not fit its image.
+            If a mask does not fit its image.
 
         Examples
         --------
@@ -170,7 +170,7 @@ class PatchIndex:
 
     @property
     def max_patch(self) -> tuple[int, int]:
-        """Rows and columns of the largest patch that can be looked for, in pixels."""
+        """Rows and columns of the largest patch that can be searched for, in pixels."""
         rows, columns = self._index.max_patch
         return rows, columns
 
@@ -179,34 +179,33 @@ class PatchIndex:
     ) -> list[Match]:
         """Return the best positions of a patch.
 
-        Greedy: the best position of all, then the best one far enough from it, and so on.
+        The search is greedy: the best position, then the best one that is far enough from it, and so on.
 
         Parameters
         ----------
         patch : (p, q) or (p, q, C) array_like
-            Any real dtype, in the units of the images. Where the weight is zero anything, NaN too.
+            Any real dtype, in the units of the images. Pixels of zero weight may have any value, including NaN.
         weight : (p, q) array_like, optional
-            Not negative; zero where the patch is unknown, bool allowed. By default 1 everywhere. If
-            all are zero every position costs nothing, and the first ones are returned.
+            Weight of each pixel, at least 0; bool is allowed. It is zero where the patch is unknown. Default: 1
+            everywhere. If all weights are zero, every position costs nothing and the first ones are returned.
         count : int
-            At most this many matches, 1 to 2^31 - 1.
+            Maximum number of matches, 1 to 2^31 - 1.
         separation : int
-            Matches in one image are more than this many pixels apart, along rows or along columns;
-            0 to 2^31 - 1.
+            Minimum distance between matches in one image, in pixels along rows or columns; 0 to 2^31 - 1.
         ratio : float
-            No match costs more than this times the least cost; at least 1, infinite allowed.
+            Maximum cost of a match, as a multiple of the least cost; at least 1, infinity is allowed.
 
         Returns
         -------
         list of Match
-            By rising cost; fewer than ``count`` where separation, ratio or the allowed positions
-            leave no more.
+            Matches by rising cost. There are fewer than ``count`` if separation, ratio or the allowed positions
+            exclude the rest.
 
         Raises
         ------
         InvalidInput
-            A patch that fits into no image or is larger than ``max_patch``, a negative weight, or
-            another argument out of range.
+            If the patch fits into no image or is larger than ``max_patch``, a weight is negative, or another argument
+            is out of range.
 
         Examples
         --------
@@ -235,29 +234,29 @@ class PatchIndex:
         Parameters
         ----------
         patch : (p, q) or (p, q, C) array_like
-            Any real dtype, in the units of the images. Where the weight is zero anything, NaN too.
+            Any real dtype, in the units of the images. Pixels of zero weight may have any value, including NaN.
         weight : (p, q) array_like, optional
-            Not negative; zero where the patch is unknown, bool allowed. By default 1 everywhere.
+            Weight of each pixel, at least 0; bool is allowed. It is zero where the patch is unknown. Default: 1
+            everywhere.
         candidates : iterable of (exemplar, row, column)
-            The positions, integers; the masks ``allowed`` play no part.
+            Positions to compare, as integers. The masks ``allowed`` are ignored.
         count : int
-            At most this many matches, 1 to 2^31 - 1.
+            Maximum number of matches, 1 to 2^31 - 1.
         separation : int
-            Matches in one image are more than this many pixels apart, along rows or along columns;
-            0 to 2^31 - 1.
+            Minimum distance between matches in one image, in pixels along rows or columns; 0 to 2^31 - 1.
         ratio : float
-            No match costs more than this times the least cost; at least 1, infinite allowed.
+            Maximum cost of a match, as a multiple of the least cost; at least 1, infinity is allowed.
 
         Returns
         -------
         list of Match
-            By rising cost; fewer than ``count`` where separation, ratio or the candidates leave no
-            more.
+            Matches by rising cost. There are fewer than ``count`` if separation, ratio or the candidates exclude the
+            rest.
 
         Raises
         ------
         InvalidInput
-            A candidate at which the patch lies beyond its image, or what `best` refuses.
+            If the patch at a candidate is not inside its image, or an argument is invalid for `best`.
 
         Examples
         --------
@@ -270,7 +269,7 @@ class PatchIndex:
         samples, weights = self._as_query(patch, weight)
         most = (len(self.shapes) - 1, _MOST, _MOST)
         positions: Any = [
-            # The type first: it costs a tenth of the full check, and there may be many.
+            # Check the type first: it costs a tenth of the full check, and there may be many candidates.
             tuple(
                 n if type(n) is int and 0 <= n <= high else as_int(n, "candidates", 0, high)
                 for n, high in zip(as_tuple(place, "candidates", 3, "(exemplar, row, column) each"), most, strict=True)
@@ -287,22 +286,23 @@ class PatchIndex:
         Parameters
         ----------
         patch : (p, q) or (p, q, C) array_like
-            Any real dtype, in the units of the images. Where the weight is zero anything, NaN too.
+            Any real dtype, in the units of the images. Pixels of zero weight may have any value, including NaN.
         weight : (p, q) array_like, optional
-            Not negative; zero where the patch is unknown, bool allowed. By default 1 everywhere.
+            Weight of each pixel, at least 0; bool is allowed. It is zero where the patch is unknown. Default: 1
+            everywhere.
         exemplar : int
-            Which image, counted from 0.
+            Index of the image, from 0.
 
         Returns
         -------
         (H - p + 1, W - q + 1) float32
-            As the filter sees them, with an error of about 1e-5 of the typical cost. Infinite where
-            not allowed. `best` and `best_among` give exact costs.
+            Costs from the filter, with an error of about 1e-5 of the typical cost. Infinite where not allowed. `best`
+            and `best_among` return exact costs.
 
         Raises
         ------
         InvalidInput
-            An image that is not there, one that the patch does not fit into, or what `best` refuses.
+            If the image does not exist or is smaller than the patch, or an argument is invalid for `best`.
 
         Examples
         --------

@@ -20,8 +20,7 @@ def __dir__() -> list[str]:
 
 
 Boundary: TypeAlias = Literal["dirichlet", "periodic", "free"]
-"""What happens at the ends of an axis: the outermost pixels keep their values, the axis is cyclic,
-or nothing lies beyond."""
+"""Condition at the ends of an axis: the outermost pixels are fixed, the axis is periodic, or the ends are free."""
 
 _BOUNDARIES = ("dirichlet", "periodic", "free")
 
@@ -36,44 +35,42 @@ def solve(
     mask: object = None,
     progress: Callable[[float], object] | None = None,
 ) -> Floats:
-    """Return the image with the gradients wanted whose values stay near a given image.
+    """Solve for the image with given gradients that stays near a given image.
 
-    Minimises ``sum((v[q] - v[p] - g[p, q]) ** 2) + screening * sum((v - image) ** 2)`` over pairs
-    of neighbours p, q [1]_ [2]_. A whole rectangle is solved directly, pixels under a mask by
-    conjugate gradients with a multigrid preconditioner; both in float32, within a small part of a
-    grey level.
+    The result minimises ``sum((v[q] - v[p] - g[p, q]) ** 2) + screening * sum((v - image) ** 2)`` over pairs of
+    neighbours p, q [1]_ [2]_. A whole rectangle is solved directly. Pixels under a mask are solved by conjugate
+    gradients with a multigrid preconditioner. Both work in float32, within a small part of a grey level.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        The values to stay near, and those of all pixels that are fixed. Any real dtype but 64-bit integers; finite.
+        The values to stay near, and the values of all fixed pixels. Any real dtype except 64-bit integers; finite.
     gradient_rows, gradient_columns : array_like
-        Of the image's shape: the difference wanted from each pixel to the one in the next row, and
-        to the one in the next column. The last row of the one and the last column of the other
-        count on periodic axes alone.
+        Requested differences from each pixel to the one in the next row, and to the one in the next column, in the
+        image's shape. The last row and the last column count on periodic axes only.
     screening : float
-        Weight of the image against the differences, at least 0; 0 for the Poisson equation. Colours
-        drift over about ``screening ** -0.5`` pixels.
+        Weight of the image compared with the differences, at least 0. If 0, this is the Poisson equation. Colours drift
+        over about ``screening ** -0.5`` pixels.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
-        The outermost ring of pixels keeps its values, or the axis is cyclic, or nothing lies
-        beyond; for both axes, or for the rows' and the columns'.
+        The outermost pixels keep their values, the axis is periodic, or the ends are free. One value for both axes, or
+        one for the rows' and one for the columns' axis.
     mask : (H, W) array_like of bool, optional
-        The pixels to solve. All others keep their values. By default all.
+        Pixels to solve. All others keep their values. By default all pixels.
     progress : callable, optional
-        Called with the share that is done, 0 to 1; raising stops the work.
+        Called with the completed share, 0 to 1. An exception that it raises stops the work.
 
     Returns
     -------
     ndarray
-        Float32, of the image's shape, neither rounded nor clipped. Where no pixel is fixed and
-        ``screening`` is 0, the mean is that of the image.
+        Solution in float32, of the image's shape, neither rounded nor clipped. If no pixel is fixed and ``screening``
+        is 0, its mean is the mean of the image.
 
     Raises
     ------
     InvalidInput
-        Shapes that differ, values that are not finite, a negative screening, an unknown boundary.
+        If shapes differ, values are not finite, the screening is negative, or a boundary is unknown.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     References
     ----------
@@ -84,7 +81,7 @@ def solve(
 
     Examples
     --------
-    A step in the middle of an image disappears when no difference is wanted there:
+    A step in the middle of an image disappears if the requested difference is 0 there:
 
     >>> import numpy as np
     >>> image = np.zeros((8, 8))
@@ -120,29 +117,29 @@ def spread(
 ) -> None:
     """Solve ``(L + screening) v = flow`` in place.
 
-    L is the Laplacian, the sum of the differences of a pixel to its neighbours: v is what `solve` adds to its image. For
-    corrections of large pictures, where one array less counts.
+    L is the Laplacian, the sum of the differences of a pixel to its neighbours. v is the difference between the result
+    of `solve` and its image. For corrections of large images, where one array less matters.
 
     Parameters
     ----------
     flow : (H, W, C) ndarray of float32
-        The divergence wanted; contiguous, writeable and finite. Becomes the solution, 0 where pixels are fixed.
+        Requested divergence; contiguous, writeable and finite. It becomes the solution, which is 0 at fixed pixels.
     screening : float
-        At least 0; 0 for the Poisson equation.
+        Weight of the image, at least 0. If 0, this is the Poisson equation.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
-        The outermost ring of pixels is 0, or the axis is cyclic, or nothing lies beyond; for both axes, or for the rows'
-        and the columns'.
+        The outermost pixels are 0, the axis is periodic, or the ends are free. One value for both axes, or one for the
+        rows' and one for the columns' axis.
     mask : (H, W) array_like of bool, optional
-        The pixels to solve; all others are 0. By default all.
+        Pixels to solve. All others are 0. By default all pixels.
     progress : callable, optional
-        Called with the share that is done, 0 to 1; raising stops the work.
+        Called with the completed share, 0 to 1. An exception that it raises stops the work.
 
     Raises
     ------
     InvalidInput
-        Another kind of array, or an option that `solve` refuses.
+        If the array is of another kind, or an option is invalid for `solve`.
     Cancelled
-        The work was stopped; ``flow`` is then of no use.
+        If the work was stopped. ``flow`` then holds no useful values.
 
     Examples
     --------
@@ -174,39 +171,38 @@ def blend(
     mixed: bool = False,
     wrap: bool | tuple[bool, bool] = False,
 ) -> Array:
-    """Return an image with a part of another cloned into it without a seam.
+    """Clone a part of another image into an image without a visible seam.
 
-    Under the mask the result has the gradients of the source, outside it the values of the
-    target.
+    Under the mask the result has the gradients of the source. Elsewhere it has the values of the target.
 
     Parameters
     ----------
     source, target : (H, W) or (H, W, C) array_like
-        The same shape for both, in register. Any real dtype but 64-bit integers; finite.
+        Two images of the same shape, in register. Any real dtype except 64-bit integers; finite.
     mask : (H, W) array_like of bool
-        The pixels to take from the source.
+        Pixels to take from the source.
     screening : float
-        How much the source's own values count, next to its gradients, at least 0: 0 lets colours go
-        all the way to those of the target, 1 all but keeps the source's.
+                Weight of the source's own values compared with its gradients, at least 0. If 0, the colours adapt
+        completely to the target; if 1, they hardly change. Default: 0.
     mixed : bool
-        Take the larger of the differences of source and target at each pair of pixels, so that the
-        texture of the target shows through flat parts of the source.
+                If True, use the larger of the two differences at each pair of pixels. The texture of the target is
+        then visible in flat parts of the source.
     wrap : bool or (bool, bool)
-        Which axes are cyclic.
+        Axes along which the images are periodic.
 
     Returns
     -------
     ndarray
-        Shape and dtype of the target, within its range; integers are rounded.
+        Image with the shape, dtype and range of the target. Integers are rounded.
 
     Raises
     ------
     InvalidInput
-        Shapes that differ, values that are not finite, a negative screening.
+        If shapes differ, values are not finite, or the screening is negative.
 
     Examples
     --------
-    The texture of one image in the light of another:
+    The texture of one image with the light of another:
 
     >>> import numpy as np
     >>> stripes = np.tile(np.uint8([20, 40]), (16, 8))
@@ -227,9 +223,9 @@ def blend(
         raise InvalidInput(f"source: needs the target's shape {shape}, got {source.shape}")
     inside, weight = as_mask(mask, "mask", onto.shape[:2]), _as_weight(screening)
     values, other = (_as_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
-    # With v = source + c no difference is wanted of c, but where the target shows through.
+    # With v = source + c the requested differences of c are 0, except where the target shows through.
     if inside.all() and weight == 0:
-        # Nothing is left of the target but its mean.
+        # Only the mean of the target remains.
         correction = np.empty(onto.shape, np.float32)
         correction[...] = values.mean((0, 1)) - other.mean((0, 1))
     else:
@@ -257,16 +253,16 @@ def _subtract_outside(values: Array, other: Array, inside: Bools) -> Floats:
 
 
 def _mix_gradients(values: Array, other: Array, axis: int) -> Floats:
-    """Return by how much the target's differences exceed the source's, where they are the larger ones."""
+    """Return the excess of the target's differences over the source's, where the target's are larger."""
     floats = (v.astype(np.float32) for v in (other, values))
     wanted, present = (np.roll(v, -1, axis) - v for v in floats)
     return np.where(np.abs(present) > np.abs(wanted), present - wanted, np.float32(0))
 
 
 def _write_into(onto: Array, solved: Floats, inside: Bools) -> None:
-    """Put the solution into the target under the mask, in the target's dtype."""
+    """Write the solution into the target under the mask, in the target's dtype."""
     if onto.dtype.kind in "ui" and onto.dtype.itemsize <= 2:
-        # Outside the mask the sum of source and correction is the target exactly.
+        # Outside the mask the sum of source and correction equals the target exactly.
         info = np.iinfo(onto.dtype)
         onto[...] = np.clip(np.rint(solved, out=solved), info.min, info.max, out=solved)
     elif onto.dtype == np.bool_:
@@ -282,12 +278,12 @@ def _write_into(onto: Array, solved: Floats, inside: Bools) -> None:
 
 
 def _divide_rows(rows: int) -> Iterator[slice]:
-    """Divide rows so that what is made of them stays in the cache."""
+    """Return ranges of rows whose intermediate results fit into the cache."""
     return (slice(first, first + 32) for first in range(0, rows, 32))
 
 
 def _as_numbers(array: Array, name: str) -> Array:
-    """Return values that float32 holds; others than float64 as they are."""
+    """Return values within the range of float32. Only float64 is converted."""
     return _as_floats(array, name) if array.dtype == np.float64 else array
 
 

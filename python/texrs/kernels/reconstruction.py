@@ -1,4 +1,4 @@
-"""Grey-scale reconstruction: what is left of an image without its small domes."""
+"""Grey-scale reconstruction: an image without its small domes."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ def __dir__() -> list[str]:
 
 
 def reconstruct(seed: object, mask: object, *, wrap: bool | tuple[bool, bool] = False) -> Floats:
-    """Return the largest image below a mask that is reached from a seed.
+    """Return the largest image below a mask that a seed reaches.
 
-    The seed is dilated by a pixel again and again, over its eight neighbours, and each time held under the mask, until
-    nothing changes (Vincent [1]_). The result is that of ``skimage.morphology.reconstruction``.
+    The seed is dilated by one pixel over its eight neighbours, and limited by the mask, again and again until nothing
+    changes (Vincent [1]_). The result is that of ``skimage.morphology.reconstruction``.
 
     Parameters
     ----------
     seed, mask : (H, W) array_like
-        Any real dtype, as single precision; the seed counts no higher than the mask.
+        Any real dtype, read in single precision. Seed values above the mask count as the mask.
     wrap : bool or (bool, bool)
-        Which axes are cyclic.
+        Axes along which the images are periodic.
 
     Returns
     -------
     (H, W) float32
-        Nowhere above the mask.
+        The reconstruction, nowhere above the mask.
 
     Raises
     ------
     InvalidInput
-        Arrays of different shapes, or values that are no numbers.
+        If the arrays have different shapes, or values that are not numbers.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     References
     ----------
@@ -47,7 +47,7 @@ def reconstruct(seed: object, mask: object, *, wrap: bool | tuple[bool, bool] = 
 
     Examples
     --------
-    Of two hills, the lower one rises above its foot by less than one, and goes:
+    The lower one of two hills rises above its foot by less than one, and disappears:
 
     >>> import numpy as np
     >>> hills = np.array([[0.0, 5.0, 2.0, 2.5, 0.0]])

@@ -29,43 +29,43 @@ def merge(
     wrap: bool | tuple[bool, bool] = False,
     progress: Progress | None = None,
 ) -> Labels:
-    """Return the regions of one colour that an image consists of.
+    """Segment an image into regions of one colour.
 
-    Pixels are joined with their eight neighbours, those first whose colours differ the least, as long as the step between
-    two regions is less than what either bears: the largest step that it was joined over, and the scale over its area
-    (Felzenszwalb and Huttenlocher [1]_). The regions are those of ``skimage.segmentation.felzenszwalb`` and are numbered
-    alike, where no two steps are of one size: then the first pixel's is the first, on any machine. They are the same for any
-    number of threads.
+    Pixels are joined with their eight neighbours, those with the smallest colour difference first. Two regions are
+    joined if the step between them is less than the tolerance of both. The tolerance is the largest step that a region
+    was joined over, plus the scale divided by its area (Felzenszwalb and Huttenlocher [1]_). The regions are those of
+    ``skimage.segmentation.felzenszwalb``, with the same numbers if no two steps are equal. Equal steps are joined in
+    the order of their pixels, on any processor and for any number of threads.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype but 64-bit integers, of values up to 1e15. Fewer than 2^30 pixels.
+        Any real dtype except 64-bit integers, with values up to 1e15. Fewer than 2^30 pixels.
     scale : float
-        What a single pixel bears, in the units of the image, 0 to 1e15; more makes larger regions. scikit-image's scale
-        is 255 times this, of an image in 0..1.
+        Tolerance of a single pixel, in the units of the image, 0 to 1e15. Larger values give larger regions. The scale
+        of scikit-image is 255 times this, if the image is in 0 to 1.
     blur : float
-        Standard deviation of the Gaussian that smooths the image before, in pixels, 0 to 64.
+        Standard deviation of the Gaussian that smooths the image first, in pixels, 0 to 64.
     least : int
-        Least area of a region in pixels; smaller ones are joined with the neighbour that they differ from the least.
+        Minimum area of a region in pixels. Smaller regions are joined with the most similar neighbour.
     wrap : bool or (bool, bool)
-        Which axes are cyclic.
+        Axes along which the image is periodic.
     progress : callable, optional
-        Called with the name of the stage and the share that is done; raising stops the work.
+        Called with the name of the stage and its completed share. An exception that it raises stops the work.
 
     Returns
     -------
     (H, W) int32
-        The region of each pixel, from 0, in the order of their first pixels.
+        Region of each pixel, from 0, in the order of the first pixels.
 
     Raises
     ------
     InvalidInput
-        Not an image, one that is not finite, or another argument out of range.
+        If the image is not an image or not finite, or another argument is out of range.
     LimitExceeded
-        More pixels than edges can be numbered of.
+        If there are more pixels than edge numbers allow.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     References
     ----------
@@ -74,7 +74,7 @@ def merge(
 
     Examples
     --------
-    Two halves under noise:
+    Two halves with noise:
 
     >>> import numpy as np
     >>> image = np.full((16, 16), 50.0)

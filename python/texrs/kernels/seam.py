@@ -1,4 +1,4 @@
-"""Minimum cuts on grids: where two images meet least visibly, and binary labels of least energy."""
+"""Minimum cuts on grids: the least visible seam between two images, and binary labels of minimum energy."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ Cost: TypeAlias = Literal["gradient", "paper"]
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Which of two images each pixel takes.
+    """Choice between two images at each pixel.
 
     Attributes
     ----------
     mask : (H, W) or (D, H, W) bool
-        True where a pixel takes B. Elsewhere it takes A where A covers it, and else neither.
+        True for pixels of B. Other pixels are of A if A covers them, else of neither.
     value : float
-        Sum of the costs of the edges of the seam inside the overlap, old seams that stay included; at least 0.
+        Sum of the costs of the seam's edges inside the overlap, including old seams that stay; at least 0.
     edges : int
-        Number of pairs of neighbours in the overlap that the seam parts.
+        Number of pairs of neighbours in the overlap that the seam separates.
 
     Examples
     --------
@@ -54,21 +54,21 @@ class Cut:
 
 @dataclass(frozen=True, slots=True)
 class OldSeams:
-    """Seams that A already contains: costs, an array of the canvas' shape for each axis in each field.
+    """Costs of seams that A already contains: in each field an array of the canvas' shape for each axis.
 
-    Entry ``p`` for an axis belongs to the pair of ``p`` and its next pixel ``q`` along that axis.
-    Write ``M(p, q, S, T)`` for the cost of a seam between ``p``, taken from ``S``, and ``q``, taken
-    from ``T``; let A show source ``S`` at ``p`` and ``T`` at ``q``.
+    Entry ``p`` of an axis belongs to the pair of ``p`` and its next pixel ``q`` along this axis. Let ``M(p, q, S, T)``
+    be the cost of a seam between ``p`` from ``S`` and ``q`` from ``T``. Let A show source ``S`` at ``p`` and ``T`` at
+    ``q``.
 
     Attributes
     ----------
     kept : sequence of array_like
-        ``M(p, q, S, T)``, at least 0, paid where both keep A; 0 where there is no old seam, which
-        leaves the pair its ordinary cost.
+                ``M(p, q, S, T)``, at least 0, the cost if both keep A. 0 without an old seam: the pair then has its
+        ordinary cost.
     ab : sequence of array_like
-        ``M(p, q, S, B)``, at least 0, paid where ``p`` keeps A and ``q`` takes B.
+        ``M(p, q, S, B)``, at least 0, the cost if ``p`` keeps A and ``q`` takes B.
     ba : sequence of array_like
-        ``M(p, q, B, T)``, at least 0, paid where ``p`` takes B and ``q`` keeps A.
+        ``M(p, q, B, T)``, at least 0, the cost if ``p`` takes B and ``q`` keeps A.
 
     Examples
     --------
@@ -87,12 +87,12 @@ class OldSeams:
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """Binary labels of least energy.
+    """Binary labels of minimum energy.
 
     Attributes
     ----------
     mask : (H, W) or (D, H, W) bool
-        The labels; of all best labellings, that with the fewest True.
+        The labels. Among equally good labels, those with the fewest True.
     energy : float
         Sum of the costs of all points and pairs, in their units.
 
@@ -123,38 +123,37 @@ def cut(
     cost: Cost = "gradient",
     wrap: bool | Sequence[bool] = False,
 ) -> Cut:
-    """Return where two overlapping images meet least visibly, by an exact minimum cut [1]_.
+    """Find the least visible seam between two overlapping images, by an exact minimum cut [1]_.
 
-    Pixels that one image alone covers take that image. In the overlap, pixels of a core are hard
-    constraints: they take its image. Of the others, those beside a pixel that only A covers take A,
-    then those beside one that only B covers take B; the rest is chosen so that the costs of all
-    pairs of neighbours that the seam parts sum to the least. Where that leaves a choice, as few
-    pixels as possible take B: in an overlap without a pixel constrained to B, none does.
+        Pixels that only one image covers take this image. Pixels of a core inside the overlap are hard constraints:
+    they take
+    its image. Next, pixels adjacent to one that only A covers take A, then pixels adjacent to one that only B covers
+    take B. The others are chosen so that the total cost of all pairs of neighbours that the seam separates is minimal.
+    If several choices are minimal, as few pixels as possible take B. If no pixel is constrained to B, none takes B.
 
     Parameters
     ----------
     a, b : array_like
-        The image that is there and the one that is added, on one canvas: (H, W) or (H, W, C); or
-        volumes (D, H, W[, C]) with masks of three axes. Any dtype; brought to [0, 1] together.
-        Finite everywhere.
+        The existing and the added image, on one canvas: (H, W) or (H, W, C), or volumes (D, H, W[, C]) with masks of
+        three axes. Any dtype; both are scaled to [0, 1] together. Finite everywhere.
     mask_a, mask_b : (H, W) or (D, H, W) array_like of bool
-        Which pixels each covers.
+        Pixels that each image covers.
     core_a, core_b : array_like of bool, optional
-        Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must
-        cover its core. By default none.
+        Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must cover its core. By
+        default none.
     penalty : float or array_like of float, optional
-        At least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean of
-        its two penalties, which keeps seams out of things that should stay whole.
+                Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus
+        the mean of its two penalties,
+        which keeps seams out of elements that should stay whole.
     old : OldSeams, optional
-        Seams that A already contains, so that they can be covered. A seam that costs more than what
-        replaces it on both sides together (which needs a cost that breaks the triangle inequality)
-        counts as that sum.
+        Seams that A already contains, which can then be covered. An old seam that costs more than its two replacements
+        together counts as their sum. This only happens with a cost that breaks the triangle inequality.
     cost : {"gradient", "paper"}
-        The cost of parting neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed
-        over channels. "gradient": the same over ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``, which
-        hides seams along edges. Both plus 1e-4, so that ties go to the shorter seam.
+        Cost of separating neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed over channels.
+        "gradient": the same over ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``, which hides seams along edges. Both plus
+        1e-4, so that ties go to the shorter seam.
     wrap : bool or sequence of bool
-        Which axes are cyclic.
+        Axes along which the canvas is periodic.
 
     Returns
     -------
@@ -164,15 +163,16 @@ def cut(
     Raises
     ------
     InvalidInput
-        Shapes that differ, values that are not finite, negative penalties, a core outside its
-        image, or cores that share a pixel.
+        If shapes differ, values are not finite, penalties are negative, a core is outside its image, or cores share a
+        pixel.
 
     Metadata
     -----
-    Costs are rounded to multiples of 2^-16, or coarser where the largest exceeds 2^10. Time grows
-    with the bounding box of the overlap. Where one connected core of B lies on a plane, and what is
-    constrained to A lies around it, the seam is a shortest closed path on the dual of the grid [2]_, found
-    several times faster than by maximum flow; it is the same seam.
+    Costs are rounded to multiples of 2^-16, or coarser if the largest exceeds 2^10. Time grows with the bounding box
+        of the overlap. One connected core of B on a plane may be surrounded by pixels constrained to A. The seam is
+    then a shortest closed path on the dual of the grid [2]_. It is the same seam, found several times faster than by
+    maximum
+    flow.
 
     References
     ----------
@@ -227,37 +227,37 @@ def cut_strip(
     penalty: ArrayLike | None = None,
     cost: Cost = "gradient",
 ) -> Cut:
-    """Return the least visible seam from border to border of two images that overlap altogether.
+    """Find the least visible seam from border to border of two images that overlap completely.
 
-    The first line along ``axis`` takes A, the last one takes B. The seam may turn back: it is the
-    exact minimum cut, found as a shortest path on the dual of the grid, hundreds of times faster
-    than by maximum flow [1]_.
+        The first line along ``axis`` takes A, and the last one takes B. The seam may turn back, because it is the
+    exact minimum cut. It is found as a shortest path on the dual of the grid, hundreds of times faster than by maximum
+    flow [1]_.
 
     Parameters
     ----------
     a, b : (H, W) or (H, W, C) array_like
-        Images of one shape. Any real dtype; brought to [0, 1] together. Finite.
+        Images of one shape. Any real dtype; both are scaled to [0, 1] together. Finite.
     axis : {0, 1}
-        The axis that the seam crosses: 1 for A at the left and B at the right, 0 for A above B.
+        Axis that the seam crosses: 1 for A at the left and B at the right, 0 for A above B.
     cyclic : bool
-        Whether the other axis is cyclic: the seam then closes on itself [2]_, which a seam that is
-        cut open cannot do.
+        If True, the other axis is periodic and the seam closes on itself [2]_. A seam of an opened axis need not
+        close.
     penalty : float or (H, W) array_like of float, optional
-        At least 0. The cost of a pair is multiplied by one plus the mean of its two penalties.
+        Penalty of each pixel, at least 0. The cost of a pair is multiplied by one plus the mean of its two penalties.
     cost : {"gradient", "paper"}
-        The cost of parting neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed
-        over channels. "gradient": the same over ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``.
+        Cost of separating neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed over channels.
+        "gradient": the same over ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``.
 
     Returns
     -------
     Cut
-        Mask (True where B is taken), value and number of edges.
+        Mask (True for pixels of B), value and number of edges.
 
     Raises
     ------
     InvalidInput
-        Shapes that differ, fewer than two pixels along ``axis``, values that are not finite, or
-        negative penalties.
+        If shapes differ, there are fewer than two pixels along ``axis``, values are not finite, or penalties are
+        negative.
 
     References
     ----------
@@ -287,16 +287,16 @@ def cut_strip(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strip:
-    """Two images of one shape that overlap altogether, one of many that `cut_strips` cuts.
+    """Two images of one shape that overlap completely, for `cut_strips`.
 
     Attributes
     ----------
     a, b : (H, W, C) array_like
-        Numbers about [0, 1]: costs are measured on them as they are. Finite.
+        Numbers within about [0, 1]. They are not rescaled before costs are computed. Finite.
     axis : {0, 1}
-        The axis that the seam crosses.
+        Axis that the seam crosses.
     penalty : float or (H, W) array_like of float, optional
-        At least 0, as in `cut`.
+        Penalty of each pixel, at least 0, as in `cut`.
 
     Examples
     --------
@@ -314,26 +314,26 @@ class Strip:
 
 
 def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "gradient") -> list[Cut]:
-    """Return the seams of many strips, found in parallel, each as by `cut_strip`.
+    """Find the seams of many strips in parallel, each as by `cut_strip`.
 
     Parameters
     ----------
     strips : sequence of Strip
-        Of any shapes.
+        Strips of any shapes.
     cyclic : bool
-        Whether the axis that a seam runs along is cyclic, for all of them.
+        If True, the axis along the seam is periodic in all strips.
     cost : {"gradient", "paper"}
-        The cost of parting neighbours, for all of them (see `cut_strip`).
+        Cost of separating neighbours in all strips (see `cut_strip`).
 
     Returns
     -------
     list of Cut
-        One a strip.
+        One cut for each strip.
 
     Raises
     ------
     InvalidInput
-        Something else than strips, or one that `cut_strip` refuses.
+        If an entry is not a strip, or is invalid for `cut_strip`.
 
     Examples
     --------
@@ -365,18 +365,18 @@ def binary_labels(
     *,
     wrap: bool | Sequence[bool] = False,
 ) -> Labels:
-    """Return the labels, True or False, of the points of a grid whose costs sum to the least [1]_.
+    """Label the points of a grid True or False at the minimum total cost [1]_.
 
     Parameters
     ----------
     unary : (H, W, 2) or (D, H, W, 2) array_like of float
-        Cost of False and of True at each point. Infinity forbids a label.
+        Cost of False and cost of True at each point. Infinity forbids a label.
     pairwise : float or sequence
-        Cost of neighbours that differ, at least 0: one number for all, or one entry an axis: a
-        number, an array of the grid's shape (the entry of ``p`` is for ``p`` and the next point),
-        or a tuple of two such, the first for False before True, the second for True before False.
+                Cost of neighbours with different labels, at least 0: one number for all, or one entry for each axis.
+        An entry is a number, or an array of the grid's shape, where the entry of ``p`` is for ``p`` and the next
+        point. It may also be a tuple of two arrays: False before True, and True before False.
     wrap : bool or sequence of bool
-        Which axes are cyclic.
+        Axes along which the grid is periodic.
 
     Returns
     -------
@@ -386,13 +386,13 @@ def binary_labels(
     Raises
     ------
     InvalidInput
-        Shapes that do not fit, negative or infinite pairwise costs, NaN, or a point at which both
-        labels are forbidden.
+        If shapes do not fit, pairwise costs are negative or infinite, values are NaN, or both labels are forbidden at
+        a point.
 
     Metadata
     -----
-    Costs are float32, rounded to multiples of the power of two of which the largest pairwise cost
-    is 2^25 to 2^26.
+    Costs are float32, rounded to multiples of a power of two. It is chosen so that the largest pairwise cost is 2^25
+    to 2^26 multiples.
 
     References
     ----------
@@ -428,7 +428,7 @@ def binary_labels(
 
 
 def _as_pair(a: object, b: object, axes: int) -> tuple[Floats, Floats]:
-    """Return two images of one shape, brought to [0, 1] together."""
+    """Return two images of one shape, scaled to [0, 1] together."""
     first, second = as_image(a, "a", axes=axes), as_image(b, "b", axes=axes)
     if first.shape != second.shape:
         raise InvalidInput(f"b: needs the shape of a, {first.shape}, got {second.shape}")
@@ -447,7 +447,7 @@ def _bring_to_unit(image: Array) -> Floats:
 
 
 def _as_floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
-    """Return an array of floats; one number stands for all of them."""
+    """Return an array of floats. A single number is broadcast."""
     if isinstance(value, Real):
         most = float(np.finfo(np.float32).max)
         return np.full(shape, as_float(value, name, -most, most), np.float32)

@@ -20,30 +20,30 @@ def __dir__() -> list[str]:
 
 
 LIMIT = 4 << 30
-"""Bytes that a factor may take, unless a limit is given."""
+"""Maximum bytes of a factor, unless the caller gives a limit."""
 
 
 class Cholesky:
-    """The factor of a sparse symmetric positive definite matrix.
+    """Factor of a sparse symmetric positive definite matrix.
 
-    Unknowns are ordered by nested dissection: those of grids, row by row, are recognised, and parted along and across their
-    rows and aslant; meshes and all else along the levels of a search. Their factors are the fastest; trees and chains take
-    longer than by minimum degree. All is double precision, for deformation energies are too ill-conditioned for less. The same
-    bytes for any number of threads and on any x86-64 processor.
+    Unknowns are ordered by nested dissection. Grids in row order are recognised, and are split along rows, across rows
+    and diagonally; meshes and other graphs along the levels of a search. Factors of grids are the fastest. Trees and
+    chains take longer than by minimum degree. All computation is in double precision, because deformation energies are
+    too ill-conditioned for less. The bytes are the same for any number of threads and on any x86-64 processor.
 
     Parameters
     ----------
     matrix : (n, n) scipy.sparse matrix or array_like
-        Any real dtype; finite. Its lower triangle is read; the diagonal must be there.
+        Any real dtype; finite. Only the lower triangle is read; the diagonal must be present.
     limit : int
-        Bytes that the factor and the work on it may take, 1 to 2^62.
+        Maximum bytes of the factor and the work on it, 1 to 2^62.
 
     Raises
     ------
     InvalidInput
-        Not a matrix of numbers, not square, not finite, or not positive definite.
+        If it is not a matrix of numbers, or is not square, not finite, or not positive definite.
     LimitExceeded
-        The factor would take more than ``limit``.
+        If the factor would take more than ``limit``.
 
     Examples
     --------
@@ -62,26 +62,26 @@ class Cholesky:
 
     @classmethod
     def several(cls, matrices: Sequence[Any], *, limit: int = LIMIT) -> list[Cholesky]:
-        """Factor several matrices in parallel; each factor is what it would be by itself.
+        """Factor several matrices in parallel. Each factor is the same as by itself.
 
         Parameters
         ----------
         matrices : sequence of (n, n) scipy.sparse matrices or array_like
-            Each as of the class; their sizes need not agree.
+            Matrices as for the class. Their sizes may differ.
         limit : int
-            Bytes that each factor and the work on it may take, 1 to 2^62.
+            Maximum bytes of each factor and the work on it, 1 to 2^62.
 
         Returns
         -------
         list of Cholesky
-            One a matrix, in their order.
+            One factor for each matrix, in their order.
 
         Raises
         ------
         InvalidInput
-            A matrix that is not square, not finite, or not positive definite.
+            If a matrix is not square, not finite, or not positive definite.
         LimitExceeded
-            A factor would take more than ``limit``.
+            If a factor would take more than ``limit``.
 
         Examples
         --------
@@ -100,31 +100,31 @@ class Cholesky:
 
     @property
     def size(self) -> int:
-        """Rows of the matrix."""
+        """Number of rows of the matrix."""
         return self._inner.size
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the factor takes."""
+        """Bytes of the factor."""
         return 8 * self._inner.entries
 
     def solve(self, sides: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Return the solutions for one right side or several.
+        """Return the solutions for one or several right sides.
 
         Parameters
         ----------
         sides : (n,) or (n, k) array_like
-            Right sides, a column each; any real dtype.
+            Right sides, one in each column; any real dtype.
 
         Returns
         -------
         ndarray
-            Float64, of the same shape.
+            Solutions in float64, of the same shape.
 
         Raises
         ------
         InvalidInput
-            Not numbers, or right sides of another length.
+            If they are not numbers, or have another length.
 
         Examples
         --------
@@ -143,7 +143,7 @@ class Cholesky:
 def _list_entries(
     matrix: Any, name: str = "matrix"
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
-    """Return the entries, column by column, rows rising."""
+    """Return the entries column by column, with rising rows."""
     from scipy.sparse import csc_array, issparse
 
     if not issparse(matrix):
@@ -155,7 +155,7 @@ def _list_entries(
     check_memory(8 * matrix.shape[0], name)
     columns = csc_array(matrix)
     if not columns.has_canonical_format:
-        # Not in the caller's own.
+        # Do not sort the caller's own matrix.
         columns = columns.copy()
         columns.sum_duplicates()
     if max(columns.nnz, columns.shape[0]) >= 1 << 31:

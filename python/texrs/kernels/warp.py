@@ -1,4 +1,4 @@
-"""Warps of pictures by points that move: where each pixel of the output comes from."""
+"""Warps of images by moved points: the source coordinates of each output pixel."""
 
 from __future__ import annotations
 
@@ -27,12 +27,11 @@ class Warp:
     Attributes
     ----------
     coordinates : (rows, columns, 2) float32
-        Where each pixel comes from, (row, column); in the holes the pixel of the source that has their own place.
+        Source coordinates of each pixel, (row, column). A hole has the source pixel at the same position.
     covered : (rows, columns) bool
-        Where a triangle was drawn; the others are holes.
+        Mask of the pixels that a triangle covers. The others are holes.
     triangles, flipped, flipped_heavy : int
-        Number of triangles that were drawn; those of them that were turned over, or flattened; and those turned over whose
-        three corners weigh something.
+        Numbers of triangles: drawn; turned over or flattened; turned over with three weighted corners.
 
     Examples
     --------
@@ -59,37 +58,37 @@ def mesh(
     size: int | Sequence[int] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Warp:
-    """Return where the pixels of an output come from, when each pixel of a picture moves: its dense mesh, rasterised.
+    """Warp an image whose pixels all move: draw its dense mesh and return the source of each output pixel.
 
-    Two triangles a cell, barycentric. Where several lie over each other the one whose corners weigh most is seen; of
-    equals one that is not turned over, then the first.
+    Each cell has two triangles, with barycentric interpolation. If several overlap, the one whose corners have the
+    largest weight is visible. Among equal ones, it is one that is not turned over, then the first.
 
     Parameters
     ----------
     target : (H, W, 2) array_like
-        Where each pixel goes, (row, column) in pixels; any real dtype, finite. H and W at least 2.
+        New position of each pixel, (row, column) in pixels; any real dtype, finite. H and W are at least 2.
     weight : (H, W) array_like of bool or int, optional
-        0 to 254: what lies above what; by default 0 everywhere.
+        Weight of each pixel, 0 to 254: larger weights are in front. Default: 0 everywhere.
     void : (H, W) array_like of bool, optional
-        Pixels whose triangles are not drawn; by default none.
+        Pixels whose triangles are not drawn. By default none.
     size : int or (rows, columns), optional
-        Of the output, up to 2^28 pixels; that of the picture by default.
+        Size of the output, up to 2^28 pixels. By default the size of the image.
     progress : callable, optional
-        Called with the share that is done, 0 to 1; raising stops the work.
+        Called with the completed share, 0 to 1. An exception that it raises stops the work.
 
     Returns
     -------
     Warp
-        The coordinates, where they are covered, and how many triangles are turned over.
+        The coordinates, the covered pixels, and the number of triangles that are turned over.
 
     Raises
     ------
     InvalidInput
-        Arrays of other shapes, targets that are not finite, or weights out of range.
+        If arrays have other shapes, targets are not finite, or weights are out of range.
     LimitExceeded
-        An output of more than 2^28 pixels.
+        If the output has more than 2^28 pixels.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     Examples
     --------
@@ -125,11 +124,11 @@ class Triangles:
     Attributes
     ----------
     coordinates : (rows, columns, 2) float32
-        Where each pixel comes from, (row, column); pixels outside of all triangles keep their place.
+        Source coordinates of each pixel, (row, column). Pixels outside all triangles keep their position.
     triangle : (rows, columns) uint32
-        The triangle of each pixel, counted from 1; 0 outside of all.
+        Triangle of each pixel, counted from 1; 0 outside all triangles.
     frames : (triangles + 1, 2, 2) float32
-        The Jacobian of the coordinates in each triangle; the first is the identity.
+        Jacobian of the coordinates in each triangle. The first is the identity.
 
     Examples
     --------
@@ -150,31 +149,32 @@ class Triangles:
 def from_points(
     source: ArrayLike, target: ArrayLike, shape: int | Sequence[int], *, size: int | Sequence[int] | None = None
 ) -> Triangles:
-    """Return where the pixels of an output come from, when points of a picture move.
+    """Warp an image by some moved points: return the source of each output pixel.
 
-    The Delaunay triangles of the source points are drawn where their corners go.
+    The Delaunay triangles of the source points are drawn at the new positions of their corners.
 
     Parameters
     ----------
     source, target : (n, 2) array_like
-        Where the points are in the picture, and where they go; (row, column) in pixels. Any real dtype, finite; three
-        points or more.
+        Positions of the points in the image, and their new positions; (row, column) in pixels. Any real dtype, finite;
+        at least three points.
     shape : int or (rows, columns)
-        Of the picture, in pixels.
+        Size of the image, in pixels.
     size : int or (rows, columns), optional
-        Of the output, up to 2^28 pixels; that of the picture by default.
+        Size of the output, up to 2^28 pixels. By default the size of the image.
 
     Returns
     -------
     Triangles
-        The coordinates, and the triangle and the frame that they belong to.
+        The coordinates, and the triangle and the Jacobian of each pixel.
 
     Raises
     ------
     InvalidInput
-        Fewer than three points, all on one line, two at one place, or coordinates that are not finite.
+        If there are fewer than three points, all are on one line, two are at one position, or coordinates are not
+        finite.
     LimitExceeded
-        A picture or an output of more than 2^28 pixels.
+        If the image or the output has more than 2^28 pixels.
 
     Examples
     --------
@@ -193,8 +193,8 @@ def from_points(
     frames = np.zeros((len(corners) + 1, 2, 2), np.float32)
     frames[0] = np.eye(2)
     edges = [(p[:, 1:] - p[:, :1]).transpose(0, 2, 1) for p in (before, after)]
-    sound = np.abs(np.linalg.det(edges[1])) > 1e-9  # The others are not drawn.
-    # By sums of two products: the last bits of inverses and of matrix products hang on the processor.
+    sound = np.abs(np.linalg.det(edges[1])) > 1e-9  # Other triangles are not drawn.
+    # Sum two products by hand, because the last bits of inverses and matrix products depend on the processor.
     (a, b), (c, d) = np.moveaxis(edges[1][sound], 0, -1)
     inverse = np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), -1, 0)
     drawn = edges[0][sound]
@@ -204,7 +204,7 @@ def from_points(
 
 
 def _fill_holes(places: Floats, covered: Bools, shape: Sequence[int]) -> Floats:
-    """Let pixels of no triangle come from their own place, in place."""
+    """Set pixels outside all triangles to their own position, in place."""
     holes = ~covered
     if holes.any():
         places[holes] = np.minimum(np.argwhere(holes), np.array(shape) - 1)

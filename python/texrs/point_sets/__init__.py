@@ -1,7 +1,7 @@
 """Registration of point sets: the layout of one texture for the elements of another.
 
 Y. Liu et al., "Texture splicing", 2009, section 4.1. Scales are normalised by the mean distance to the nearest points,
-and orientations by the directions in which points are aligned. Points are matched one to one at the minimum total cost
+and orientations by the directions of aligned points. Points are matched one to one at the minimum total cost
 (Eq. 4). The paper does not state how both point sets continue beyond the borders of their images; this package defines
 it.
 """

@@ -12,8 +12,8 @@ __all__ = ["continue_on_lattice", "find_courses", "find_lattice", "fit_lattice"]
 VOTERS = 400
 """Number of points in the middle of a layout that determine its lattice."""
 REGULAR = 0.12
-"""Maximum root mean square distance of points from their lattice sites, in spacings, for a layout to be continued on
-the lattice.
+"""Maximum root mean square distance of points from their lattice sites, in spacings. Layouts with a larger distance are
+not continued on the lattice.
 """
 FEWEST, SHARE, STEP, STRAIGHT = 3, 0.8, 0.2, 0.06
 """Properties of a wall: minimum number of courses, minimum share of points in courses of two or more, minimum row
@@ -21,7 +21,7 @@ distance between two courses in spacings. The last is the maximum root mean squa
 in steps between courses. Random points are 0.07 steps apart or more.
 """
 AREAS = (0.6, 1.6)
-"""Minimum and maximum area of a lattice cell, in squared spacings, for the lattice to describe the points."""
+"""Minimum and maximum area of a lattice cell, in squared spacings. Other lattices do not describe the points."""
 
 
 def fit_lattice(points: Points) -> tuple[Points, Points]:

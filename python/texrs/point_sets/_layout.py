@@ -77,7 +77,7 @@ class Fold:
 
 
 def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
-    """Find the lines at which a layout is reflected along an axis so that it continues naturally.
+    """Find the two lines that reflect a layout along an axis so that it continues naturally.
 
     Several positions around the outermost points are tried for each line. The best is the one where points near the
     line have neighbours as far away as points inside. In a row of a lattice this is on a point or midway between two

@@ -1,4 +1,4 @@
-"""Distances between points, and the directions in which they are aligned."""
+"""Distances between points, and the directions of their alignment."""
 
 from __future__ import annotations
 
@@ -60,14 +60,14 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
 
 
 def mark_inner(points: Points, far: Points) -> NDArray[np.bool_]:
-    """Return a mask of the points that are not outermost, or of all if there are no others."""
+    """Return a mask of the points that are not outermost, or of all points if all are outermost."""
     edge = INSIDE * float(np.median(far[:, 0]))
     found: NDArray[np.bool_] = ((points > points.min(axis=0) + edge) & (points < points.max(axis=0) - edge)).all(axis=1)
     return found if found.any() else ~found
 
 
 def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
-    """Return the directions in which points are aligned, in degrees in [0, 180), strongest first.
+    """Return the directions of alignment of points, in degrees in [0, 180), strongest first.
 
     Angles go from the axis of the columns to the axis of the rows. The method is a Radon transform of the points,
     drawn as Gaussians of 0.15 spacings. It varies most where lines of points are seen end on [1]_. The result is empty

@@ -22,8 +22,8 @@ Departures, with their reasons:
 - A texture with courses is quilted along them only: its images are placed so that their joints coincide.
 - In large textures rows of patches follow each other at a distance of two patches, so that several are cut in
   parallel. Each pays for repetitions of patches that precede all of these.
-- A patch that shows the mirror image of its overlap is refused. At a mirror axis the two meet without a seam, but the
-  mirror is conspicuous.
+- A patch that shows the mirror image of its overlap is refused. The two meet
+  without a seam at the mirror axis, but the mirror is conspicuous.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from texrs.source_map._pixels import Pixels
 COLOUR, DEPTH = 1.0, 1.0
 """Weights of a seam: of squared colour differences, and of the depth of its pixels inside elements."""
 CELL = 8
-"""Side of the cells in which use is counted, in pixels."""
+"""Side of the cells that count use, in pixels."""
 CALM, RUN = 64, 9
 """Number of lines that are searched for a calm one, and length in pixels of a visible piece of an edge."""
 
@@ -102,7 +102,8 @@ def finish(
 ) -> SourceMap:
     """Return the source map into the exemplars. The arrays are consumed.
 
-    Axes in ``rolled`` begin at a calm line, so that the border of the texture does not follow an edge. They begin at the
+        Axes in ``rolled`` begin at a calm line, so that the border of the texture does not follow an edge. They begin
+    at the
     first calm line for 0, and at the last one for 1.
     """
     channels = pictures[0].colours.shape[2]
