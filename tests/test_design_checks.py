@@ -231,7 +231,7 @@ class Result:
     """What `checks.d1` looks at."""
 
     def __init__(self, image, source, holes):
-        self.image, self.source, self.report = image, source, {"holes": holes}
+        self.image, self.source_map, self.report = image, source, {"holes": holes}
 
 
 def test_d1_fails_for_another_size_for_places_outside_and_for_holes_unreported(pebbles, copy):

@@ -263,8 +263,8 @@ MARKED[70:90, 60:90] = True
             "ground: the others leave",
         ),
         (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
-        (lambda: texrs.remove(FLOOR, MARKED, patch_size=2), "patch: "),
-        (lambda: texrs.remove(FLOOR, MARKED, boundary_width=65), "boundary: "),
+        (lambda: texrs.remove(FLOOR, MARKED, patch_size=2), "patch_size: "),
+        (lambda: texrs.remove(FLOOR, MARKED, boundary_width=65), "boundary_width: "),
         (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: needs a texrs.PlaneView"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: nothing"),
@@ -327,5 +327,5 @@ def test_a_photograph_is_extended_to_a_size() -> None:
     ).report["added"]
     assert up["top"] < 35 < up["bottom"]
     assert up["top"] + up["bottom"] == 80
-    with pytest.raises(InvalidInput, match=r"to: needs \(180, 240\)"):
+    with pytest.raises(InvalidInput, match=r"size: needs \(180, 240\)"):
         texrs.extend(FLOOR, size=(100, 300), view=PLANE)
