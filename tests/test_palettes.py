@@ -158,3 +158,18 @@ def test_notices_name_the_file_only_while_its_array_lives(tmp_path):
     with collect(show=lambda line: None) as notices:
         texrs.tile(image.copy())
     assert notices.assumed[0].startswith("image: ")
+
+
+def test_unbounded_textures_keep_few_colours():
+    """Turned windows have no colours between those of the example, unless they are asked for."""
+    seen = find_colours(ART)
+    with collect() as notices:
+        plane = texrs.PlaneTexture(ART, field="circular", seed=1)
+    assert any("few colours, looked up to the nearest pixel" in line for line in notices.assumed)
+    assert find_colours(plane[10:74, -30:40]) <= seen
+    smooth = texrs.PlaneTexture(ART, field="circular", seed=1, interpolation="cubic")
+    assert not find_colours(smooth[10:74, -30:40]) <= seen
+    with ask(False):
+        assert not find_colours(texrs.PlaneTexture(ART, field="circular", seed=1)[10:74, -30:40]) <= seen
+    tiles = texrs.CornerTiles(ART)
+    assert find_colours(tiles.window((5, 7), (90, 90)).image) <= seen

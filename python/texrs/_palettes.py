@@ -25,7 +25,7 @@ from texrs.materials._material import Material
 from texrs.source_map import RenderOptions, SourceMap
 from texrs.synthesis import Synthesis
 
-__all__ = ["Palette", "ask", "find", "has_few_colours", "keep_material", "make_plain"]
+__all__ = ["Palette", "ask", "find", "has_few_colours", "keep_material", "keeps_colours", "make_plain"]
 
 MOST = 64
 """Number of colours that are few. Pixel art has up to 64, and photographs of so few grey levels are rare."""
@@ -133,6 +133,15 @@ def has_few_colours(image: Array) -> bool:
     steps = np.concatenate([np.abs(np.diff(p.astype(np.int32), axis=1)).max(axis=-1).ravel() for p in lines])
     least = STEP * np.iinfo(image.dtype).max // 255
     return bool((steps >= least).sum() >= SHARE * (steps > 0).sum())
+
+
+def keeps_colours(image: Array) -> bool:
+    """Return whether results of an image have only its colours, and report it."""
+    asked = _ASKED.get()
+    kept = has_few_colours(image) if asked is None else asked
+    if kept:
+        assume("exemplar: few colours, looked up to the nearest pixel; see interpolation (--no-palette)")
+    return kept
 
 
 def make_plain(source: SourceMap) -> SourceMap:

@@ -108,7 +108,9 @@ def takes_materials(
                 given.arguments["flatten_lighting"] = False
             made: Any = verb(*given.args, **given.kwargs)
             if lit is True:
-                made = replace(made, source_map=_flattened(made.source_map), report={**made.report, "flatten_lighting": True})
+                made = replace(
+                    made, source_map=_flattened(made.source_map), report={**made.report, "flatten_lighting": True}
+                )
             if isinstance(made, Synthesis):
                 return cast(T, finish(made, materials, watch))
             return cast(T, (finish(one, materials, watch) for one in made))

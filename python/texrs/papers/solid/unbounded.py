@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_int, as_seed, as_size
 from texrs._cache import Cache, content_hash
 from texrs._engine.pyramid import ONE, Region
+from texrs._palettes import keeps_colours
 from texrs._progress import listen
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import finish
@@ -62,7 +63,9 @@ class Texture(Endless):
         self._material = exemplar if isinstance(exemplar, Material) else None
         shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
         known = as_exemplar(shown, axes=self.axes, minimum=COARSEST)
-        self._exemplar, self._how = known, as_interpolation(interpolation, known, "cubic")
+        base = known.image if self._material is None else self._material.base
+        usual: Interpolation = "nearest" if self.axes == 2 and keeps_colours(base) else "cubic"
+        self._exemplar, self._how = known, as_interpolation(interpolation, known, usual)
         self._spacing = as_distances(spacing, self.axes)
         self._field = as_field(field, self.axes, spacing=spacing)
         self._seed, self._quality = as_seed(seed), as_quality(quality)

@@ -43,7 +43,8 @@ class PlaneTexture(Texture):
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
         They are different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample, whatever it says.
+        Between the exemplar's samples. None is "cubic", or "nearest" for an exemplar of few colours, so that no colours
+        are added. Labels are looked up at the nearest sample, whatever it says.
     spacing : sequence of 2 float, optional
         Distances between rows and columns, in any unit. The field turns in space, where pixels need not be squares. Its places
         and lengths are in the same unit. Windows and points stay in pixels. Default: 1.
