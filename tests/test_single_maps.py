@@ -52,7 +52,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("name", NORMALS)
 def test_a_single_normal_map_is_one(here: Path, capsys: pytest.CaptureFixture[str], verb: str, name: str) -> None:
     """The result is what the source map makes of the normals as a map of a material."""
-    assert main([verb, f"{name}.png", *VERBS[verb].split(), "-o", "out.png", "--map", "map.npz"]) == 0
+    assert main([verb, f"{name}.png", *VERBS[verb].split(), "-o", "out.png", "--source-map", "map.npz"]) == 0
     role = "normal-dx" if name.endswith("dx") else "normal"
     assert f"{name}.png: read as {role}, because its name and its values say so" in capsys.readouterr().err
     truth = Material({"map": NORMALS[name]}, roles={"map": role}).apply(SourceMap.load("map.npz"))["map"].pixels
@@ -83,6 +83,8 @@ def test_tiles_and_variants_of_a_single_map_are_images(here: Path) -> None:
     assert np.abs(lengths - 1).max() < 0.01
     assert main(["design", "rock_normal_gl.png", "--size", "64x64", "--variants", "2", "-o", "many.png"]) == 0
     assert io.read("many-1.png").shape == (64, 64, 3)
-    assert main(["inpaint", "rock_normal_gl.png", "hole.png", "--from", "rock_normal_gl.png", "-o", "filled.png"]) == 0
+    assert (
+        main(["inpaint", "rock_normal_gl.png", "hole.png", "--exemplar", "rock_normal_gl.png", "-o", "filled.png"]) == 0
+    )
     # Several inputs are mixed as images, because they may differ in kind.
     assert main(["design", "rock_normal_gl.png", "photo.png", "--size", "64x64", "-o", "mixed.png"]) == 0
