@@ -95,9 +95,11 @@ def tiles_command(
     elif not parts and not folder:
         _outputs.check_output(out)
     values |= TILED.read(given, About(roles=stack.roles), which=lambda o: o.file)
-    call = TILED.call(values) | DESIGNED.call(
-        {path: v for path, v in values.items() if path not in {o.path for o in TILED}}
-    )
+    names = DESIGNED.name_values(given) | TILED.name_values(given)
+    with name_arguments(**names):
+        call = TILED.call(values) | DESIGNED.call(
+            {path: v for path, v in values.items() if path not in {o.path for o in TILED}}
+        )
     example = call["exemplar"]
     single = isinstance(example, SingleMap)
     if isinstance(example, Material) and not single:
@@ -105,7 +107,6 @@ def tiles_command(
             stack.check_outputs(example, {"out": out}, [])
     elif role:
         stack.refuse({})
-    names = DESIGNED.name_values(given) | TILED.name_values(given)
     with name_arguments(**names, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
         tiles = CornerTiles(**call, progress=progress)
     note(f"made {tiles!r}, in {time.monotonic() - start:.1f} s", quiet=quiet)
