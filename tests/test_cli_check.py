@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import texrs
 from texrs import io, samples
 from texrs.cli import main
 
@@ -27,7 +28,10 @@ def test_a_picture_is_checked_and_shown_twice_by_twice(folder, capsys):
 
 def test_a_tile_is_left_as_it_is(folder, capsys):
     assert main(["tile", "in.png", "-o", "tile.png"]) == 0
-    assert "of the pixels in place, seam of rows " in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "of the pixels in place, " in said
+    assert "% unchanged, borders of rows " in said
+    assert ", seams between rows " in said
     assert main(["check", "tile.png"]) == 0
     assert [line.partition(", seam")[0] for line in capsys.readouterr().out.splitlines()[1:]] == [
         "rows (bottom to top): tile",
@@ -38,6 +42,20 @@ def test_a_tile_is_left_as_it_is(folder, capsys):
     assert "tiles already along the rows and columns, which are not changed" in said
     assert "100% of the pixels in place" in said
     np.testing.assert_array_equal(io.read("tile.png"), io.read("again.png"))
+
+
+def test_seams_inside_are_checked_with_a_source_map(folder, capsys):
+    assert main(["tile", "in.png", "-o", "tile.png", "--source-map", "map.npz", "-q"]) == 0
+    assert main(["check", "tile.png", "--source-map", "map.npz"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    found = texrs.check_tiling(io.read("tile.png"), texrs.SourceMap.load("map.npz"))
+    assert said[1].endswith(f"; seams inside not visible, {found.step[0]:.2f}")
+    assert said[2].endswith(f"; seams inside not visible, {found.step[1]:.2f}")
+    assert main(["check", "in.png"]) == 0
+    assert "inside" not in capsys.readouterr().out
+    io.write("less.png", io.read("tile.png")[:64])
+    assert main(["check", "less.png", "--source-map", "map.npz"]) == 2
+    assert "--source-map: must have the size of the image" in capsys.readouterr().err
 
 
 def test_the_reason_of_another_size_is_printed(folder, capsys):

@@ -397,6 +397,17 @@ def test_georeference_that_is_not_written_is_reported(here: Path, capsys: Captur
     assert read_tags("new.tif") == {}
 
 
+def test_georeference_goes_through_tile_if_the_size_stays(here: Path, capsys: Capture) -> None:
+    tifffile.imwrite("whole.tif", HEIGHTS, extratags=[(*tag, True) for tag in GEO])
+    assert main(["tile", "whole.tif", "-o", "same.tif"]) == 0
+    assert io.read("same.tif").shape == HEIGHTS.shape
+    assert read_tags("same.tif") == {code: value for code, _, _, value in GEO}
+    assert "georeference" not in capsys.readouterr().err
+    assert main(["tile", "whole.tif", "-o", "less.tif", "--size", "40x40"]) == 0
+    assert "whole.tif: its georeference is not written, because the size changed" in capsys.readouterr().err
+    assert read_tags("less.tif") == {}
+
+
 def test_nodata_that_is_used_as_values_is_reported(here: Path, capsys: Capture) -> None:
     words = f"heights.tif: its nodata value -9999 is not used, so {DISC.sum()} pixels count as data; texrs inpaint fills them"
     with pytest.warns(InputWarning, match=words):

@@ -205,7 +205,7 @@ def test_an_output_that_wraps(floor):
         ),
         (
             {"mask": np.ones((64, 64), bool), "scale_map": "auto", "exemplar": np.zeros((40, 40), np.uint8)},
-            "scale_map: 'auto' measures what is known",
+            "scale_map: 'auto' needs known pixels",
         ),
         ({"screening": "soft"}, "screening: needs a number"),
         ({"mask": "alpha"}, "mask: 'alpha' needs an image with an alpha channel"),

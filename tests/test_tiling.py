@@ -336,8 +336,8 @@ def test_smallest_pictures(shape):
         ({"overlap": (3, 4, 5)}, "overlap: needs one number or"),
         ({"overlap": "8"}, "overlap: needs an integer"),
         ({"overlap": True}, "overlap: needs an integer"),
-        ({"size": 30, "overlap": 4}, "overlap: the size says it already"),
-        ({"size": (1, 30)}, "size: needs at least 2 rows to wrap them, got 1"),
+        ({"size": 30, "overlap": 4}, "overlap: cannot be combined with size"),
+        ({"size": (1, 30)}, "size: must have at least 2 rows to wrap them, got 1"),
         ({"size": (30, 40, 3)}, "size: needs (rows, columns)"),
         ({"size": 0}, "size: each side must be at least 1"),
         ({"wrap": "xy"}, "wrap: needs"),
@@ -366,7 +366,7 @@ def test_images_are_checked(image, words):
 
 
 def test_a_few_pixels_are_not_extended():
-    with pytest.raises(InvalidInput, match="needs 8 pixels a side of it, got 40"):
+    with pytest.raises(InvalidInput, match="if a side has fewer than 8 pixels, got 40"):
         texrs.tile(np.zeros((7, 60), np.uint8), size=40)
 
 

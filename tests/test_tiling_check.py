@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import samples
+from texrs import samples, tiling
 from texrs.errors import InvalidInput
 from texrs.tiling import Tiling
 
@@ -106,6 +106,65 @@ def test_only_pictures_are_checked():
     assert Tiling((None, 1.0), (None, (0, 8))).tiles == (False, True)
 
 
+# --- seams inside the image ----------------------------------------------------------------------------------------------
+
+
+def split(image: np.ndarray, factor: float) -> tuple[np.ndarray, texrs.SourceMap]:
+    """Return an image whose right half is from other rows and in other light, and its source map."""
+    rows, columns = image.shape[:2]
+    at = np.stack(np.indices((rows, columns)), axis=-1).astype(np.float32)
+    at[:, columns // 2 :, 0] = (at[:, columns // 2 :, 0] + rows // 2) % rows
+    label = (np.indices((rows, columns))[1] >= columns // 2).astype(np.uint32)
+    source = texrs.SourceMap.from_coordinates(at, (rows, columns), label=label)
+    made = source.render(image)
+    made[:, columns // 2 :] = np.rint(made[:, columns // 2 :] * factor)
+    return made, source
+
+
+def test_a_step_across_a_seam_inside_the_image_is_measured():
+    made, source = split(picture("grit"), 0.6)
+    found = texrs.check_tiling(made, source)
+    assert found.visible
+    assert found.step[1] > 1.5
+    assert found.seam == texrs.check_tiling(made).seam
+    assert texrs.check_tiling(made).step == (None, None)
+    assert not texrs.check_tiling(made).visible
+    assert found.report()["columns"]["step"] == found.step[1]
+    # The same seam in even light does not show.
+    assert texrs.check_tiling(*split(picture("grit"), 1.0)).step[1] < 1
+    material = texrs.Material({"albedo": made, "height": np.full(made.shape[:2], 9, np.uint16)})
+    assert texrs.check_tiling(material, source).step == found.step
+
+
+def test_a_source_map_has_the_size_of_the_image():
+    with pytest.raises(
+        InvalidInput, match=r"source_map: must have the size of the image, \(128, 128\), got \(64, 64\)"
+    ):
+        texrs.check_tiling(picture("grit"), texrs.SourceMap.identity((64, 64)))
+
+
+def test_another_joint_is_taken_if_a_seam_is_visible(monkeypatch):
+    image = picture("pebbles", 192)
+    made = texrs.tile(image)
+    monkeypatch.setattr(tiling, "REFUSED", ())
+    first = texrs.tile(image)
+    assert tiling.find_boldest(first) > 1.25
+    assert tiling.find_boldest(made) < 1.1
+    assert made.image.shape == first.image.shape
+    assert first.report["warnings"]
+    assert not made.report["warnings"]
+
+
+def test_seams_that_stay_visible_are_listed():
+    made = texrs.tile(multiply(picture("grit"), 0.4, 1.6), flatten_lighting=False)
+    assert made.report["tiling"]["columns"]["step"] > 1.25
+    assert any(
+        each.startswith("columns: a seam inside the image is visible, ")
+        and each.endswith("as the boldest lines elsewhere")
+        for each in made.report["warnings"]
+    )
+
+
 # --- what tiles already ------------------------------------------------------------------------------------------------
 
 
@@ -187,6 +246,9 @@ def test_uneven_light_is_evened_and_reported():
     lit = multiply(gravel[..., np.newaxis], 0.55, 1.45)
     made, kept = texrs.tile(lit), texrs.tile(lit, flatten_lighting=False)
     assert made.report["flatten_lighting"] is True
+    # Pixels stay in place, but their values do not.
+    assert made.report["unchanged"] < 0.1 < 0.4 < made.report["in_place"]
+    assert kept.report["unchanged"] == pytest.approx(kept.report["in_place"], abs=0.01)
     assert kept.report["flatten_lighting"] is False
     [said] = [each for each in made.report["assumed"] if "unevenly" in each]
     assert said.startswith("image: is lit unevenly, one part 2.")

@@ -11,6 +11,7 @@ import texrs
 from texrs import io, samples
 from texrs.cli import main
 from texrs.errors import InvalidInput
+from texrs.inpainting import _volumes
 
 
 def make_ball(shape: tuple[int, ...], radius: float) -> np.ndarray:
@@ -60,6 +61,35 @@ def test_a_hole_has_no_step_at_its_border(name: str) -> None:
     assert not hole[tuple(np.moveaxis(places, -1, 0))].any()
     # What was in the hole does not matter.
     assert (texrs.inpaint(volume, hole, seed=3).image == result.image).all()
+
+
+def make_cells(seed: int = 5) -> np.ndarray:
+    """Return labels of cells around random points, which wrap."""
+    points = np.random.default_rng(seed).uniform(0, 40, (60, 3))
+    grid = np.moveaxis(np.indices((40, 40, 40)), 0, -1)[..., np.newaxis, :]
+    away = np.abs(grid - points)
+    nearest = (np.minimum(away, 40 - away) ** 2).sum(axis=-1).argmin(axis=-1)
+    return np.asarray((nearest % 5).astype(np.uint8))
+
+
+def test_smaller_patches_are_tried_if_the_border_of_a_hole_shows() -> None:
+    labels, hole = make_cells(), make_ball((40, 40, 40), 10)
+    usual, least = _volumes.list_sides(_volumes.choose_side(hole, hole.shape), labels=True)[::3]
+    made = texrs.inpaint(labels, hole, seed=1)
+    fixed = texrs.inpaint(labels, hole, seed=1, patch_size=usual)
+    steps = [_volumes.measure_step(each.image, hole, labels=True) for each in (made, fixed)]
+    assert steps[0] < 0.85 * steps[1]
+    assert made.report["candidates"][0] == [usual, round(steps[1], 3)]
+    assert least <= made.report["patch_size"] < usual
+    # The first size stays if its border does not show.
+    stripes = samples.stripes((40, 40, 40)).image
+    assert len(texrs.inpaint(stripes, hole, seed=1).report["candidates"]) == 1
+
+
+def test_a_correction_outside_the_source_map_is_reported() -> None:
+    volume, hole = make_noise(), make_ball((40, 40, 40), 8)
+    assert texrs.inpaint(volume, hole).report["screening_in_source_map"] is False
+    assert texrs.inpaint(volume, hole, screening=0).report["screening_in_source_map"] is True
 
 
 def test_labels_are_not_mixed() -> None:

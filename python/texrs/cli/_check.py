@@ -1,10 +1,11 @@
-"""The command that tests whether pictures tile: ``texrs check``."""
+"""The command that tests whether images tile: ``texrs check``."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 import numpy as np
+import typer
 
 from texrs import io
 from texrs._threads import threads
@@ -14,29 +15,40 @@ from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arg
 from texrs.cli._readers import read_example
 from texrs.cli._texts import About
 from texrs.materials import Material
+from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling import Tiling, check_tiling
+from texrs.tiling._borders import SEEN
 
 COPIES = (2, 2)
 BORDERS = {"rows": "bottom to top", "columns": "right to left"}
-"""The axes along which a picture tiles, and the border of each."""
+"""The axes along which an image tiles, and the border of each."""
 
 
 def check_command(
-    file: Annotated[str, make_argument("FILE", "A picture, a folder of the maps of a material, or sample:NAME.")],
+    file: Annotated[str, make_argument("FILE", "An image, a folder of the maps of a material, or sample:NAME.")],
+    source_map: Annotated[
+        str | None,
+        typer.Option(
+            "--source-map",
+            metavar="FILE",
+            help="Source map of the image (.npz). The seams inside the image are checked too.",
+            show_default="only the borders are checked",
+        ),
+    ] = None,
     out: Annotated[str | None, to_write("out", text="Picture of 2 x 2 copies to write.")] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Test whether a picture tiles along each axis, and how bold its borders are."""
+    """Test whether an image tiles along each axis, and how bold its borders and seams are."""
     if out is not None:
         _outputs.check_output(out)
     given = read_example(file, About(), single=False)
     shown = np.asarray(given.base if isinstance(given, Material) else given)
     if out is not None:
         _outputs.check_output(out, shown)
-    with name_arguments(image=file, count="--threads"), threads(count):
-        found = check_tiling(given)
+    with name_arguments(image=file, source_map="--source-map", count="--threads"), threads(count):
+        found = check_tiling(given, None if source_map is None else SourceMap.load(source_map))
     say(f"{file}: {describe(shown, 2)}")
     for name, each in (found.maps or {"": found}).items():
         for line in list_borders(each):
@@ -57,18 +69,24 @@ def list_borders(found: Tiling) -> list[str]:
             continue
         other = "columns" if axis == "rows" else "rows"
         where = "" if tiles else f", boldest at {other} {place[0]} to {place[1] - 1}"
-        lines.append(f"{axis} ({border}): {'tile' if tiles else 'do not tile'}, seam {seam:.2f}{where}")
+        step = found.step[0 if axis == "rows" else 1]
+        inside = "" if step is None else f"; seams inside {'visible' if step > SEEN else 'not visible'}, {step:.2f}"
+        lines.append(f"{axis} ({border}): {'tile' if tiles else 'do not tile'}, seam {seam:.2f}{where}{inside}")
     return lines
 
 
 def tell_tiling(result: Synthesis) -> str:
-    """Return how bold the borders of a result are, what was changed, and why its size is another one."""
+    """Return how bold borders and seams of a result are, what was changed, and the reason for another size."""
     report = result.report
-    said = [f", {report['in_place']:.0%} of the pixels in place"] if "in_place" in report else []
-    seams = [
-        f"{name} {each['seam']:.2f}" for name, each in report.get("tiling", {}).items() if each["seam"] is not None
-    ]
-    said += [f", seam of {', '.join(seams)} (1: as elsewhere)"] if seams else []
+    said = []
+    if "in_place" in report:
+        said.append(f", {report['in_place']:.0%} of the pixels in place, {report['unchanged']:.0%} unchanged")
+    for key, words in (("seam", "borders of"), ("step", "seams between")):
+        found = report.get("tiling", {}).items()
+        figures = [f"{name} {each[key]:.2f}" for name, each in found if each[key] is not None]
+        said += [f", {words} {', '.join(figures)}"] if figures else []
+    said += [" (1: as elsewhere)"] if report.get("tiling") else []
+    said += [f", {each}" for each in report.get("warnings", [])]
     said += [f", {name} {reason}" for name, reason in report.get("resized", {}).items()]
     return "".join(said)
 

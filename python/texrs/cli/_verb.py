@@ -63,6 +63,8 @@ class Verb:
     """Whether a pixel of the result is as large as one of the first input."""
     fills: bool = False
     """Whether it fills pixels of the first input and keeps the others in place. A transparent input can then become opaque."""
+    keeps: bool = False
+    """If True, pixels stay in place if the size stays. A georeference is then written only to a result of the same size."""
     beyond: str = ""
     """What makes larger ones."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
@@ -155,6 +157,9 @@ class Verb:
                 call["size"] = size
             if variants is None or self.several is None:
                 made = options.function(**call, progress=progress)
+                if self.keeps and like.georeference and made.image.shape[:2] != example.shape[:2]:
+                    ignore(f"{os.path.basename(first)}: its georeference is not written, because the size changed")
+                    like = replace(like, georeference=())
                 made = replace(made, report=notices.add_to(made.report))
                 deliver(made, paths, like=like, **apart)
             else:
@@ -196,9 +201,10 @@ class Verb:
         first = given[next(o.name for o in self.options if o.argument)]
         name = first[0] if isinstance(first, list) else first
         notes = io.read_metadata(name) if os.path.isfile(name) else io.Metadata()
-        if self.fills and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
+        kept = self.fills or self.keeps
+        if kept and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
             ignore(f"{os.path.basename(name)}: its georeference is not written, because only TIFF holds it")
-        notes = notes if self.fills else replace(notes, georeference=())
+        notes = notes if kept else replace(notes, georeference=())
         role = guess_role(Path(name).stem)
         if role is not None and not role.coloured:
             notes = replace(notes, multiplied=None)

@@ -136,7 +136,7 @@ def make_verb(name: str) -> Verb:
             from texrs.cli._check import tell_tiling
             from texrs.tiling import tile
 
-            return Verb(Options(tile, arguments={"image": EXAMPLE}), says=tell_tiling, beyond=TILES)
+            return Verb(Options(tile, arguments={"image": EXAMPLE}), says=tell_tiling, keeps=True, beyond=TILES)
 
 
 @dataclass(frozen=True, slots=True)

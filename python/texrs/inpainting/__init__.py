@@ -1,9 +1,8 @@
-"""Holes in a picture filled with patches of what is around them, or of another picture.
+"""Fill holes in images with patches of their surroundings, or of another image.
 
-J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.4: patches
-that fit what is known around a hole, each cut into it, and the one with the cheapest cut pasted; here from the boundary of
-the hole inwards, where the paper goes in scan order. A verb of its own, for any picture: `texrs.papers.design` fills its
-own holes in the same way.
+J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.4.
+Patches that match the pixels around a hole are cut into it, and the patch with the cheapest cut is pasted. The paper fills
+a hole in scan order. Here it is filled from its boundary inwards. `texrs.papers.design` fills its holes in the same way.
 """
 
 from __future__ import annotations
@@ -85,38 +84,39 @@ def inpaint(
         Mask of the pixels that patches may be copied from, such as the floor without the sky above it. Default: all known
         pixels. It cannot be combined with ``exemplar`` or with "optimise".
     scale_map : {None, "auto"} or (H, W) float array, optional
-        For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is
-        filled with elements of the size that belongs there [2]_. "auto" measures it: that of the plane
-        which is found (`texrs.planes.find`), or else measured (`texrs.planes.measure_scale`). In the hole it may
-        be NaN; it is continued.
+        Size of the elements at each pixel (`texrs.scale_maps`), for images taken at an angle. The hole is then filled with
+        elements of the right size [2]_. "auto": the map of the plane that is found (`texrs.planes.find`), or a measured map
+        (`texrs.planes.measure_scale`). Values in the hole may be NaN, because the map is continued there.
     exemplar_scale_map : {None, "auto"} or (h, w) float array, optional
-        How large they are in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
-        front; measured maps have a geometric mean of 1.
+        Size of the elements in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in an image taken from
+        the front. Measured maps have a geometric mean of 1.
     scale_kind : {"width", "area"}, optional
         What the maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope;
         "area", square roots of areas. None: what each fits best, as a map of a plane.
     method : {"patch", "optimise"}
-        How: "patch", patches that fit what is around, cut in [1]_; where the scale map is that of a plane, and there is no
-        ``exemplar``, patches of the plane, seen as they are seen in the hole. "optimise", windows corrected until each is
-        like one of the picture, or of ``exemplar``, resized where there is a scale map [2]_: for large holes, where patches
-        would repeat what is around.
+        "patch": patches that match the surroundings, joined along cuts [1]_. If the scale map is that of a plane, patches
+        of the plane are projected into the hole, except with an ``exemplar``. "optimise": windows are corrected until each
+        is similar to a window of the image or of ``exemplar``, resized by the scale map [2]_. It is for large holes, where
+        patches would repeat the surroundings.
     patch_size : int, optional
-        Side of a patch in pixels, at least 4: about the size of what repeats. By default several are tried, from three
-        quarters to four times a sixth of the shorter side (12 to 32), of large holes in a small copy, and those are kept
-        whose seams show least; with a scale map a sixth, of a plane up to a quarter. "optimise" has no patches, and
-        refuses one. Volumes: at least 6; by default 12 to 32, by the size of the hole.
+        Side of a patch in pixels, at least 4: about the size of the elements. By default several sides are tried: 0.75 to 4
+        times 1/6 of the shorter side (12 to 32). Large holes are tried in a small copy. The side with the least visible
+        seams is kept. With a scale map, the side is 1/6, and up to 1/4 for a plane. "optimise" has no patches, and refuses a
+        side. Volumes: at least 6. By default 12 to 32, depending on the hole. Smaller sides are tried if the border of the
+        hole is visible.
     boundary_width : int
-        Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
-        least. 0 leaves all that is known as it is.
+        Width in pixels of a band around the hole that may be replaced too, 0 to 1024. The seam can then follow the least
+        visible path. 0: known pixels do not change.
     allow_mirror : bool, optional
-        Whether patches may be mirrored; False for lettered textures. By default along those axes where nothing tells the
-        picture beside the hole from its mirror image, as light from one side does; not where there is a scale map: what is
-        seen at an angle has an upper side.
+        If True, patches may be mirrored; use False for textures with letters. By default patches are mirrored along axes
+        where the surroundings are symmetric: light from one side is not. With a scale map patches are not mirrored, because
+        an oblique view is not symmetric.
     screening : float, optional
-        Weight of the values, 0 to 1e6, when colours of what is filled are corrected so that seams disappear: the smaller,
-        the wider the correction; 0.003 is good for the picture's own colours, less where an ``exemplar`` has other light.
+        Weight of the values in the correction of colours at seams, 0 to 1e6. A smaller weight gives a wider correction.
+        0.003 is good for patches of the image, and a smaller weight for an ``exemplar`` in other light.
         None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the hole. Volumes:
-        None is 0.1, and 0 for labels (integers with at most 16 values), which are never mixed.
+        None is 0.1, and 0 for labels (integers with at most 16 values), which are never mixed. The correction of a volume is
+        not in its source map: other volumes that are rendered through the map have no correction.
     wrap : bool or (rows, columns), optional
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across; None: neither.
     seed : int
@@ -128,20 +128,22 @@ def inpaint(
     Returns
     -------
     Synthesis
-        The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
-        into ``[image, exemplar]``; pixels that are kept map to themselves, and none maps into the hole. To render a
-        picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
-        (each in a shade of its own) and ``"before_blending"``, the result before ``screening``. In the report ``"measured"``
-        tells of a ``scale_map`` "auto" what it is of, as `texrs.planes.ScaleEstimate` has it, and how sure that is;
-        ``"exemplar_measured"`` the same of the exemplar's. ``"filled"`` is the share of the image that is filled, 0 to 1.
+        The filled image, in the dtype and with the channels of the input. Its source map points into the image, or
+        into ``[image, exemplar]``. Pixels that are kept map to themselves, and no pixel maps into the hole. Replace NaN in
+        the hole by any number before you render an image through the map. The stages are ``"known"``, ``"patches"``
+        (each in a shade of its own) and ``"before_blending"``, the result before ``screening``. The report
+        contains ``"measured"``, the attributes of `texrs.planes.ScaleEstimate` for a ``scale_map`` "auto". ``"exemplar_measured"`` is
+        the same for the exemplar. ``"filled"`` is the share of the image that is filled, 0 to 1. ``"candidates"`` lists the
+        sides that were tried, with the figure of each: volumes, the step at the border of the hole (1: as elsewhere).
+        ``"screening_in_source_map"`` of a volume is False if its seams are corrected.
 
     Raises
     ------
     InvalidInput
-        A hole or ``allowed`` of another shape; a hole that marks nothing; an exemplar of another dtype or other channels;
-        nothing to copy from; a patch larger than the pictures, with no place for it outside the hole, or given to "optimise".
+        A hole or ``allowed`` of another shape. A hole that marks nothing. An exemplar of another dtype or other channels.
+        Nothing to copy from. A patch that is larger than the images or the space outside the hole, or given to "optimise".
 
-    Metadata
+    Notes
     -----
     Masked values of a `numpy.ma.MaskedArray` are filled too. A number or "nodata" also fills pixels that are NaN or infinite.
 
@@ -285,7 +287,7 @@ def inpaint(
 
 
 def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
-    """Return what patches may be copied from: what is known, and allowed if anything is said of that."""
+    """Return the pixels that patches may be copied from: known pixels, and only allowed ones if there is a mask of them."""
     if allowed is None:
         return ~open_
     if not fits:
@@ -310,7 +312,7 @@ def recover_scales(
 
 def check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | None) -> list[Array]:
     """Return the picture with its marked pixels painted over, and the one to copy from if there is one."""
-    # What is in the hole must not matter, not even to the range of the values.
+    # Values in the hole must not matter, not even for the range of the values.
     array = array.copy()
     first = np.unravel_index(mask.argmin(), mask.shape)
     array[mask] = array[first] if not mask[first] else 0

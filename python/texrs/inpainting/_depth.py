@@ -1,7 +1,7 @@
 """Holes filled in depth: with patches of the plane that a picture shows, each seen as it is seen in the hole.
 
-W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008: the scale is recovered from what
-is known, continued into the hole, and the hole synthesised with the rest as the exemplar.
+W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008. The scale is recovered from
+the known pixels and continued into the hole. The hole is then synthesised with the known pixels as the exemplar.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ def fill_in_depth(
     open_, wide : (H, W) bool
         The hole, and what may be replaced.
     far : (H, W) bool, optional
-        What may be replaced where things lie apart.
+        Pixels that may be replaced if elements are separate.
     plane : texrs.scale_maps._slope.Slope
         The plane that it shows.
     usable : (H, W) bool
         What may be copied.
     side : int, optional
-        Of the patches, in pixels.
+        Side of the patches in pixels.
     wrap : (bool, bool)
         Axes along which the picture is cyclic.
     seed : int
@@ -78,7 +78,7 @@ def fill_in_depth(
     """
     from scipy import ndimage
 
-    # What is interpolated from pixels of the hole is not known.
+    # Values that are interpolated from pixels of the hole are not known.
     whole: Bools = ndimage.minimum_filter(usable, TAPS, mode="nearest")
     if not whole.any():
         return None

@@ -19,11 +19,11 @@ class Filling:
 
     source: SourceMap
     side: float
-    """Of the patches."""
+    """Side of the patches in pixels."""
     count: int
-    """How many there are."""
+    """Number of patches."""
     tried: list[tuple[int, float]]
-    """The sides that were tried, and what the seams of each show."""
+    """Sides that were tried, and the visibility of the seams of each."""
     whole: bool
     """Whether every coordinate is that of a pixel."""
 
@@ -52,13 +52,13 @@ def fill(
     open_, wide : (H, W) bool
         The hole, and what may be replaced.
     far : (H, W) bool, optional
-        What may be replaced of a plane whose things lie apart: what the hole cuts through is left out whole.
+        Pixels that may be replaced on a plane with separate elements. Elements that the hole cuts are not copied.
     usable : (H, W) bool
         What may be copied.
     plane : Plane, optional
         The plane that is copied from, and filled in.
     scales : sequence of (H, W) float32, optional
-        How large elements are, where there is no plane, or too little of it.
+        Size of the elements, if no plane is known, or too little of it.
     patch : int, optional
         Side of the patches, in pixels.
     mirrors : sequence of Flip

@@ -168,7 +168,7 @@ def paint_over(picture: Array, open_: Bools) -> Array:
     box = []
     for axis in range(2):
         marked = np.flatnonzero(open_.any(axis=1 - axis))
-        # What is known right around them is nearer than all that is beyond.
+        # The known pixels next to the holes are nearer than all others.
         box.append(slice(max(0, int(marked[0]) - 1), int(marked[-1]) + 2))
     part = tuple(box)
     nearest = distance_transform_edt(open_[part], return_distances=False, return_indices=True)

@@ -1,4 +1,4 @@
-"""What a completion shows of its seams: how far patches are from going on in what lies beside them."""
+"""Visibility of the seams of a filled hole: how badly patches continue into their neighbours."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Holes filled by optimisation: windows that fit what is around them, with elements of the size that belongs there.
 
-W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008: the scale is recovered from what
-is known, continued into the hole, and the hole synthesised with the rest as the exemplar.
+W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008. The scale is recovered from
+the known pixels and continued into the hole. The hole is then synthesised with the known pixels as the exemplar.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from texrs.source_map import SourceMap
 SETTINGS = replace(
     FROM_ATLAS, passes=(24, 12, 6), acceptance=1.0, coherence=0.3, continuation=0.0, repetition=0.1, exhaustive=1 << 24
 )
-"""What goes on across a hole counts more than that nothing rare is lost, and a copy of what is beside it is no fault."""
+"""Features that continue across a hole are more important than rare ones, and copies of the surroundings are allowed."""
 LEAST = 16
 """Least side of a picture."""
 AROUND = 12
@@ -47,9 +47,9 @@ def recover_scale(
     known = ~open_
     if isinstance(given, str):
         if given != "auto":
-            raise InvalidInput(f"{name}: must be 'auto', a map or None; got {given!r}")
+            raise InvalidInput(f"{name}: must be 'auto', a map or None, got {given!r}")
         if not known.any():
-            raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
+            raise InvalidInput(f"{name}: 'auto' needs known pixels, and the hole covers the whole image; pass a map")
         found = measure_known_scale(picture, known)
         return found.scale, found
     scale, holds = try_array(given), find_kind(given) or scale_kind

@@ -1,7 +1,7 @@
 """Holes in pictures of several planes: each is filled in by itself, from what is seen of it, and as it is seen.
 
-What is none of the planes, as the sky above a floor, goes on behind them as it lies. Where two meet in a hole neither sees the
-other: both are filled in a little further than they show, and cut where one ends (`texrs.inpainting._sides`).
+Parts outside the planes, such as the sky above a floor, continue behind the planes. Two planes that meet in a hole are both
+filled a little beyond their visible part, and cut at the line where they meet (`texrs.inpainting._sides`).
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from texrs.source_map import SourceMap
 LEAST = 0.05
 """Nearer to the horizon than this share of the middle's scale nothing is seen of a plane."""
 FEWEST = 0.02
-"""Share of a picture that something beside the planes must take for anything to lie behind them."""
+"""Least share of the image outside the planes. A smaller part does not continue behind them."""
 BESIDE = 0.5
-"""How much nearer the camera a corner of the picture may be than its middle, from -1 to 1, for something behind to have it."""
+"""Largest nearness of a corner to the camera, relative to the middle, -1 to 1, if the corner shows a part behind the planes."""
 MOSTLY = 0.8
-"""Share of what is known around a hole that shows one thing, of which the hole is a part then."""
+"""Share of the pixels around a hole that show one part. The hole then belongs to this part."""
 ALIKE = 0.15
-"""Difference of mean colours, of 1, up to which what lies apart is one thing, as the sky on both sides of a tower."""
+"""Largest difference of the mean colours, 0 to 1, of regions of one part, such as the sky on both sides of a tower."""
 BAND, NARROWEST, WIDEST = 0.4, 16, 64
 """By how much more of a plane is filled in than is shown, where it meets another: in roots of its area, and in pixels."""
 
@@ -52,7 +52,7 @@ class Part:
     reach: Bools | None = None
     """(H, W): where it can be seen at all; None for everywhere."""
     large: Bools | None = None
-    """(H, W): where so much of it is seen that it may go on behind something; None for wherever it is seen."""
+    """(H, W): where enough of it is visible to continue behind other parts; None: everywhere that it is visible."""
 
     @classmethod
     def of(cls, shown: Bools, plane: Plane | None, origin: Sequence[int] = (0, 0)) -> Part:
@@ -64,9 +64,9 @@ class Part:
 
 
 def lay(plane: Plane, shape: Sequence[int], origin: Sequence[int] = (0, 0)) -> Slope | None:
-    """Return a plane by the sizes of things in a picture (rows, columns) that begins at a point of its own picture.
+    """Return the sizes of elements on a plane, in an image (rows, columns) that begins at a point of the plane's own image.
 
-    None where it is seen from the front. What lies beyond its horizon does not count.
+    None: the plane is seen from the front. Pixels beyond its horizon do not count.
     """
     middle = np.array(plane.principal_point) - origin
     corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], np.float64)
@@ -83,11 +83,11 @@ def lay(plane: Plane, shape: Sequence[int], origin: Sequence[int] = (0, 0)) -> S
 
 
 def add_rest(parts: Sequence[Part], hole: Bools, pixels: Array) -> list[Part]:
-    """Return the parts with what is none of them: it goes on where enough of it is seen, and it is no thing on them.
+    """Return the parts, and the regions outside them that continue behind them.
 
-    A sky, or a wall, has a corner of the picture where one of the parts goes away from the camera (upwards, as floors do, where
-    it is not known how it lies), or is what a hole lies in; a cup on a table, or the shadow of one that is taken out, is
-    neither. What has other colours is another part: a wall does not go on as the sky beside it.
+    A sky or a wall surrounds a hole, or contains a corner of the image where a plane recedes from the camera. Floors
+    recede upwards if their orientation is not known. An object on a plane, such as a cup on a table, is not such a
+    region. Regions of different colours are different parts: a wall does not continue as the sky next to it.
     """
     from scipy.ndimage import label
 
@@ -131,17 +131,17 @@ class Mended:
     owner: NDArray[np.uint16]
     """(H, W): the part that each pixel shows."""
     replaced: Bools
-    """(H, W): what does not come from where it is."""
+    """(H, W): pixels that are copied from other places."""
     counts: tuple[int, ...]
     """Patches of each part."""
     shades: NDArray[np.uint8]
-    """(H, W): where each part was seen, the lighter the earlier; 0 in the holes, and of what is none of them."""
+    """(H, W) grey levels: where each part was visible, lighter for earlier parts; 0 in the holes and outside all parts."""
 
     def finish(self, screening: float, first: tuple[int, int] | None) -> dict[str, Any]:
-        """Return how the picture is finished, for a `RenderOptions`.
+        """Return the options of a `RenderOptions`.
 
-        Seams are evened out, but not where two parts meet, for one would stain the other; and light is followed where it is
-        said at which place in what is known the first pixel lies.
+        Seams are corrected, except where two parts meet: the colours of one would stain the other. Light is followed if the
+        place of the first pixel in the known image is given.
         """
         if not screening and first is None:
             return {}
@@ -182,9 +182,9 @@ def fill_parts(
     boundary : int
         Pixels around the holes that may change too.
     things : int
-        The same of planes whose things lie apart from each other.
+        The same for planes with separate elements.
     light : bool
-        Whether what is copied is compared, and goes on, as it would look in even light.
+        If True, patches are compared and continued as they would look in even light.
     patch : int, optional
         Side of the patches in pixels.
     seed : int

@@ -1,4 +1,4 @@
-"""A picture with holes, and what they may be filled from; the same at half the size."""
+"""An image with holes, and the pixels that they may be filled from; the same at half the size."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from texrs.kernels.patch_search import PatchIndex
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a hole is filled in, and from."""
+    """An image with holes, and the image that they are filled from."""
 
     colours: Floats
     """(H, W, C)"""
     known: Bools
     """(H, W): False in the holes."""
     keep: Bools
-    """(H, W): what nothing may be pasted over."""
+    """(H, W): pixels that no patch may replace."""
     source: Floats
-    """(h, w, C): what is copied from; the colours themselves, or another picture's."""
+    """(h, w, C): the image that patches are copied from: the same colours, or those of another image."""
     free: Bools
-    """(h, w): what of it may be copied."""
+    """(h, w): pixels of it that may be copied."""
     wrap: tuple[bool, bool]
     """Axes along which the picture is cyclic."""
     _made: dict[tuple[Flip, ...], PatchIndex] = field(default_factory=dict, repr=False)
@@ -45,7 +45,7 @@ class Scene:
         return int(np.count_nonzero(~self.known))
 
     def halve(self) -> Scene:
-        """Return the scene at half the size; what is not wholly known is a hole, and an odd last line is left out."""
+        """Return the scene at half the size, without an odd last line. Partly known pixels are holes."""
         colours = _average(self.colours)
         return Scene(
             colours,

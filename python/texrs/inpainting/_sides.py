@@ -1,4 +1,4 @@
-"""Which part of a picture goes on where in a hole: a floor meets a wall in a line, and so it does behind what is taken out."""
+"""Decide which part of an image continues at each pixel of a hole. A floor and a wall meet in a line, also in the hole."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from texrs._masks import widen
 from texrs._typing import Bools
 
 REACH = 0.5
-"""Known pixels around a hole that tell where parts meet: so far away, in square roots of its area."""
+"""Distance of the known pixels around a hole that show where parts meet, in square roots of the area of the hole."""
 NEAREST = 16
-"""And at least so many pixels."""
+"""Least distance in pixels."""
 POINTS = 1500
-"""About so many of each part are looked at."""
+"""Number of pixels of each part that are compared, about."""
 FEWEST = 12
-"""With fewer of one a line would not be sure."""
+"""Least number of pixels of a part. With fewer pixels, a line is not reliable."""
 ANGLES = 180
-"""Directions in which a line may run."""
+"""Number of directions of a line that are tried."""
 FINER = 10
-"""Steps between two of them in which the best is then turned."""
+"""Number of steps between two directions, to refine the best one."""
 WRONG = 0.04
-"""Share of the pixels of a part that may lie on the wrong side of a line; where more do parts meet in no line."""
+"""Maximum share of the pixels of a part on the wrong side of a line. With more pixels, the parts do not meet in a line."""
 
 
 def share_out(hole: Bools, parts: Sequence[Bools], reach: Sequence[Bools]) -> NDArray[np.intp]:
     """Return the part that goes on at each pixel of a hole, -1 elsewhere.
 
-    Two parts that meet in a line beside the hole meet in that line in it; of others the nearer one goes on.
+    Two parts that meet in a line next to the hole meet in that line inside it. Otherwise the nearer part continues.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def share_out(hole: Bools, parts: Sequence[Bools], reach: Sequence[Bools]) -> ND
     parts : sequence of (H, W) bool
         Where each part is seen.
     reach : sequence of (H, W) bool
-        Where it can go on at all: of a floor below its horizon. What no part can reach is for the nearest.
+        Pixels that each part can reach: for a floor, those below its horizon. The nearest part continues at other pixels.
 
     """
     from scipy.ndimage import distance_transform_edt, find_objects, label
@@ -82,15 +82,15 @@ def _follow_lines(
             first = np.where(both, _measure(places, line[0]) < line[1], first)
         before[one] += first
         before[other] += ~first
-    # Of lines that meet in no point the nearer part goes on.
+    # If lines do not meet in a point, the nearer part continues.
     tied = np.where(before == before.max(axis=0), away, np.inf)
     return np.asarray(tied.argmin(axis=0), np.intp)
 
 
 def find_line(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[float, float] | None:
-    """Return the line with one set of points before it and the other beyond it, but for few; none where there is none.
+    """Return the line between two sets of points, with few points on the wrong side. None: no such line exists.
 
-    It is given by its direction in radians, and by how far along that the points before it reach.
+    The line is given by its direction in radians, and by its distance along this direction.
 
     Examples
     --------

@@ -1,22 +1,30 @@
-"""Any picture made tileable: its opposite edges meet along cuts that show the least.
+"""Make images tileable: opposite edges meet along the least visible cuts.
 
 J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.5. There the
-halves of the picture are swapped, and its former edges overlap in the middle, where a minimum cut joins them.
+halves of the image are swapped, and its former edges overlap in the middle, where a minimum cut joins them.
 
 Departures, with their reasons:
 
-- An axis along which the picture tiles already is left as it is.
-- The halves are not swapped back and forth: the cut lies at the border, and pixels far from it stay where they are.
-- The cut of the second axis lives on a cylinder and closes on itself. A cut that is open ends at two heights and
-  opens the wrap of the first axis again.
-- The overlap is searched, up to seven sixteenths of the side, not fixed at 50 pixels. It gives the period of the result: in
-  brickwork few of them make the courses meet, and large stones can only be parted where they end. What is laid over each
-  other must fit, which a cheap cut through plain ground does not say.
-- Where two cuts cost little more than one, the former edges are covered from elsewhere in the picture,
-  and the result keeps the size of the picture.
+- An axis along which the image tiles already does not change.
+
+- The halves are not swapped. The cut is at the border, and pixels far from it stay in place.
+
+- The cut of the second axis closes on itself. An open cut ends at two heights and opens the wrap of the first axis again.
+
+- The overlap is searched, up to 7/16 of the side, and not fixed at 50 pixels. It determines the period of the result.
+  The courses of a wall meet only for some periods, and large stones can be separated only where they end.
+
+- The overlapping parts must be similar. The cost of a cut does not show this if the cut runs through plain background.
+
+- If two cuts cost little more than one, other parts of the image cover the former edges. The result keeps the size.
+
 - A cut costs more the deeper inside elements it runs.
+
 - Uneven light is evened out first if there is evidence of it.
-- A result larger than the picture is a cyclic quilt of it; a lattice is stretched by as little as makes it close, as in
+
+- A border or seam that stays visible is measured, and other joints are tried.
+
+- A result larger than the image is a periodic quilt of it. A lattice is stretched a little so that it closes, as in
   `texrs.design`.
 """
 
@@ -24,6 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +51,8 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.materials import Material
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
-from texrs.tiling._check import AXES, Tiling, check_tiling, find_tiled, report_tiling
+from texrs.tiling._borders import SEEN
+from texrs.tiling._check import AXES, Tiling, check_result, check_tiling, find_tiled, report_tiling
 from texrs.tiling._extend import extend
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
 from texrs.tiling._light import is_uneven, name_image
@@ -52,16 +62,20 @@ from texrs.tiling._things import SMALLEST, Things, find_things
 __all__ = ["Tiling", "check_tiling", "tile"]
 
 SHARE, LEAST = 8, 25
-"""An overlap that is chosen is at least the side divided by the one, or the other in pixels."""
+"""Least overlap that is chosen: the side divided by the first number, at most the second number in pixels."""
 LARGER = "texrs.CornerTiles makes an endless design, and gives it in parts"
-"""How larger ones are made."""
+"""Advice for results that are too large."""
 MOST = 7
-"""Sixteenths of the side that it is at most."""
+"""Maximum overlap, in sixteenths of the side."""
 REGULAR, DEAR = 1.0, 0.5
-"""Factor of the cost that a cut next to a cover may have if elements are on a lattice, and if they are large or the
-side is not a multiple of their period."""
+"""Cost that a cut next to a cover may have, relative to the cut of an overlap. The first value is for elements on a lattice,
+the second value if a cover is unlikely to fit. It is unlikely for large elements, and for a side that is not a multiple of
+their period."""
 PERIODIC = 3.0
-"""Share of the price of a cut that an overlap of the whole side would add, among multiples of a period."""
+"""Price of an overlap of the whole side, relative to the price of a cut, among multiples of a period."""
+REFUSED = ((0, 1), (1, 0), (1, 1))
+"""Number of joints of the rows and of the columns that each further attempt leaves out. Attempts are made only if a
+border or seam is visible, and the result is the attempt whose boldest figure is least."""
 ELEMENT = 0.22
 """Elements larger than this share of a side are seldom whole between two cuts."""
 
@@ -76,49 +90,51 @@ def tile(
     flatten_lighting: bool | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Make a picture tileable: copies of the result side by side have no edge between them.
+    """Make an image tileable: copies of the result side by side have no edge between them.
 
-    An axis along which the picture tiles already stays as it is. Pixels far from the border stay where they are.
+    An axis along which the image tiles already does not change. Pixels far from the border stay in place.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array, or Exemplar
-        The picture, any real dtype, at least 2 pixels along an axis that wraps.
+        The image, any real dtype, at least 2 pixels along an axis that wraps.
     wrap : bool or (rows, columns), optional
         Axes along which the result repeats; None: both.
     size : int or (rows, columns), optional
-        Size of the result in pixels, at least 2 along an axis that wraps. By default the size of the picture, or less along an
-        axis where that shows clearly less: the report contains the reason. A result larger than the picture, at
-        least 8 pixels a side, is a quilt of it, for which a lattice is stretched so that it closes.
+        Size of the result in pixels, at least 2 along an axis that wraps. By default the size of the image, or less along an
+        axis if the joint is then clearly less visible: the report contains the reason. A result larger than the image,
+        at least 8 pixels a side, is a quilt of it. A lattice is then stretched so that it closes.
     overlap : int or (rows, columns), optional
-        How many pixels of two opposite edges are laid over each other, 1 to half the side, instead of a size. By
-        default what shows least.
+        Overlap of two opposite edges in pixels, 1 to half the side, instead of a size. By default the least visible one.
     screening : float, optional
-        Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear: the smaller, the wider the
-        correction. None or 0: no correction, so that each pixel is one of the picture. See `texrs.blend`.
+        Weight of the values in the correction of colours at seams, 0 to 1e6. A smaller weight gives a wider correction.
+        None or 0: no correction, so that each pixel is a pixel of the image. See `texrs.blend`.
     flatten_lighting : bool, optional
         If True, uneven light is evened out first, as far as there is evidence of it. By default only if one part is lit at
-        least 1.6 times brighter than another part, and no side is shorter than 128 pixels. Of a material only colours
-        are flattened. See `texrs.materials.flatten_lighting`.
+        least 1.6 times brighter than another part, and no side is shorter than 128 pixels. Only the colours
+        of a material are changed. See `texrs.materials.flatten_lighting`.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        Called as ``progress(stage, share)``, with the finished share of the stage; raising stops the work.
         True shows a bar.
 
     Returns
     -------
     Synthesis
-        The image, in the dtype and with the channels of the picture; an axis that does not wrap keeps its length, or that
-        much of its middle that was asked for. The stages are ``"shifted"`` (the halves
-        exchanged, nothing cut yet), ``"source_regions"`` (which part of the picture each pixel is from) and
-        ``"before_blending"``, the result before colours are corrected. The report contains for each axis the overlap, 0 if the
-        ends are covered, the number of joints that were tried, and the cost of the cuts. ``already`` lists the axes along which
-        the picture tiles. ``in_place`` is the share of the pixels that are those of the picture at the same place. ``resized``
-        is the reason for another size, and ``tiling`` is what `texrs.check_tiling` finds in the result.
+        The image, in the dtype and with the channels of the input. An axis that does not wrap keeps its length, or its
+        middle part of the requested length. Stages: ``"shifted"`` is the image with its halves exchanged, before any cut.
+        ``"source_regions"`` shows the part of the image that each pixel is from. ``"before_blending"`` is the result
+        before colours are corrected. ``joints`` in the report contains the overlap of each axis, 0 if the ends are
+        covered. It also contains the number of joints that were tried, and the cost of the cuts. ``already`` lists the
+        axes along which the image tiles. ``in_place`` is the share of the pixels that come from the same place of the
+        image. ``unchanged`` is the share that equal the pixel of the image there. ``resized`` is the reason for another
+        size. ``in_step`` is whether elements are on a strict lattice, so that a size must be a multiple of its period.
+        ``tiling`` is what `texrs.check_tiling` finds in the result with its source map. If a border or a seam is visible,
+        other joints are tried. ``warnings`` lists those that stay visible.
 
     Raises
     ------
     InvalidInput
-        A volume, a side that is too short, a size or an overlap outside its limits, or both of them.
+        A volume, a side that is too short, a size or an overlap outside its limits, or a size together with an overlap.
 
     References
     ----------
@@ -160,7 +176,8 @@ def tile(
         if already:
             along = " and ".join(AXES[a] for a in already)
             assume(f"{name_image(given)}: tiles already along the {along}, which are not changed")
-        made = join_edges(
+        join = partial(
+            join_edges,
             image,
             wrap=cyclic,
             size=wanted,
@@ -170,7 +187,16 @@ def tile(
             flatten_lighting=evened,
             progress=listen(progress),
         )
-    return replace(made, report=notices.add_to(made.report)) if notices else made
+        made = join()
+        for refused in REFUSED:
+            if find_boldest(made) <= SEEN or not made.report["joints"] or made.report["in_step"]:
+                break
+            other = join(refused=refused)
+            # A joint that loses more of the image is not better.
+            if find_boldest(other) < find_boldest(made) and other.source_map.label.size >= made.source_map.label.size:
+                made = other
+    report = {**made.report, "unchanged": measure_unchanged(made.image, pixels), "warnings": list_visible(made)}
+    return replace(made, report=notices.add_to(report))
 
 
 tile.takes = ("image",)  # type: ignore[attr-defined]
@@ -186,11 +212,12 @@ def join_edges(
     already: Sequence[int],
     screening: float,
     flatten_lighting: bool,
+    refused: Sequence[int] = (0, 0),
     progress: Progress | None,
 ) -> Synthesis:
-    """Return a picture whose edges are joined along the axes that wrap, and do not tile ``already``.
+    """Return an image whose edges are joined along the axes that wrap and do not tile ``already``.
 
-    ``flatten_lighting``: whether the picture is in even light, which it was not.
+    ``flatten_lighting``: whether the light of the image was evened out. ``refused``: see `find_joint`.
     """
     exemplar, watch = as_exemplar(image, "image"), progress or (lambda stage, share: None)
     shape = (exemplar.shape[0], exemplar.shape[1])
@@ -202,11 +229,11 @@ def join_edges(
     if larger:
         source = extend(exemplar.guidance, size, wrap, watch)
     else:
-        source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, watch)
+        source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, refused, watch)
     weight = screening if found or larger else 0.0
     source = source.with_finish(wrap, screening=weight or None, flatten_lighting=flatten_lighting)
     composite = source.render(exemplar.image)
-    # The picture is in even light already.
+    # The light of the image is even already.
     finish = None if source.finish is None else replace(source.finish, flatten_lighting=False)
     result = apply(source, exemplar.image, finish=finish, progress=progress) if weight else composite
     watch("done", 1.0)
@@ -226,37 +253,68 @@ def join_edges(
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
         "joints": {AXES[a]: describe(joined) for a, joined in found.items()},
         "in_place": round(measure_kept_places(source), 4),
-        "tiling": report_tiling(result, wrap, regular=things is not None and things.regular),
+        "in_step": things is not None and things.strict,
+        "tiling": report_tiling(
+            check_result(result, source, wrap, regular=things is not None and things.regular), wrap
+        ),
     }
     return Synthesis(result, source, stages, report)
 
 
+def find_boldest(made: Synthesis) -> float:
+    """Return the boldness of the boldest border or seam of a result."""
+    return max(each[name] or 0.0 for each in made.report["tiling"].values() for name in ("seam", "step"))
+
+
+def list_visible(made: Synthesis) -> list[str]:
+    """Return a sentence about each border and each seam that is visible."""
+    return [
+        f"{axis}: {where} is visible, {each[name]:.1f} times as bold as the boldest lines elsewhere"
+        for axis, each in made.report["tiling"].items()
+        for name, where in (("seam", "the border"), ("step", "a seam inside the image"))
+        if (each[name] or 0.0) > SEEN
+    ]
+
+
+def measure_unchanged(image: Array, given: Array) -> float:
+    """Return the share of the pixels of a result that equal those of the input at the same place."""
+    rows, columns = (min(n, m) for n, m in zip(image.shape[:2], given.shape[:2], strict=True))
+    shown, before = (each[:rows, :columns].reshape(rows, columns, -1) for each in (image, given))
+    # Over few channels, `all` takes ten times as long.
+    same = np.ones((rows, columns), bool)
+    for channel in range(shown.shape[-1]):
+        same &= shown[..., channel] == before[..., channel]
+    return round(float(same.sum()) / (image.shape[0] * image.shape[1]), 4)
+
+
 def keeps_colours(image: Array | Exemplar | Material, screening: float) -> bool:
-    """Return whether a result has no other colours than the picture, which is then never in another light."""
+    """Return whether a result has only the colours of the image. Its light is then never evened out."""
     if isinstance(image, Material):
         return has_few_colours(np.asarray(image.base))
     return find_palette({"image": image, "screening": screening}, ("image",), {}) is not None
 
 
 def measure_kept_places(source: SourceMap) -> float:
-    """Return the share of the pixels that come from the same place of the picture."""
-    return float((source.coordinates == np.moveaxis(np.indices(source.shape, np.float32), 0, -1)).all(axis=-1).mean())
+    """Return the share of the pixels that come from the same place of the image."""
+    rows, columns = (np.arange(n, dtype=np.float32) for n in source.shape)
+    there = (source.coordinates[..., 0] == rows[:, np.newaxis]) & (source.coordinates[..., 1] == columns)
+    return float(there.mean())
 
 
 def as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tuple[int, int]:
-    """Return the size of the result, as far as it is known: what was asked for, or the picture's."""
+    """Return the requested size of the result, or the size of the image."""
     for axis, side in enumerate(shape):
         if wrap[axis] and side < 2:
-            raise InvalidInput(f"image: needs at least 2 {AXES[axis]} to wrap them, got {side}")
+            raise InvalidInput(f"image: must have at least 2 {AXES[axis]} to wrap them, got {side}")
     if size is None:
         return shape
     rows, columns = as_size(size, way=LARGER)
     for axis, side in enumerate((rows, columns)):
         if wrap[axis] and side < 2:
-            raise InvalidInput(f"size: needs at least 2 {AXES[axis]} to wrap them, got {side}")
+            raise InvalidInput(f"size: must have at least 2 {AXES[axis]} to wrap them, got {side}")
         if side > shape[axis] and min(shape) < SMALLEST:
             raise InvalidInput(
-                f"size: more than the picture's {shape} needs {SMALLEST} pixels a side of it, got {side}"
+                f"size: must be at most that of the image, {shape}, if a side has fewer than {SMALLEST} pixels, got {side}"
             )
     return rows, columns
 
@@ -264,11 +322,11 @@ def as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tupl
 def as_choices(
     overlap: object, free: bool, shape: tuple[int, int], size: tuple[int, int], wrap: Sequence[bool]
 ) -> list[Choice]:
-    """Return the joints of each axis that may be chosen; ``free``: whether they choose the size."""
+    """Return the joints of each axis that may be chosen; ``free``: whether the size depends on the joint."""
     if overlap is None:
         return [_choose(n, m, free) for n, m in zip(shape, size, strict=True)]
     if not free:
-        raise InvalidInput("overlap: the size says it already; give one of the two")
+        raise InvalidInput("overlap: cannot be combined with size")
     several = list(overlap) if isinstance(overlap, Sequence | np.ndarray) and not isinstance(overlap, str) else None
     several = [overlap] * 2 if several is None else several
     if len(several) != 2:
@@ -285,9 +343,9 @@ def as_choices(
 
 def _choose(side: int, wanted: int, free: bool) -> Choice:
     if free:
-        # Of all that lies over each other every line but one would be taken: the border could not be at a calm one.
+        # A larger overlap leaves only one possible place for the border, which may be a bold one.
         return Choice(max(1, min(LEAST, side // SHARE)), max(1, side * MOST // 16), side)
-    # More than half cannot be laid over each other.
+    # Two halves are the largest parts that can overlap.
     overlap = min(side - wanted, wanted)
     return Choice(max(1, overlap), overlap, wanted)
 
@@ -299,18 +357,19 @@ def join_ends(
     choices: Sequence[Choice],
     wrap: Sequence[bool],
     already: Sequence[int],
+    refused: Sequence[int],
     watch: Progress,
 ) -> tuple[SourceMap, dict[int, Joined], dict[str, str]]:
-    """Return the map of a picture no larger than it, the joints of its axes, and the reasons for another length.
+    """Return the source map of a result that is not larger, the joints of its axes, and the reasons for other lengths.
 
-    ``already``: axes along which the picture tiles.
+    ``already``: axes along which the image tiles. ``refused``: see `find_joint`.
     """
     shape = (colours.shape[0], colours.shape[1])
-    # Of more than can be laid over each other the middle is taken.
+    # Take the middle of an image that is more than twice as long as the result.
     kept = [min(n, 2 * m) if cyclic else m for n, m, cyclic in zip(shape, wanted, wrap, strict=True)]
     corner = [(n - m) // 2 for n, m in zip(shape, kept, strict=True)]
     part = tuple(slice(low, low + n) for low, n in zip(corner, kept, strict=True))
-    # What each pixel shows: which pixel of the picture, and which piece of it.
+    # Index of the pixel of the image that each pixel is copied from. The label is its piece.
     place = np.arange(shape[0] * shape[1]).reshape(shape)[part]
     label: NDArray[np.uint32] = np.zeros(place.shape, np.uint32)
     found: dict[int, Joined] = {}
@@ -325,7 +384,7 @@ def join_ends(
         if things.side > ELEMENT * place.shape[axis]:
             choice = replace(choice, covered=DEAR)
         elif things.is_out_of_step(axis, place.shape[axis]):
-            # Any multiple of the period fits: the largest one is wanted.
+            # Any multiple of the period fits, so prefer the largest one.
             choice = replace(choice, covered=DEAR, loss=PERIODIC)
         elif things.regular:
             choice = replace(choice, covered=REGULAR)
@@ -335,6 +394,7 @@ def join_ends(
             choice,
             closed=bool(found) or 1 - axis in already,
             progress=lambda share, axis=axis: watch(f"join {AXES[axis]}", share),  # type: ignore[misc]
+            refused=refused[axis],
         )
         line, piece = lay_out(place.shape[1 - axis], joined)
         line, piece = np.moveaxis(line, 0, axis), np.moveaxis(piece, 0, axis)
@@ -355,12 +415,12 @@ def give_reason(joined: Joined, things: Things, axis: int, side: int) -> str:
     if things.side > ELEMENT * side:
         return f"{side} -> {length} pixels: elements are large, and fewer are cut at this length"
     if things.is_out_of_step(axis, side):
-        return f"{side} -> {length} pixels: {side} is not a multiple of the period of about {period:.1f}"
+        return f"{side} -> {length} pixels: no multiple of the period of about {period:.1f} fits, and the ends fit better here"
     return f"{side} -> {length} pixels: a joint that keeps the length costs {joined.dearer:.1f} times as much"
 
 
 def describe(joined: Joined) -> dict[str, object]:
-    """Return what was done at one axis."""
+    """Return the report about one axis."""
     joint, edges = joined.joint, sum(cut.edges for cut in joined.cuts)
     cost = sum(cut.value for cut in joined.cuts)
     return {

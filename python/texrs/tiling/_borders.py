@@ -1,9 +1,10 @@
-"""How far a picture repeats: the step across its border, compared with the steps between its other lines."""
+"""Steps across the border of an image, compared with the steps between its other lines."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,12 @@ USUAL = 95
 FLAT = 0.25
 """Share of the mean step that is added to both parts of a ratio. Noise in flat parts then does not count as a step."""
 TINY = 1e-4
-"""The same for a picture without steps, in units of the guide."""
+"""The same for an image without steps, in units of the guide."""
 SEEN = 1.25
 """Largest figure of a border that tiles. It was chosen on 404 borders that tile and 350 borders of crops. 4 % and 5 % of
 these are judged wrongly. On as many others, 2 % and 7 % are."""
 SHORTEST = 8
-"""Fewer lines than this say nothing about what is usual."""
+"""Least number of lines. Fewer lines do not show which steps are usual."""
 STRICT, OUT_OF_STEP = 0.5, 1.5
 """Least correlation of a lattice that must continue across a border, and largest ratio of the differences to the image
 a period away. The factor is relative to the largest difference elsewhere."""
@@ -51,16 +52,17 @@ class Border:
         return self.figure <= SEEN
 
 
-def measure_border(guide: Floats, axis: int, lattice: Lattice | None = None) -> Border | None:
+def measure_border(guide: Floats, axis: int, lattice: Lattice | None = None, *, enough: float = inf) -> Border | None:
     """Return the border of an axis of a guide (H, W, C); None if there are too few lines to compare it with.
 
     The ratio of each step to the steps on both sides is compared. An edge of a photograph is on several lines, but a
-    cut is on one. A picture on a lattice must continue on the lattice too: half a brick has no steps.
+    cut is on one. An image on a lattice must continue on the lattice too: half a brick has no steps. A figure above
+    ``enough`` ends the search, and is then not the largest one.
     """
     side, length = guide.shape[axis], guide.shape[1 - axis]
     found: Border | None = None
     for scale in SCALES:
-        if side < SHORTEST * scale or length < scale:
+        if side < SHORTEST * scale or length < scale or (found is not None and found.figure > enough):
             break
         step, beside = _compare_sides(guide, axis, scale)
         for count in {min(WINDOW, step.shape[1]), step.shape[1]}:
@@ -77,7 +79,7 @@ def measure_border(guide: Floats, axis: int, lattice: Lattice | None = None) -> 
 
 
 def _compare_periods(guide: Floats, axis: int, lattice: Lattice) -> float:
-    """Return how many times more a picture differs from what is a period away across the border than at most elsewhere."""
+    """Return the difference of pixels a period apart across the border, relative to the largest difference elsewhere."""
     lines = np.moveaxis(guide, axis, 0)
     side, length = lines.shape[:2]
     (a, b), most = (np.array(vector) for vector in (lattice.a, lattice.b)), 0.0
@@ -109,7 +111,7 @@ def _compare_sides(guide: Floats, axis: int, scale: int) -> tuple[Floats, Floats
 
 
 def _add_channels(values: Floats) -> Floats:
-    """Return the sums over the channels: over so few, `sum` takes ten times as long."""
+    """Return the sums over the channels. For few channels `numpy.sum` takes ten times as long."""
     return np.asarray(sum(values[..., c] for c in range(values.shape[-1])))
 
 

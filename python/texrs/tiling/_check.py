@@ -1,24 +1,28 @@
-"""Whether a picture tiles, and how bold its border is if it does not."""
+"""Whether an image tiles, how bold its borders are, and how bold the seams inside it are."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 from texrs._arrays import as_image, guidance
 from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.exemplar.regularity import find_lattice
 from texrs.materials import Material
+from texrs.source_map import SourceMap
 from texrs.tiling._borders import SEEN, measure_border
+from texrs.tiling._steps import measure_steps
 
 AXES = ("rows", "columns")
 
 
 @dataclass(frozen=True, slots=True)
 class Tiling:
-    """How bold the borders between copies of a picture are.
+    """How bold the borders between copies of an image, and the seams inside it, are.
 
     Attributes
     ----------
@@ -28,7 +32,10 @@ class Tiling:
     place : ((int, int) or None, (int, int) or None)
         Where each border is boldest: first pixel along the border, and first pixel after that.
     maps : mapping of str to Tiling
-        Each map of a material; ``seam`` and ``place`` are those of the boldest map. Empty for a picture.
+        Each map of a material; the other attributes are those of the boldest map. Empty for an image.
+    step : (float or None, float or None)
+        Boldness of the steps across seams of the source map: between rows, and between columns. The value 1 means as
+        bold as the boldest lines elsewhere in the image. None: no source map, or no seam of a quarter of a side.
 
     Examples
     --------
@@ -41,10 +48,16 @@ class Tiling:
     seam: tuple[float | None, float | None]
     place: tuple[tuple[int, int] | None, tuple[int, int] | None]
     maps: Mapping[str, Tiling] = field(default_factory=dict)
+    step: tuple[float | None, float | None] = (None, None)
+
+    @property
+    def visible(self) -> bool:
+        """Whether a seam inside the image is visible: a step above 1.25."""
+        return max(step or 0.0 for step in self.step) > SEEN
 
     @property
     def tiles(self) -> tuple[bool, bool]:
-        """Whether the picture tiles along the rows and along the columns: a seam of at most 1.25."""
+        """Whether the image tiles along the rows and along the columns: a seam of at most 1.25."""
         rows, columns = (seam is not None and seam <= SEEN for seam in self.seam)
         return rows, columns
 
@@ -54,85 +67,110 @@ class Tiling:
         Returns
         -------
         dict
-            ``rows`` and ``columns``, each with ``tiles``, ``seam`` and ``place``; ``maps`` for a material.
+            ``rows`` and ``columns``, each with ``tiles``, ``seam``, ``place`` and ``step``; ``maps`` for a material.
 
         Examples
         --------
         >>> from texrs import Tiling
         >>> Tiling((0.9, 2.5), ((0, 16), (32, 48))).report()["columns"]
-        {'tiles': False, 'seam': 2.5, 'place': [32, 48]}
+        {'tiles': False, 'seam': 2.5, 'place': [32, 48], 'step': None}
 
         """
         made: dict[str, Any] = {
-            name: {"tiles": tiles, "seam": seam, "place": None if place is None else list(place)}
-            for name, tiles, seam, place in zip(AXES, self.tiles, self.seam, self.place, strict=True)
+            name: {"tiles": tiles, "seam": seam, "place": None if place is None else list(place), "step": step}
+            for name, tiles, seam, place, step in zip(AXES, self.tiles, self.seam, self.place, self.step, strict=True)
         }
         if self.maps:
             made["maps"] = {name: each.report() for name, each in self.maps.items()}
         return made
 
 
-def check_tiling(image: Array | Exemplar | Material) -> Tiling:
-    """Check whether a picture tiles: whether copies side by side have no visible border between them.
+def check_tiling(image: Array | Exemplar | Material, source_map: SourceMap | None = None) -> Tiling:
+    """Check whether an image tiles: whether copies side by side have no visible border between them.
 
     The step across the border is compared with the steps between other lines of the image. This is done at several
-    scales, on the whole border and on each part of it.
+    scales, on the whole border and on each part of it. With a source map, the seams inside the image are compared with
+    other places too: `tile` joins the ends of an image inside it.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array, Exemplar or Material
-        The picture, any real dtype. Each map of a material is checked.
+        The image, any real dtype. Each map of a material is checked.
+    source_map : SourceMap, optional
+        Source map of the image, (H, W): the attribute ``source_map`` of a result. Default: only borders are checked.
 
     Returns
     -------
     Tiling
-        Attributes ``tiles`` and ``seam``, each (rows, columns). It is wrong for about 2 % of the borders that tile and for
-        7 % of those that do not.
+        Attributes ``tiles``, ``seam`` and ``step``, each (rows, columns). ``tiles`` is wrong for about 2 % of the borders
+        that tile and for 7 % of those that do not.
 
     Raises
     ------
     InvalidInput
-        Not a picture.
+        Not an image, or a source map of another size.
 
     Examples
     --------
     >>> import texrs
     >>> pebbles = texrs.samples.pebbles((96, 96)).image
-    >>> texrs.check_tiling(pebbles).tiles, texrs.check_tiling(texrs.tile(pebbles).image).tiles
+    >>> made = texrs.tile(pebbles)
+    >>> texrs.check_tiling(pebbles).tiles, texrs.check_tiling(made.image, made.source_map).tiles
     ((False, False), (True, True))
 
     """
     if not isinstance(image, Material):
         known = image.guidance if isinstance(image, Exemplar) else guidance(as_image(image, "image"))
-        return measure_tiling(known)
-    maps = {name: measure_tiling(guidance(as_image(each.pixels, name))) for name, each in image.items()}
+        return measure_tiling(known, source=source_map)
+    maps = {
+        name: measure_tiling(guidance(as_image(each.pixels, name)), source=source_map) for name, each in image.items()
+    }
     boldest = [max(maps.values(), key=lambda each, axis=axis: each.seam[axis] or 0.0) for axis in range(2)]  # type: ignore[misc]
     rows, columns = boldest
-    return Tiling((rows.seam[0], columns.seam[1]), (rows.place[0], columns.place[1]), maps)
+    down, across = (max((each.step[axis] for each in maps.values()), key=lambda step: step or 0.0) for axis in range(2))
+    return Tiling((rows.seam[0], columns.seam[1]), (rows.place[0], columns.place[1]), maps, (down, across))
 
 
-def measure_tiling(guide: Floats, wrap: Sequence[bool] = (True, True), *, regular: bool = True) -> Tiling:
-    """Return the tiling of a guide (H, W, C), along some axes only; ``regular``: whether it can be on a lattice."""
-    borders = [measure_border(guide, axis) if cyclic else None for axis, cyclic in enumerate(wrap)]
+def measure_tiling(
+    guide: Floats,
+    wrap: Sequence[bool] = (True, True),
+    *,
+    regular: bool = True,
+    source: SourceMap | None = None,
+    enough: float = inf,
+) -> Tiling:
+    """Return the tiling of a guide (H, W, C), along some axes only.
+
+    ``regular``: whether it can be on a lattice. ``enough``: figure of a border that need not be measured further.
+    """
+    if source is not None and source.shape != guide.shape[:2]:
+        raise InvalidInput(f"source_map: must have the size of the image, {guide.shape[:2]}, got {source.shape}")
+    borders = [measure_border(guide, axis, enough=enough) if cyclic else None for axis, cyclic in enumerate(wrap)]
     if regular and any(each is not None and each.tiles for each in borders):
         lattice = find_lattice(guide)
         borders = [each and measure_border(guide, axis, lattice) for axis, each in enumerate(borders)]
     rows, columns = (None if each is None else each.figure for each in borders)
     down, across = (None if each is None else (each.start, each.stop) for each in borders)
-    return Tiling((rows, columns), (down, across))
+    step = (None, None) if source is None else measure_steps(guide, source, wrap)
+    return Tiling((rows, columns), (down, across), step=step)
 
 
 def find_tiled(image: Exemplar | Material, wrap: Sequence[bool]) -> list[int]:
-    """Return the axes along which a picture tiles, or each map of a material, of some axes."""
+    """Return the axes along which an image tiles, or each map of a material, of some axes."""
     maps = [image] if isinstance(image, Exemplar) else [Exemplar(each.pixels) for each in image.values()]
     left = list(wrap)
     for each in maps:
         if any(left):
-            left = list(measure_tiling(each.guidance, left).tiles)
+            left = list(measure_tiling(each.guidance, left, enough=SEEN).tiles)
     return [axis for axis, tiles in enumerate(left) if tiles]
 
 
-def report_tiling(image: Array, wrap: Sequence[bool], *, regular: bool) -> dict[str, Any]:
-    """Return the report of a result about the axes along which it wraps."""
-    found = measure_tiling(guidance(as_image(image)), wrap, regular=regular).report()
-    return {name: found[name] for name, cyclic in zip(AXES, wrap, strict=True) if cyclic}
+def check_result(image: Array, source: SourceMap | None, wrap: Sequence[bool], *, regular: bool) -> Tiling:
+    """Return the tiling of a result along the axes along which it wraps, and the steps across seams of a source map."""
+    return measure_tiling(guidance(as_image(image)), wrap, regular=regular, source=source)
+
+
+def report_tiling(found: Tiling, wrap: Sequence[bool]) -> dict[str, Any]:
+    """Return the report about the axes along which a result wraps."""
+    report = found.report()
+    return {name: report[name] for name, cyclic in zip(AXES, wrap, strict=True) if cyclic}

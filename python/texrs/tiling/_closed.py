@@ -1,4 +1,4 @@
-"""Cuts between two pictures that lie over each other, along seams that may have to close on themselves."""
+"""Cuts between two overlapping images, along seams that may have to close on themselves."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from texrs._typing import Bools, Floats
 from texrs.kernels.seam import Cut, Strip, cut_strips
 
 MORE = 8
-"""A seam that has to close is cut in the pictures and the side divided by this beyond either end of them."""
+"""A seam that has to close is cut in a longer strip: longer at each end by the side divided by this."""
 FLAT = 0.05
-"""What the kernel adds to the gradients that costs are divided by."""
+"""Value that the kernel adds to a gradient before it divides a cost by it."""
 
 
 def cut_overlaps(strips: Sequence[Strip], *, closed: bool) -> list[Cut]:
     """Cut strips whose first line shows A, and their last one B.
 
-    A least seam that closes takes ten times as long as one that need not. So the pictures are continued around their ends:
-    where the seam passes through the same place on both of its rounds it closes. If it never does, the least one is cut.
+    The search for the least closed seam takes ten times as long as the search for an open one. An open seam is therefore cut
+    in a strip that continues around its ends. It closes at a place that it passes twice. Without such a place, the least
+    closed seam is searched.
     """
     several = [strip for strip in strips if np.shape(strip.a)[0] > 1]
     made = iter(_cut_closed(several) if closed else cut_strips(several))
@@ -28,7 +29,7 @@ def cut_overlaps(strips: Sequence[Strip], *, closed: bool) -> list[Cut]:
 
 
 def _cut_line(strip: Strip) -> Cut:
-    """Return the cut of a single line, which leaves nothing to choose."""
+    """Return the only possible cut of a single line."""
     a, b = np.asarray(strip.a), np.asarray(strip.b)
     return Cut(np.zeros(a.shape[:2], bool), float(np.abs(a - b).sum(dtype=np.float64)), a.shape[1])
 
@@ -50,7 +51,7 @@ def _continue(strip: Strip) -> Strip:
 
 
 def _close(mask: Bools, side: int) -> Bools | None:
-    """Return a round of a seam between two places that are one; none where there are none."""
+    """Return one round of a seam, from a place that it passes twice. Without such a place, return None."""
     more = (mask.shape[1] - side) // 2
     same = np.flatnonzero((mask[:, :-side] == mask[:, side:]).all(axis=0))
     if not len(same):
@@ -60,7 +61,7 @@ def _close(mask: Bools, side: int) -> Bools | None:
 
 
 def measure_cut(strip: Strip, mask: Bools) -> Cut:
-    """Return a cut whose seam closes, with what it costs."""
+    """Return a cut whose seam closes, with its cost."""
     a, b, penalty = (np.asarray(each, np.float32) for each in (strip.a, strip.b, strip.penalty))
     apart = np.abs(a - b).sum(axis=-1)
     value, edges = 0.0, 0

@@ -1,4 +1,4 @@
-"""Cyclic pictures larger than the one they are made from."""
+"""Tileable images that are larger than the input."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from texrs.source_map import SourceMap
 from texrs.tiling._things import find_things
 
 PATCH, OVERLAP, DEEP = 0.6, 0.25, 6.0
-"""Side of a patch and overlap of two as shares of the picture's shorter side, and what depth costs a seam."""
+"""Side of a patch and overlap of two patches, as shares of the shorter side, and additional cost of a seam inside elements."""
 
 
 def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: Progress) -> SourceMap:
-    """Return the map of a cyclic quilt of a picture."""
+    """Return the source map of a periodic quilt of an image."""
     shape = (colours.shape[0], colours.shape[1])
     things = find_things(colours)
     picture = Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * things.depth, things.regular)
@@ -35,9 +35,9 @@ def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: 
 
 
 def close_lattice(picture: Picture, size: tuple[int, int], wrap: Sequence[bool]) -> Picture:
-    """Return a picture stretched so that its lattice closes on the torus; as it is where that would change it by much.
+    """Return an image stretched so that its lattice closes on the torus, or unchanged if that would stretch it too much.
 
-    The lattice is looked for in the picture itself: a fine one does not show in a small copy.
+    The lattice is searched at the full size, because a fine lattice is not visible in a small copy.
     """
     lattice = find_lattice(picture.colours)
     closing = None if lattice is None else lattice.close(size, (wrap[0], wrap[1]))

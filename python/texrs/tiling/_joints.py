@@ -1,8 +1,8 @@
-"""Where the ends of an axis are joined: every joint tried on a small picture, the best ones followed to the full size.
+"""Where the ends of an axis are joined: every joint is tried in a small copy, and the best are refined.
 
-A small picture tells as well as the full one where two ends of it agree, and a cut of an eighth of the side takes a
-hundredth of the time. So all overlaps up to half of the side are cut there, and all covers; the cheapest are followed from
-level to level, where each may be one of a few, which are told apart by what the seam of the level before costs.
+Two ends of an image that agree also agree in a small copy. A cut at 1/8 of the side takes 1/100 of the time. The search
+therefore cuts every overlap (up to half the side) and every cover in a small copy. It refines the cheapest joints level by
+level. It tries a few neighbouring joints at each level, and keeps the best by the seam cost of the previous level.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from texrs.kernels.seam import Cut, Strip, cut_strips
 from texrs.tiling._closed import cut_overlaps
 
 COARSEST = 96
-"""The shorter side of the coarsest level is at least so long, and less than twice that."""
+"""Least length of the shorter side of the coarsest level. It is less than twice this."""
 DEEP = 8.0
-"""How many times more a pair deep inside an element costs to part, less one."""
+"""Additional cost of a pair of pixels deep inside an element, as a multiple of the usual cost."""
 FOLLOWED = 3
-"""Joints that are followed from the coarsest level to the next, of which one goes on."""
+"""Number of joints that are refined from the coarsest level to the next. Only the best one is refined further."""
 APART = 2
-"""Pixels of the coarsest level by which they differ at least."""
+"""Least difference of these joints, in pixels of the coarsest level."""
 LOSS = 1.5
-"""Share of the price of a cut that an overlap of the whole side would add: what is overlapped is lost."""
+"""Price of an overlap of the whole side, relative to the price of a cut, because an overlap makes the result smaller."""
 COVERED = 1.6
-"""Factor of the cost that a cut next to a cover may have, relative to the cut of an overlap. A cover needs two cuts,
-but nothing is lost."""
+"""Cost that a cut next to a cover may have, relative to the cut of an overlap. A cover needs two cuts, but keeps the
+size."""
 BAND = 4
-"""Either cut of a cover is made in the side divided by this."""
+"""Length of the strip of each cut of a cover: the side divided by this."""
 NEAR = 6
-"""Lines on either side of a seam within which it is looked for at the next level, to judge a joint."""
+"""Lines on either side of a seam that are searched at the next level, to measure the cost of a joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Level:
-    """A picture at one size."""
+    """An image at one size."""
 
     colours: Floats
     """(H, W, C)"""
@@ -45,12 +45,12 @@ class Level:
     """(H, W): how deep inside an element each pixel is, 0 to 1."""
 
     def halve(self) -> Level:
-        """Return the level of half the size; an odd last line is left out."""
-        return Level(_halve(self.colours), _halve(self.depth))
+        """Return the level of half the size, without an odd last line."""
+        return Level(halve(self.colours), halve(self.depth))
 
 
 def make_levels(colours: Floats, depth: Floats) -> list[Level]:
-    """Return a picture at all sizes, the coarsest first."""
+    """Return an image at all sizes, the coarsest first."""
     levels = [Level(colours, depth)]
     while min(levels[0].depth.shape) >= 2 * COARSEST:
         levels.insert(0, levels[0].halve())
@@ -59,10 +59,10 @@ def make_levels(colours: Floats, depth: Floats) -> list[Level]:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """How the ends of an axis of some lines meet.
+    """How the two ends of an axis meet.
 
-    One cut: what comes ``width`` lines and less after the period is laid over the first lines. Or, with a ``cover``, two
-    cuts: around the ends the lines that come so many before are shown. The period is then any length.
+    With one cut, the ``width`` lines after the period overlap the first lines. With a ``cover``, there are two cuts: the
+    lines around the ends are replaced by the lines ``cover`` before them. The period is then any length.
     """
 
     period: int
@@ -70,14 +70,14 @@ class Joint:
     cover: int = 0
 
     def list_overlaps(self) -> list[tuple[int, int]]:
-        """Return the first lines of what is cut from and of what is cut to, for each cut."""
+        """Return the first lines of the two overlapping parts of each cut."""
         if not self.cover:
             return [(self.period, 0)]
         back = self.period - self.cover
         return [(self.period - self.width, back - self.width), (back, 0)]
 
     def list_finer(self, choice: Choice, side: int) -> list[Joint]:
-        """Return what it may be at a level of twice the size."""
+        """Return the joints near this one at a level of twice the size."""
         if self.cover:
             width = max(1, choice.period // BAND)
             low, high = max(width, 2 * self.cover - 1), min(choice.period - width, 2 * self.cover + 2)
@@ -92,17 +92,17 @@ class Choice:
     """Joints of an axis that may be chosen."""
 
     low: int
-    """The least overlap of one cut; none where ``high`` is less."""
+    """Least overlap of one cut. None is possible if ``high`` is less."""
     high: int
     period: int = 0
-    """The length of what is covered; 0: no cover."""
+    """Length of a result with a cover; 0: no cover."""
     covered: float = COVERED
-    """Factor of the cost that a cut next to a cover may have, relative to the cut of an overlap."""
+    """Cost that a cut next to a cover may have, relative to the cut of an overlap."""
     loss: float = LOSS
-    """Share of the price of a cut that an overlap of the whole side would add."""
+    """Price of an overlap of the whole side, relative to the price of a cut."""
 
     def coarsen(self, times: int, side: int) -> Choice:
-        """Return the choice at a level of ``side``, halved so many times."""
+        """Return the choice at a level of ``side``, halved a number of ``times``."""
         if not times:
             return self
         low = max(1, (self.low >> times) - 1)
@@ -110,7 +110,7 @@ class Choice:
         return replace(self, low=low, high=high, period=min(self.period >> times, side))
 
     def list_joints(self, side: int) -> list[Joint]:
-        """Return all joints; those that lose nothing come first."""
+        """Return all joints. Joints that keep the length come first."""
         width, period = max(1, self.period // BAND), self.period
         covers = [Joint(period, width, cover) for cover in range(width, period - width + 1)] if period else []
         return covers + [Joint(side - width, width) for width in range(self.low, self.high + 1)]
@@ -118,39 +118,47 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joined:
-    """A joint, and its cuts."""
+    """A joint and its cuts."""
 
     joint: Joint
     cuts: tuple[Cut, ...]
     factor: float = 1.0
-    """What the joint's price is multiplied by, besides the cost of its cuts."""
+    """Factor of the price of the joint."""
     tried: int = 1
     dearer: float = 1.0
-    """How many times more the best joint that keeps the length costs, at the coarsest level."""
+    """Cost of the best joint that keeps the length, relative to this joint, at the coarsest level."""
 
     @property
     def price(self) -> float:
-        """The mean cost of a cut, dearer where the joint loses something, and does not fit."""
+        """Mean cost of a cut, times a factor: above 1 if the joint shortens the axis, or if its parts differ."""
         return self.factor * sum(cut.value for cut in self.cuts) / len(self.cuts)
 
 
 def find_joint(
-    levels: Sequence[Level], axis: int, choice: Choice, *, closed: bool, progress: Callable[[float], object]
+    levels: Sequence[Level],
+    axis: int,
+    choice: Choice,
+    *,
+    closed: bool,
+    progress: Callable[[float], object],
+    refused: int = 0,
 ) -> Joined:
-    """Return the joint of an axis that shows least and loses least.
+    """Return the joint of an axis that is least visible and shortens the axis least.
 
     Parameters
     ----------
     levels : sequence of Level
-        The picture at all sizes, the coarsest first.
+        The image at all sizes, the coarsest first.
     axis : {0, 1}
-        The axis that becomes cyclic.
+        The axis that becomes periodic.
     choice : Choice
-        At the full size.
+        The possible joints at the full size.
     closed : bool
-        Whether the other axis is cyclic already, so that cuts must close on themselves.
+        Whether the other axis is periodic already, so that cuts must close on themselves.
     progress : callable
-        Called with the share that is done.
+        Called with the finished share.
+    refused : int
+        Number of earlier calls whose joint was not used. The best joints of those calls are left out.
 
     """
     last = len(levels) - 1
@@ -161,16 +169,18 @@ def find_joint(
     cuts = cut_joints(levels[0], axis, all_joints)
     misfits = np.array([measure_misfit(levels[0], axis, joint) for joint in all_joints])
     usual = float(np.median(misfits)) or 1.0
-    # Where a seam runs through plain ground its cost does not say that a course or a lattice is out of step.
+    # A seam through plain background is cheap even if courses or a lattice do not continue across it.
     costs = misfits / usual * [sum(each.value for each in cut) / len(cut) for cut in cuts]
     whole = min((cost for joint, cost in zip(all_joints, costs, strict=True) if joint.cover), default=0.0)
     found = []
     for joint, cut, misfit, cost in zip(all_joints, cuts, misfits.tolist(), costs.tolist(), strict=True):
         loss = 1 / choice.covered if joint.cover else 1 + choice.loss * joint.width / sides[0]
         found.append(Joined(joint, cut, loss * misfit / usual, len(all_joints), whole / cost if cost else 1.0))
-    best = _spread(found, FOLLOWED if last else 1)
+    followed = FOLLOWED if last else 1
+    best = _spread(found, followed * (refused + 1))
+    best = best[followed * refused :] or best[:followed]
     if closed:
-        # Seams that close cost little more, and take longer.
+        # Closed seams take longer. Cut them only for the best joints, because they cost little more.
         again = cut_joints(levels[0], axis, [each.joint for each in best], closed=True)
         best = [replace(each, cuts=cut) for each, cut in zip(best, again, strict=True)]
     for k in range(1, last + 1):
@@ -193,7 +203,7 @@ def _spread(found: Sequence[Joined], count: int) -> list[Joined]:
 
 
 def _refine(found: Joined, level: Level, axis: int, choice: Choice, *, closed: bool) -> Joined:
-    """Return a joint at the next level: the one of which the seams that are known would cost least, cut anew."""
+    """Return the joint at the next level whose seams near those of this level cost least, with new cuts."""
     near = found.joint.list_finer(choice, level.depth.shape[axis])
     costs = judge_seams(level, axis, near, found.cuts)
     joint = near[int(np.argmin(costs))]
@@ -202,13 +212,13 @@ def _refine(found: Joined, level: Level, axis: int, choice: Choice, *, closed: b
 
 
 def cut_joints(level: Level, axis: int, joints: Sequence[Joint], *, closed: bool = False) -> list[tuple[Cut, ...]]:
-    """Cut each joint: where what comes after the period, or before the cover, ends."""
+    """Cut each joint."""
     made = iter(cut_overlaps([s for joint in joints for s in _lay_over(level, axis, joint)], closed=closed))
     return [tuple(next(made) for _ in joint.list_overlaps()) for joint in joints]
 
 
 def _lay_over(level: Level, axis: int, joint: Joint) -> list[Strip]:
-    """Return what is to be cut, with its lines first."""
+    """Return the strips to cut, with their lines first."""
     colours, depth = np.moveaxis(level.colours, axis, 0), np.moveaxis(level.depth, axis, 0)
     strips = []
     for both in joint.list_overlaps():
@@ -220,14 +230,14 @@ def _lay_over(level: Level, axis: int, joint: Joint) -> list[Strip]:
 
 
 def measure_misfit(level: Level, axis: int, joint: Joint) -> float:
-    """Return the mean difference of what is laid over each other."""
+    """Return the mean difference of the overlapping parts."""
     colours = np.moveaxis(level.colours, axis, 0)
     pairs = [[colours[first : first + joint.width] for first in both] for both in joint.list_overlaps()]
     return float(np.mean([np.abs(a - b).mean() for a, b in pairs]))
 
 
 def judge_seams(level: Level, axis: int, joints: Sequence[Joint], cuts: Sequence[Cut]) -> list[float]:
-    """Return what each joint costs if its seams run near those of the level before."""
+    """Return the cost of each joint if its seams run near those of the previous level."""
     colours, depth = np.moveaxis(level.colours, axis, 0), np.moveaxis(level.depth, axis, 0)
     along = np.arange(colours.shape[1])
     strips = []
@@ -242,7 +252,7 @@ def judge_seams(level: Level, axis: int, joints: Sequence[Joint], cuts: Sequence
     return costs
 
 
-def _halve(image: Floats) -> Floats:
+def halve(image: Floats) -> Floats:
     rows, columns = (n // 2 * 2 for n in image.shape[:2])
     lines = image[0:rows:2, :columns] + image[1:rows:2, :columns]
     return np.asarray((lines[:, 0::2] + lines[:, 1::2]) * np.float32(0.25), np.float32)

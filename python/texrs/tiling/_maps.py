@@ -1,4 +1,4 @@
-"""Which line of a picture each pixel comes from when the ends of an axis are joined."""
+"""The line that each pixel comes from when the ends of an axis are joined."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from texrs.tiling._joints import Joined
 
 PICTURE, END, COVER = PIECES = range(3)
-"""The pieces of an axis: pixels in their place, those from beyond the last line, and those from elsewhere."""
+"""Pieces of an axis: pixels in place, pixels from beyond the last line, and pixels from elsewhere."""
 
 
 def lay_out(length: int, found: Joined) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
-    """Return which line each pixel of an axis with its ends joined comes from, and in which piece it is: (period, length).
+    """Return the line and the piece that each pixel comes from, (period, length) each.
 
-    ``length`` is that of the other axis. Lines far from the ends stay where they are.
+    ``length`` is the length of the other axis. Lines far from the ends stay in place.
     """
     joint = found.joint
     line = np.repeat(np.arange(joint.period)[:, np.newaxis], length, axis=1)

@@ -1,4 +1,4 @@
-"""The things of a picture that seams should spare, found in a small copy of it."""
+"""The elements of an image that seams should avoid, found in a small copy of it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from texrs.exemplar.segmentation import segment
 from texrs.tiling._joints import make_levels
 
 REACH = 3.0
-"""Depth in pixels of the coarsest level; all of an element beyond it counts as equally deep."""
+"""Largest depth inside an element, in pixels of the coarsest level."""
 CLOSE = 0.5
 """Least share of the image that close elements on a lattice cover. Seams need not keep to the joints of close
 elements."""
@@ -23,17 +23,17 @@ STRICT = 0.45
 WHOLE = 0.2
 """Largest difference between a length and a multiple of the period, as a share of the period."""
 SMALLEST = 8
-"""A picture of fewer pixels a side has no elements, and no patches of a quilt."""
+"""Least side of an image with elements, and of an image that can be quilted, in pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Things:
-    """What seams should spare."""
+    """The parts of an image that seams should avoid."""
 
     depth: Floats
-    """(H, W): how deep inside an element each pixel is, 0 to 1; 0 where none stand out."""
+    """(H, W): depth of each pixel inside an element, 0 to 1; 0 without elements."""
     side: float = 0.0
-    """What the element at a pixel of one measures on the average, in pixels."""
+    """Mean side of the elements in pixels, weighted by their area."""
     lattice: NDArray[np.float64] | None = None
     """Two shifts of the lattice as columns (2, 2), in pixels of the image; None without a lattice."""
     strict: bool = False
@@ -65,7 +65,7 @@ class Things:
 
 
 def find_things(colours: Floats) -> Things:
-    """Find what seams should spare in the coarsest level of a picture."""
+    """Find the elements that seams should avoid in the coarsest level of an image."""
     nothing = Things(np.zeros(colours.shape[:2], np.float32))
     if min(colours.shape[:2]) < SMALLEST:
         return nothing
@@ -74,7 +74,7 @@ def find_things(colours: Floats) -> Things:
     lattice = None if parts.lattice is None else scale * parts.lattice.vectors
     strict = parts.lattice is not None and parts.lattice.correlation >= STRICT
     close = (parts.elements > 0).mean() > CLOSE
-    # The joints between bricks go on across every seam: one that kept to them would show.
+    # The joints between bricks continue across every seam. A seam that follows them would be visible.
     if parts.kind != "components" or (lattice is not None and close):
         return replace(nothing, lattice=lattice, strict=strict)
     depth = parts.measure_depth(REACH)

@@ -70,7 +70,7 @@ from texrs.papers.design.report import describe, draw_stages
 from texrs.papers.design.texture import correct_colours, look_up
 from texrs.papers.design.trials import choose_plan, make_composite
 from texrs.synthesis import Synthesis
-from texrs.tiling._check import report_tiling
+from texrs.tiling._check import check_result, report_tiling
 
 __all__ = ["DeformationOptions", "design", "design_variants"]
 
@@ -353,7 +353,8 @@ def make_texture(plans: Sequence[Plan], arguments: Arguments, seed: int) -> Synt
     image, seams = correct_colours(composite, picture, arguments)
     report = describe(plans, tiles, composite, seams, arguments, seed)
     if any(arguments.wrap):
-        report["tiling"] = report_tiling(image, arguments.wrap, regular=plans[0].parts.lattice is not None)
+        found = check_result(image, None, arguments.wrap, regular=plans[0].parts.lattice is not None)
+        report["tiling"] = report_tiling(found, arguments.wrap)
     return Synthesis(image, composite, draw_stages(plans[0], tiles[0], picture), report)
 
 

@@ -1,0 +1,107 @@
+"""Steps across the seams inside an image: where neighbouring pixels come from places that are not neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats
+from texrs.source_map import SourceMap
+from texrs.tiling._joints import halve
+
+SCALES = 5
+"""Number of levels that are compared: blocks of 1, 2, 4, 8 and 16 pixels. A visible step is bold at most of them. A cut
+along the outline of an element is bold at the first level only."""
+FEWEST_SCALES, SHORTEST = 3, 8
+"""Least number of levels for a figure, and least side of a level in blocks."""
+SHIFTS = 32
+"""Number of places where a seam is compared: its own place, and others without a seam."""
+USUAL = 95
+"""Percentile of the other places that gives the figure 1."""
+LONG = 0.25
+"""Least length of a seam, as a share of the side that it crosses. Shorter seams are not measured."""
+TINY = 0.002
+"""Step that is not visible, in units of the guide. It is added to the steps at other places."""
+LEAST = 0.05
+"""Least figure of a level. Without it, a level without a step would decide the mean of all levels."""
+DIGITS = 4
+"""Digits of a figure after the point: the last bits of a mean depend on the processor."""
+
+
+def measure_steps(guide: Floats, source: SourceMap, wrap: Sequence[bool]) -> tuple[float | None, float | None]:
+    """Return how bold the steps across seams are: between rows and between columns.
+
+    The mean difference of both sides of a seam is compared with the same mean at other places of the image. The value 1
+    means as bold as the boldest of 95 % of these places. None: no seam is a quarter of a side long, or few pixels.
+
+    Parameters
+    ----------
+    guide : (H, W, C) float32
+        The image.
+    source : SourceMap
+        Source map of the image, with seams where it is not continuous.
+    wrap : (rows, columns)
+        Axes along which the border is a seam too, if the source map is not continuous there.
+
+    """
+    seams = [find_seams(source, axis, wrap[axis]) for axis in range(2)]
+    figures: list[list[float]] = [[], []]
+    for scale in range(SCALES):
+        if not any(len(at) for at, _ in seams) or min(guide.shape[:2]) < SHORTEST:
+            break
+        for axis, (at, seam) in enumerate(seams):
+            if len(at):
+                figures[axis].append(_compare_places(guide, axis, at, seam, scale))
+        guide = halve(guide)
+    rows, columns = (
+        round(float(np.prod(np.maximum(each, LEAST)) ** (1 / len(each))), DIGITS)
+        if len(each) >= FEWEST_SCALES
+        else None
+        for each in figures
+    )
+    return rows, columns
+
+
+def find_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the pixels before each long seam along an axis (N, 2), and the number of the seam (N,).
+
+    All pairs of pixels from the same two patches belong to one seam.
+    """
+    torn = ~source.is_coherent(axis, wrap=wrap)
+    if not wrap:
+        torn[(slice(None),) * axis + (-1,)] = False
+    at = np.argwhere(torn)
+    ahead = at.copy()
+    ahead[:, axis] = (ahead[:, axis] + 1) % source.shape[axis]
+    before, after = (source.label[tuple(each.T)].astype(np.int64) for each in (at, ahead))
+    _, seam, counts = np.unique((before << 32) + after, return_inverse=True, return_counts=True)
+    long = (counts >= LONG * source.shape[1 - axis])[seam]
+    return at[long], np.unique(seam[long], return_inverse=True)[1]
+
+
+def _compare_places(guide: Floats, axis: int, at: NDArray[np.intp], seam: NDArray[np.intp], scale: int) -> float:
+    """Return the boldest step of the seams, as a multiple of the step that the same seams have at other places."""
+    rows, columns = guide.shape[:2]
+    blocks = np.minimum(at >> scale, (rows - 1, columns - 1))
+    chosen = np.unique((blocks[:, 0] * columns + blocks[:, 1]) * (seam.max() + 1) + seam)
+    place, seam = np.divmod(chosen, seam.max() + 1)
+    row, column = np.divmod(place, columns)
+    # A block that contains the seam is between the two blocks that are compared.
+    first, last = (0, 1) if scale == 0 else (-1, 1)
+    counts = np.bincount(seam)
+    flat = guide.reshape(rows * columns, -1)
+    bold = np.zeros(SHIFTS)
+    for k in range(SHIFTS):
+        # Multiples of the plastic number's powers fill the square evenly.
+        down, across = int(k * 0.7548776662 % 1 * rows), int(k * 0.5698402910 % 1 * columns)
+        here = []
+        for step in (first, last):
+            r = (row + down + (step if axis == 0 else 0)) % rows
+            c = (column + across + (step if axis == 1 else 0)) % columns
+            here.append(flat.take(r * columns + c, axis=0))
+        change = here[1] - here[0]
+        means = sum(np.abs(np.bincount(seam, change[:, n])) for n in range(change.shape[1])) / counts
+        bold[k] = means.max()
+    return float(bold[0] / (np.percentile(bold[1:], USUAL) + TINY))
