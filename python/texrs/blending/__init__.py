@@ -124,7 +124,7 @@ def blend(
         The map of a volume; another number of exemplars, or of another size, than the map was made from; an option out
         of range.
 
-    Metadata
+    Notes
     -----
     Some values have no meaning between them, and come back as `SourceMap.render` gives them: the last of two or of four
     channels (transparency), and whatever is bool, signed integers or ``interpolation="nearest"`` (labels).

@@ -61,7 +61,7 @@ def measure_visibility(
     Visibility
         All 0 where there is no seam, or where the exemplar is constant.
 
-    Metadata
+    Notes
     -----
     Of a picture of more than 2^22 pixels, bands of rows spread over it are looked at; of an exemplar of more than 2^20,
     rows spread over it.

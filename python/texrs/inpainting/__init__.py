@@ -132,8 +132,8 @@ def inpaint(
         into ``[image, exemplar]``. Pixels that are kept map to themselves, and no pixel maps into the hole. Replace NaN in
         the hole by any number before you render an image through the map. The stages are ``"known"``, ``"patches"``
         (each in a shade of its own) and ``"before_blending"``, the result before ``screening``. The report
-        contains ``"measured"``, the attributes of `texrs.planes.ScaleEstimate` for a ``scale_map`` "auto". ``"exemplar_measured"`` is
-        the same for the exemplar. ``"filled"`` is the share of the image that is filled, 0 to 1. ``"candidates"`` lists the
+        contains ``"measured"``, the attributes of `texrs.planes.ScaleEstimate` for a ``scale_map`` "auto".
+        ``"exemplar_measured"`` is the same for the exemplar. ``"filled"`` is the share of the image that is filled, 0 to 1. ``"candidates"`` lists the
         sides that were tried, with the figure of each: volumes, the step at the border of the hole (1: as elsewhere).
         ``"screening_in_source_map"`` of a volume is False if its seams are corrected.
 

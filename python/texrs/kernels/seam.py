@@ -166,7 +166,7 @@ def cut(
         If shapes differ, values are not finite, penalties are negative, a core is outside its image, or cores share a
         pixel.
 
-    Metadata
+    Notes
     -----
     Costs are rounded to multiples of 2^-16, or coarser if the largest exceeds 2^10. Time grows with the bounding box
         of the overlap. One connected core of B on a plane may be surrounded by pixels constrained to A. The seam is
@@ -389,7 +389,7 @@ def binary_labels(
         If shapes do not fit, pairwise costs are negative or infinite, values are NaN, or both labels are forbidden at
         a point.
 
-    Metadata
+    Notes
     -----
     Costs are float32, rounded to multiples of a power of two. It is chosen so that the largest pairwise cost is 2^25
     to 2^26 multiples.

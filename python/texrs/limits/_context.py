@@ -104,7 +104,7 @@ def context(
     InvalidInput
         No such number.
 
-    Metadata
+    Notes
     -----
     A thread that is started inside the block does not know of it, unless it runs in a copy of the context
     (`contextvars.copy_context`); threads of texrs do. `set` is for all of them.

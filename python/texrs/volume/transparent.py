@@ -84,7 +84,7 @@ def render_volume(
     InvalidInput
         Not a volume, or not such a transfer function.
 
-    Metadata
+    Notes
     -----
     Front to back as Levoy has it [1]_, at every half voxel.
 

@@ -157,7 +157,7 @@ def design(
     --------
     design_variants : Many different textures of one example, which is analysed once.
 
-    Metadata
+    Notes
     -----
     For each pixel of the result 18 bytes are needed, or 14 and twice those of a pixel of the image where that is more,
     and 0.5 GB beside it: 5.9 GB for 16384 x 16384 pixels of 8-bit RGB. ``method="paper"`` takes 24 more. Several
