@@ -1,13 +1,13 @@
 """Make new textures from one example.
 
-The verbs: `design` (many natural textures from one example), `splice` (the elements of one texture in the arrangement of
-another) and `self_splice` (in an edited one), `perspective` (elements as large as a map says), `solid` and `synthesize`
-(volumes and pictures grown under a frame field), `tile` (any picture made cyclic), `inpaint` (holes filled by example),
-`rectify` (the flat texture of a plane that was photographed aslant), `extend` (more of such a photograph), `remove` (something
-taken out of one) and `blend` (colours corrected so that seams disappear). Each returns a `Synthesis`, whose `SourceMap` looks
-anything that is in register with the exemplar up in the same way.
+Each function below makes or edits a texture. `design` makes many natural textures from one example. `splice` puts the
+elements of one texture into the layout of another, and `self_splice` edits a layout. `perspective` follows a scale
+map. `solid` and `synthesize` grow volumes and images under a frame field. `tile` makes an image tileable, and
+`inpaint` fills holes by example. `rectify` flattens a photographed plane, `extend` enlarges such a photograph, and
+`remove` takes an object out of it. `blend` corrects colours so that seams disappear. All return a `Synthesis`. Its
+`SourceMap` applies the result to any array in register with the exemplar.
 
-Names are loaded when they are first used; the stub beside this file lists them.
+Names are loaded on first use. The stub next to this file lists them.
 """
 
 import lazy_loader

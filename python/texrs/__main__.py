@@ -1,4 +1,4 @@
-"""``python -m texrs`` is the command ``texrs``."""
+"""Run the command ``texrs`` by ``python -m texrs``."""
 
 import signal
 import sys
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code; Ctrl-C ends it without a traceback while it still loads, too."""
+    """Run the command line and return its exit code. Ctrl-C ends it without a traceback, also during import."""
     try:
         try:
             from texrs.cli import main as run
@@ -14,7 +14,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run(arguments)
         finally:
             if arguments is None:
-                # All is done, or cleared away: the process is on its way out, and its exit code says how it went.
+                # The command has finished or cleaned up, so ignore a late Ctrl-C: the exit code already states the
+                # result.
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
         print("texrs: stopped; nothing was left half-written", file=sys.stderr)

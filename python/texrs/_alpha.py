@@ -12,9 +12,9 @@ from texrs._typing import Array
 __all__ = ["adapt", "divide", "has_alpha", "multiply", "undo"]
 
 CLEAR = 0.01
-"""Minimum level of a colour that is seen. Colours in clear pixels are noise below it."""
+"""Minimum visible level of a colour. Colours of clear pixels below it are noise."""
 MOST = 0.5
-"""Share of clear pixels with a colour above which a file does not have its colours multiplied by alpha."""
+"""Share of clear pixels with a colour above which a file is taken as not multiplied by alpha."""
 
 
 def has_alpha(pixels: Array) -> bool:
@@ -31,7 +31,7 @@ def has_alpha(pixels: Array) -> bool:
 
 
 def multiply(pixels: Array, name: str) -> Array:
-    """Return linear colours multiplied by their alpha; report colours that this loses.
+    """Return linear colours multiplied by their alpha, and report colours that are lost.
 
     Examples
     --------
@@ -52,7 +52,9 @@ def multiply(pixels: Array, name: str) -> Array:
 
 
 def divide(pixels: Array, name: str) -> Array:
-    """Return linear colours of an EXR file divided by their alpha, unless clear pixels show that they are not multiplied.
+    """Return linear colours of an EXR file divided by their alpha.
+
+    They stay as they are if clear pixels show that the file is not multiplied by alpha.
 
     Examples
     --------
@@ -73,7 +75,7 @@ def divide(pixels: Array, name: str) -> Array:
 
 
 def undo(pixels: Array) -> Array:
-    """Return linear colours divided by their alpha; clear pixels stay as they are.
+    """Return linear colours divided by their alpha. Clear pixels stay as they are.
 
     Examples
     --------
@@ -89,7 +91,7 @@ def undo(pixels: Array) -> Array:
 
 
 def adapt(array: Array, path: Path, multiplied: bool | None) -> Array:
-    """Return an image as the format of a file has it: EXR files have colours multiplied by alpha, others do not.
+    """Return an image in the convention of its file format: only EXR files have colours multiplied by alpha.
 
     Parameters
     ----------
@@ -98,7 +100,7 @@ def adapt(array: Array, path: Path, multiplied: bool | None) -> Array:
     path : pathlib.Path
         File that the image is written to.
     multiplied : bool or None
-        If True, the colours are multiplied by alpha already. None leaves all values as they are.
+        If True, the colours are already multiplied by alpha. None leaves all values unchanged.
 
     """
     pixels, wanted = np.asarray(array), path.suffix.lower() == ".exr"

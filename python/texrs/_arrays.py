@@ -1,6 +1,6 @@
-"""Checks and conversions of arrays, shared by everything that takes an image from a user.
+"""Checks and conversions of arrays, for every function that takes an image from a user.
 
-The checks of what is no array (`texrs._checks`) are at hand here too, for whoever takes both.
+The checks of other arguments (`texrs._checks`) are available here too.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ __all__ = [
 ]
 
 FEW = 4
-"""Channels that pictures have, at most, as far as their order is guessed."""
+"""Maximum number of channels that the check of the channel order assumes for an image."""
 
 
 def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int = 2, finite: bool = True) -> Array:
@@ -84,31 +84,31 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     Parameters
     ----------
     value : array_like, path_like or PIL.Image.Image
-        Shape (H, W) or (H, W, C); with ``axes=3`` (D, H, W) or (D, H, W, C). Integers, floats of 16, 32 or 64 bit, or bool.
-        `as_ndarray` says what else is taken.
+        Shape (H, W) or (H, W, C); with ``axes=3`` (D, H, W) or (D, H, W, C). Integers, floats of 16, 32 or 64 bit, or
+        bool. `as_ndarray` lists other accepted types.
     name : str
-        The argument's name, for messages.
+        Name of the argument, for messages.
     minimum : int
-        The least length of an axis.
+        Minimum length of an axis.
     axes : int
         Number of axes without the channels.
     finite : bool
-        Whether floats must be finite, for which all of them are read.
+        If True, floats must be finite. This reads all of them.
 
     Returns
     -------
     ndarray
-        The same values and dtype, shape (..., C), C-contiguous and in native byte order. Not copied where it need not
-        be.
+        The same values and dtype, shape (..., C), C-contiguous and in native byte order. Copied only if needed.
 
     Raises
     ------
     InvalidInput
-        Not numbers, not finite, masked, too small, with the wrong number of axes, or with the channels first.
+        If the values are not numbers, not finite or masked. Also if the image is too small, has the wrong number of
+        axes, or its channels are first.
     FileError
-        A path that cannot be read.
+        If a path cannot be read.
     LimitExceeded
-        A copy is needed, and would take more bytes than the machine has.
+        If a copy is needed and would take more bytes than the machine has.
 
     """
     array = as_ndarray(value, name, axes=axes)
@@ -139,7 +139,7 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
 
 
 def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
-    """Refuse what has its channels first, or is a batch: few samples along the first axis, and many along all others."""
+    """Refuse an array with channels first, or a batch: few samples along the first axis, and many along all others."""
     first = len(shape) - axes - 1
     if first not in (0, 1) or not 0 < shape[first] <= FEW or min(shape[first + 1 :]) < 2 * FEW:
         return
@@ -156,32 +156,33 @@ def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
 
 
 def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | str] | None = None) -> Array:
-    """Check the numbers that a compiled function takes, and return them as it takes them.
+    """Check numbers for a compiled function, and return them in the form that it takes.
 
     Parameters
     ----------
     value : array_like
-        Bool, integers or floats; for an integer dtype bool or integers within its range, and for bool the same, of which
-        zero means False.
+        Bool, integers or floats. An integer dtype accepts bool, or integers within its range. Bool accepts the same,
+        and zero means False.
     name : str
-        The argument's name, for messages.
+        Name of the argument, for messages.
     dtype : dtype
-        Of the result.
+        Dtype of the result.
     shape : sequence of int or str, optional
-        The length of each axis; a word stands for any length of at least 1, and names it in messages. By default any.
+        Length of each axis. A word stands for any length of at least 1, and names the axis in messages. By default any
+        shape.
 
     Returns
     -------
     ndarray
-        C-contiguous, aligned, in native byte order. The very array where it is so already. Floats beyond the range of
-        ``dtype`` become infinite.
+        Array that is C-contiguous, aligned and in native byte order; the given array if it is so already. Floats
+        beyond the range of ``dtype`` become infinite.
 
     Raises
     ------
     InvalidInput
-        Not numbers, of another kind, out of range, or of another shape.
+        If the values are not numbers, of another kind, out of range, or of another shape.
     LimitExceeded
-        A copy is needed, and would take more bytes than the machine has.
+        If a copy is needed and would take more bytes than the machine has.
 
     Examples
     --------
@@ -214,7 +215,7 @@ def _has_shape(sides: tuple[int, ...], shape: Sequence[int | str]) -> bool:
 
 
 def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
-    """Return the values in a dtype, in order and aligned; a view of less memory than it has values may be of any size."""
+    """Return the values in a dtype, contiguous and aligned. The size of a broadcast view is checked before the copy."""
     if array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned:
         return array
     check_memory(array.size * dtype.itemsize, name)
@@ -231,12 +232,12 @@ def check_finite(array: Array, name: str) -> None:
     Raises
     ------
     InvalidInput
-        Some are.
+        If some values are NaN or infinite.
 
     """
     if array.dtype.kind != "f":
         return
-    # A part at a time, which stays near: a mask of all values takes ten times as long.
+    # Check a cached part at a time: a mask of all values takes ten times as long.
     parts = np.nditer(array, ["external_loop", "buffered", "zerosize_ok"], buffersize=2**15)
     bad = array.size - sum(int(np.count_nonzero(np.isfinite(part))) for part in parts)
     if bad:
@@ -246,17 +247,17 @@ def check_finite(array: Array, name: str) -> None:
 
 
 def to_unit(array: Array) -> Floats:
-    """Bring an image to [0, 1] in float32, so that thresholds mean the same for every dtype.
+    """Scale an image to [0, 1] in float32, so that thresholds mean the same for every dtype.
 
-    Integers of 8 or 16 bit are divided by the largest value of their dtype; wider ones, and floats beyond [0, 1], are brought
-    to it by their own range. ``v`` as uint8 and ``257 v`` as uint16 give the same result.
+    Integers of 8 or 16 bit are divided by the largest value of their dtype. Wider integers, and floats beyond [0, 1],
+    are scaled by their own range. ``v`` as uint8 and ``257 v`` as uint16 give the same result.
     """
     if array.dtype == np.bool_:
         return array.astype(np.float32)
     if array.dtype.kind in "ui" and array.itemsize <= 2:
         info = np.iinfo(array.dtype)
         if array.dtype.kind == "u":
-            # Exact in float32, so that one rounding gives what float64 does.
+            # The values are exact in float32, so that one rounding gives the same result as float64.
             return np.divide(array, np.float32(info.max), dtype=np.float32)
         return ((array.astype(np.float64) - min(info.min, 0)) / (float(info.max) - min(info.min, 0))).astype(np.float32)
     low, high = float(array.min()), float(array.max())
@@ -266,7 +267,10 @@ def to_unit(array: Array) -> Floats:
 
 
 def locate(values: Array, low: float, high: float) -> NDArray[np.float64]:
-    """Return where values lie between two of them, from 0 to 1, though these be farther apart than a double can be."""
+    """Return the position of values between two bounds, from 0 to 1.
+
+    The bounds may differ by more than the range of double.
+    """
     given = values.astype(np.float64)
     if math.isinf(high - low):
         given, low, high = given / 2, low / 2, high / 2
@@ -274,7 +278,7 @@ def locate(values: Array, low: float, high: float) -> NDArray[np.float64]:
 
 
 def guidance(pixels: Array) -> Floats:
-    """Return the colours that decisions are made on: up to three channels in [0, 1], transparency over mid grey."""
+    """Return the colours for decisions: up to three channels in [0, 1], with transparency over mid grey."""
     unit = to_unit(pixels)
     if unit.shape[-1] in (2, 4):
         alpha = unit[..., -1:]
@@ -288,7 +292,10 @@ def as_rgb(unit: Floats) -> Floats:
 
 
 def to_lab(unit: Floats) -> Floats:
-    """Return CIE Lab / 100 of colours, so that a just visible difference is about 0.02; of the same bits on any processor."""
+    """Return CIE Lab / 100 of colours.
+
+    A just visible difference is about 0.02. The bits are the same on any processor.
+    """
     from skimage.color import rgb2lab
 
     return np.asarray(rgb2lab(as_rgb(unit).astype(np.float64)) / 100, np.float32)
@@ -297,7 +304,7 @@ def to_lab(unit: Floats) -> Floats:
 def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     """Check a mask and return a copy.
 
-    It may be an array of bool or integers, of which zero means False, a file or an image of PIL, or a `texrs.Mask`.
+    The mask may be an array of bool or integers (zero means False), a file, an image of PIL, or a `texrs.Mask`.
     """
     if isinstance(value, Mask) and value.feather:
         raise InvalidInput(f"{name}: must have no feather, which is for a hole that is filled")
@@ -309,25 +316,25 @@ def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     return np.array(as_array(given, name, np.bool_, shape))
 
 
-# Of single precision NumPy works out functions in other ways on other processors, which differ in the last bit; rounded from
-# double precision they do not.
+# NumPy computes functions of single precision in different ways on different processors, with other last bits. Values
+# computed in double precision and rounded are the same.
 
 
 def log_single(values: Array) -> Floats:
-    """Return natural logarithms in single precision, of the same bits on any processor."""
+    """Return natural logarithms in single precision, with the same bits on any processor."""
     return np.log(values, dtype=np.float64).astype(np.float32)
 
 
 def exp_single(values: Array) -> Floats:
-    """Return exponentials in single precision, of the same bits on any processor."""
+    """Return exponentials in single precision, with the same bits on any processor."""
     return np.exp(values, dtype=np.float64).astype(np.float32)
 
 
 def hypot_single(rows: ArrayLike, columns: ArrayLike) -> Floats:
-    """Return lengths of vectors in single precision, of the same bits on any processor."""
+    """Return lengths of vectors in single precision, with the same bits on any processor."""
     return np.asarray(np.hypot(rows, columns, dtype=np.float64), np.float32)
 
 
 def power_single(values: Array, exponent: float) -> Floats:
-    """Return powers in single precision, of the same bits on any processor."""
+    """Return powers in single precision, with the same bits on any processor."""
     return np.power(values, np.float64(exponent), dtype=np.float64).astype(np.float32)

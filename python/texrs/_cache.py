@@ -1,4 +1,4 @@
-"""What was made lately, kept by what it was made from."""
+"""Cache of recent results by the values that they were computed from."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ V = TypeVar("V")
 
 
 class Cache(Generic[K, V]):
-    """Values by their keys, of which those that were not used for longest are dropped.
+    """Values by key. The least recently used ones are dropped first.
 
     Parameters
     ----------
     limit : int
-        The most that the sizes of all values may add up to; a value that is larger on its own is not kept.
+        Maximum total size of all values. A single value above it is not kept.
     size : callable, optional
-        Returns the size of a value, as its bytes; by default each counts 1.
+        Function that returns the size of a value, such as its bytes. By default each value counts 1.
 
     """
 
@@ -32,7 +32,7 @@ class Cache(Generic[K, V]):
 
     @property
     def used(self) -> int:
-        """What the sizes of the values add up to."""
+        """Total size of the values."""
         return int(self._kept.currsize)
 
     def get(self, key: K) -> V | None:
@@ -47,7 +47,10 @@ class Cache(Generic[K, V]):
                 self._kept[key] = value
 
     def get_or_make(self, key: K, make: Callable[[], V]) -> V:
-        """Return the value of a key, made if it is not kept. Two threads may make it at once: no lock is held meanwhile."""
+        """Return the value of a key, and compute it if it is not kept.
+
+        Two threads may compute it at once, because no lock is held meanwhile.
+        """
         found = self.get(key)
         if found is None:
             found = make()
@@ -61,7 +64,7 @@ class Cache(Generic[K, V]):
 
 
 def content_hash(*parts: object) -> bytes:
-    """Return a hash of arrays, by their shape, dtype and values, and of other parts by their repr."""
+    """Return a hash of the shape, dtype and values of arrays, and of the repr of other parts."""
     digest = hashlib.blake2b(digest_size=16, person=b"texrs")
     for part in parts:
         if isinstance(part, np.ndarray):

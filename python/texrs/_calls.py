@@ -1,4 +1,4 @@
-"""Functions that callers give, checked before they are called in the middle of long work."""
+"""Checks of functions that callers pass, before long work calls them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["check_call"]
 
 
 def check_call(function: Callable[..., object], name: str, *arguments: str) -> None:
-    """Refuse a function that cannot be called with so many arguments, as far as it says what it takes."""
+    """Refuse a function that cannot be called with these arguments, as far as its signature shows."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

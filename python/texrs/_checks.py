@@ -1,4 +1,4 @@
-"""Checks of arguments that are no arrays: numbers, sizes, choices."""
+"""Checks of arguments that are not arrays: numbers, sizes, choices."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from texrs.limits._context import find
 from texrs.limits._estimates import estimate_memory
 
 FREE = 2**20
-"""Bytes that may be taken without asking how many there are, which takes as long as to fill them."""
+"""Bytes that are allocated without asking for the available memory, because asking takes as long as filling them."""
 
 
 def as_list(value: object) -> list[Any]:
-    """Return several things as a list, and a single one as a list of it."""
+    """Return several values as a list, and a single one as a list with one entry."""
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
 def try_array(value: object, dtype: DTypeLike | None = None) -> NDArray[Any]:
-    """Return an array of a value; one of no entries, of objects by default, where it is none."""
+    """Return an array of a value, or an empty array of objects if it is not an array."""
     try:
         return np.asarray(value, dtype)
     except (ValueError, TypeError, OverflowError, MemoryError):
@@ -37,14 +37,14 @@ def try_array(value: object, dtype: DTypeLike | None = None) -> NDArray[Any]:
 def as_size(
     value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int | None = None, way: str = ""
 ) -> tuple[int, ...]:
-    """Check a size: an int for a square, or one int an axis (rows, columns); ``way`` says what makes larger ones.
+    """Check a size: an int for a square, or one int an axis (rows, columns). ``way`` names a method for larger sizes.
 
     Raises
     ------
     InvalidInput
-        Not integers, too few or too many, or below ``minimum``.
+        If it is not integers, has too few or too many, or is below ``minimum``.
     LimitExceeded
-        More than ``limit`` pixels, by default those that `texrs.limits` allows.
+        If it has more than ``limit`` pixels, by default the limit of `texrs.limits`.
 
     """
     order = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
@@ -62,12 +62,12 @@ def as_size(
 
 
 def check_pixels(shape: Sequence[int], name: str = "size", *, limit: int | None = None, way: str = "") -> None:
-    """Refuse what has more pixels or voxels than ``limit``, by default than `texrs.limits` allows; ``way`` says what else is.
+    """Refuse more pixels or voxels than ``limit``, by default the limit of `texrs.limits`. ``way`` names a remedy.
 
     Raises
     ------
     LimitExceeded
-        More of them.
+        If there are more.
 
     """
     count = math.prod(shape)
@@ -78,11 +78,11 @@ def check_pixels(shape: Sequence[int], name: str = "size", *, limit: int | None 
 
 
 def check_memory(needed: int, name: str = "size", *, limit: int | None = None, way: str = "") -> None:
-    """Refuse what needs more bytes than ``limit``, or than `texrs.limits` allows; ``way`` says what needs less.
+    """Refuse more bytes than ``limit`` or than `texrs.limits` allows. ``way`` names a method with less memory.
 
     Raises
     ------
-    LimitExceeded
+    If more bytes are needed than are known to be available.
         More bytes than there are, where anything tells.
 
     """
@@ -108,27 +108,27 @@ def check_work(
     way: str = "",
     **more: Any,
 ) -> None:
-    """Refuse work that would make, or take, more than `texrs.limits` allows, before it begins.
+    """Refuse work beyond the limits of `texrs.limits` before it begins.
 
     Parameters
     ----------
     verb : str
-        As `texrs.limits.estimate_memory` knows it.
+        Name of the verb, as in `texrs.limits.estimate_memory`.
     examples : sequence of (..., C) array
-        What is looked into.
+        Examples that the verb uses.
     size : sequence of int
-        Of the result.
+        Size of the result.
     name, way : str
-        The argument that asks for so much, and what takes less.
+        Argument that requests this much, and a method that takes less.
     limit : int, optional
-        Bytes that are allowed for this alone.
+        Maximum bytes for this work only.
     **more
-        Options that `texrs.limits.estimate_memory` takes.
+        Options of `texrs.limits.estimate_memory`.
 
     Raises
     ------
     LimitExceeded
-        More pixels or bytes than are allowed.
+        If the work needs more pixels or bytes than allowed.
 
     """
     check_pixels(size, name, way=way)
@@ -137,7 +137,7 @@ def check_work(
 
 
 def as_instance(value: object, name: str, *kinds: type) -> Any:
-    """Check that a value is of one of some classes."""
+    """Check that a value is an instance of one of some classes."""
     if not isinstance(value, kinds):
         needed = " or a ".join(kind.__name__ for kind in kinds)
         raise InvalidInput(f"{name}: needs a {needed}, got {type(value).__name__}")
@@ -145,18 +145,18 @@ def as_instance(value: object, name: str, *kinds: type) -> Any:
 
 
 def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
-    """Check a sequence of so many entries; its length is looked at first, for it may be anything."""
+    """Check a sequence with a number of entries. The length is checked first, because the value may be of any kind."""
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         try:
             if len(value) == length:
                 return tuple(value)
-        except (TypeError, OverflowError, MemoryError):  # An array without axes, a range beyond what fits in memory.
+        except (TypeError, OverflowError, MemoryError):  # An array without axes, or a range too long for memory.
             pass
     raise InvalidInput(f"{name}: needs {what}, got {value!r}")
 
 
 def as_items(value: object, name: str) -> Iterator[Any]:
-    """Check something to go through; its items are not looked at before they are asked for."""
+    """Check an iterable. Its items are read only when they are needed."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes):
         with suppress(TypeError):  # An array without axes.
             return iter(value)
@@ -164,7 +164,7 @@ def as_items(value: object, name: str) -> Iterator[Any]:
 
 
 def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | None = None) -> tuple[bool, ...]:
-    """Check a choice of cyclic axes: one bool for all, or one an axis; None is what is usual, where something is."""
+    """Check a choice of periodic axes: one bool for all, or one an axis. None gives the default, if there is one."""
     if value is None and usual is not None:
         return (usual,) * axes
     if isinstance(value, bool | np.bool_):
@@ -177,7 +177,7 @@ def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | N
 
 
 def as_bool(value: object, name: str) -> bool:
-    """Check a choice of two."""
+    """Check a bool."""
     if not isinstance(value, bool | np.bool_):
         raise InvalidInput(f"{name}: needs True or False, got {value!r}")
     return bool(value)
@@ -191,7 +191,7 @@ def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
 
 
 def as_one(value: Any, name: str, *allowed: str | int | None) -> Any:
-    """Check a choice among words, numbers and None; its type is looked at first, for arrays are compared entry by entry."""
+    """Check a choice among words, numbers and None. The type is checked first, because arrays compare entry by entry."""
     plain = isinstance(value, str | numbers.Integral | None) and not isinstance(value, bool)
     if not plain or value not in allowed:
         names = [str(each) if isinstance(each, int) else repr(each) for each in allowed if each is not None]
@@ -207,14 +207,14 @@ def as_axes(value: object, name: str = "axes") -> int:
 
 
 def as_method(value: object, *allowed: str | None) -> None:
-    """Check the name of an algorithm; None is the usual one."""
+    """Check the name of an algorithm. None is the default one."""
     if not isinstance(value, str | None) or value not in allowed:
         names = [repr(name) for name in allowed]
         raise InvalidInput(f"method: must be one of {', '.join(names)}; got {value!r}")
 
 
 def as_progress(value: object, name: str = "progress", *, stages: bool = False) -> Callable[..., object] | None:
-    """Check what is called while work goes on, with the share that is done, or with the ``stages`` too."""
+    """Check a progress function, which is called with the completed share, or with the ``stages`` too."""
     if value is None:
         return None
     if not callable(value):
@@ -242,7 +242,7 @@ def as_float(value: object, name: str, low: float, high: float) -> float:
 
 
 def as_limit(value: object, name: str = "limit", *, axes: int = 2) -> int:
-    """Check a limit of pixels, or with ``axes=3`` of voxels; None is what `texrs.limits` allows."""
+    """Check a limit of pixels, or of voxels with ``axes=3``. None is the limit of `texrs.limits`."""
     if value is None:
         return find("voxels" if axes == 3 else "pixels") or MAX_PIXELS
     return as_int(value, name, 1, 2**40)

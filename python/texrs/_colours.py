@@ -1,4 +1,4 @@
-"""Colours as light and back: what can be added, averaged and shone upon, of pictures of any dtype."""
+"""Conversion of colours of any dtype to linear light and back, for addition and averages."""
 
 from __future__ import annotations
 
@@ -14,38 +14,38 @@ Space = Literal["srgb", "linear"]
 
 
 def decode_srgb(values: Floats) -> Floats:
-    """Return linear light of sRGB values (IEC 61966-2-1), of 0 for what is below."""
+    """Return linear light of sRGB values (IEC 61966-2-1). Negative values give 0."""
     kept = np.maximum(values, np.float32(0))
     curved = power_single((kept + np.float32(0.055)) / np.float32(1.055), 2.4)
     return np.where(kept <= np.float32(0.04045), kept / np.float32(12.92), curved)
 
 
 def encode_srgb(light: Floats) -> Floats:
-    """Return sRGB values of linear light, of 0 for what is below."""
+    """Return sRGB values of linear light. Negative values give 0."""
     kept = np.maximum(light, np.float32(0))
     curved = np.float32(1.055) * power_single(kept, 1 / 2.4) - np.float32(0.055)
     return np.where(kept <= np.float32(0.0031308), kept * np.float32(12.92), curved)
 
 
 def to_light(pixels: Array, space: Space) -> Floats:
-    """Return what values encode: of integers shares of their range, of floats themselves, as linear light."""
+    """Return linear light of encoded values. Integers count as shares of their range."""
     unit = to_unit(pixels) if pixels.dtype.kind in "bui" else pixels.astype(np.float32)
     if space == "linear":
         return unit
     if pixels.dtype == np.uint8:
-        # A power a value, not one a pixel.
+        # Compute one power for each possible value instead of each pixel.
         table: Floats = decode_srgb(np.arange(256, dtype=np.float32) / np.float32(255))
         return table[pixels]
     return decode_srgb(unit)
 
 
 def to_share(pixels: Array) -> Floats:
-    """Return values in [0, 1]: of integers shares of their range, of floats themselves as far as they are within."""
+    """Return values in [0, 1]: integers as shares of their range, floats clipped."""
     return to_unit(pixels) if pixels.dtype.kind in "bui" else np.clip(pixels, 0, 1).astype(np.float32)
 
 
 def to_pixels(values: Array, dtype: np.dtype[Any]) -> Array:
-    """Return values in a dtype, or its largest: of integers shares of their range, of which `to_share` is the way back."""
+    """Return shares in a dtype, the inverse of `to_share`. Values beyond the dtype become its largest."""
     if dtype.kind == "f":
         most = min(float(np.finfo(dtype).max), float(np.finfo(values.dtype).max))
         return np.clip(values, -most, most).astype(dtype)
@@ -58,7 +58,7 @@ def to_pixels(values: Array, dtype: np.dtype[Any]) -> Array:
 
 
 def shrink(values: Array, shape: Sequence[int]) -> Array:
-    """Return floats of fewer samples along the first axes: each the mean of the area that it covers."""
+    """Return floats with fewer samples along the first axes. Each is the mean of the area that it covers."""
     for axis, wanted in enumerate(shape):
         given = values.shape[axis]
         if given == wanted:

@@ -1,4 +1,4 @@
-"""What people keep pictures in, as arrays: files, PIL pictures, tensors, labelled and masked arrays."""
+"""Conversion to arrays: files, PIL images, tensors, labelled and masked arrays."""
 
 from __future__ import annotations
 
@@ -12,44 +12,44 @@ from texrs._typing import Array, Bools
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 
 COLOURED = {"P": "RGB", "PA": "RGBA", "RGBX": "RGB", "RGBa": "RGBA", "La": "LA", "YCbCr": "RGB", "HSV": "RGB"}
-"""Modes of PIL pictures whose numbers are no colours yet, and what they are converted to."""
+"""Modes of PIL images whose numbers are not colours, and the modes that they are converted to."""
 WITH_ALPHA = {"L": "LA", "RGB": "RGBA"}
-"""What a mode is converted to where one of its colours stands for transparency."""
+"""Modes that images are converted to if one of their colours means transparency."""
 NEAR = 1e-6
-"""Relative difference up to which a float equals the nodata value of a file, which is rounded text."""
+"""Relative tolerance for comparing a float with the nodata value of a file, which is rounded text."""
 KEPT = ("1", "L", "LA", "I", "F", "RGB", "RGBA")
-"""Modes whose numbers are taken as they are, as are those of I;16."""
+"""Modes whose numbers are used unchanged, in addition to the modes I;16."""
 
 
 def as_ndarray(value: object, name: str, *, axes: int = 2, used: bool = True) -> Array:
-    """Return whatever somebody keeps a picture in as an array: the one place that knows what that may be.
+    """Return an array of any supported image type. This is the one place that knows these types.
 
     Parameters
     ----------
     value : array_like, path_like or PIL.Image.Image
-        An array, or what makes itself one (``__array__``, ``__array_interface__``, the buffer protocol, DLPack): tensors,
-        labelled arrays, nested lists. A path is read. Of a PIL picture the palette is applied, and what stands for
-        transparency becomes alpha.
+        An array, or an object with an array interface (``__array__``, ``__array_interface__``, the buffer protocol,
+        DLPack): tensors, labelled arrays, nested lists. A path is read. The palette of a PIL image is applied, and its
+        transparent colour becomes alpha.
     name : str
-        The argument's name, for messages.
+        Name of the argument, for messages.
     axes : int
-        Of a file's array without the channels: 3 reads a volume.
+        Number of axes of a file's array without the channels: 3 reads a volume.
     used : bool
         If True, pixels that have the nodata value of their file are reported, because they are used as values.
 
     Returns
     -------
     ndarray
-        Of whatever dtype and shape; no copy where there need not be one.
+        Array of any dtype and shape, copied only if needed.
 
     Raises
     ------
     InvalidInput
-        Nothing that can be made an array, masked values, or a PIL picture in inks or in CIELAB.
+        If the value has no array form, has masked values, or is a PIL image in inks or in CIELAB.
     FileError
-        A path that cannot be read.
+        If a path cannot be read.
     LimitExceeded
-        More than there is memory for.
+        If there is not enough memory.
 
     Examples
     --------
@@ -79,7 +79,9 @@ def as_ndarray(value: object, name: str, *, axes: int = 2, used: bool = True) ->
         raise LimitExceeded(f"{name}: needs more memory than there is") from None
     except InvalidInput:
         raise
-    except Exception as error:  # Whatever a library says of what it cannot hand over, as a tensor on another device.
+    except (
+        Exception
+    ) as error:  # Libraries raise many types for data that they cannot export, such as a tensor on another device.
         text = " ".join(str(error).split())
         raise InvalidInput(f"{name}: not an array of numbers ({text or type(error).__name__})") from None
 
@@ -96,18 +98,20 @@ def _read(path: str | os.PathLike[str], name: str, axes: int) -> Array:
 
 
 def _take_whole(value: Any, name: str) -> Array:
-    """Return the values of a masked array in which nothing is masked."""
+    """Return the values of a masked array without masked entries."""
     count = int(np.ma.getmaskarray(value).sum())
     if count:
         raise InvalidInput(
             f"{name}: {count} of {value.size} values are masked, which is a hole: texrs.inpaint fills it, "
-            "or value.filled(...) says what stands there"
+            "or value.filled(...) fills it with a number"
         )
     return np.asarray(value.data)
 
 
 def find_value(pixels: Array, value: float, axes: int) -> Bools:
-    """Return which pixels have a value in all channels; floats are compared as the rounded text of a file states them.
+    """Return a mask of the pixels that have a value in all channels.
+
+    Floats are compared as the rounded text in a file.
 
     Examples
     --------
@@ -127,7 +131,7 @@ def find_value(pixels: Array, value: float, axes: int) -> Bools:
 
 
 def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
-    """Report pixels that have the nodata value of their file, if they are used as values."""
+    """Report pixels with the nodata value of their file if they are used as values."""
     from texrs.io import read_metadata
 
     if os.path.splitext(path)[1].lower() not in (".tif", ".tiff"):
@@ -142,13 +146,13 @@ def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
 
 
 def is_pillow(value: object) -> bool:
-    """Return whether a value is a picture of PIL."""
-    # Do not import PIL, which takes a while.
+    """Return whether a value is an image of PIL."""
+    # Do not import PIL, because this takes a while.
     return any(c.__module__ == "PIL.Image" and c.__name__ == "Image" for c in type(value).__mro__)
 
 
 def _take_colours(picture: Any, name: str) -> Any:
-    """Return a PIL picture in a mode whose numbers are colours."""
+    """Return a PIL image in a mode whose numbers are colours."""
     mode = str(picture.mode)
     seen_through = picture.info.get("transparency") is not None
     if mode == "P":

@@ -1,4 +1,4 @@
-"""Numbers written into pictures."""
+"""Numbers drawn into images."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ GLYPHS = {
     "0": 0o75557, "1": 0o26227, "2": 0o71747, "3": 0o71717, "4": 0o55711, "5": 0o74717,
     "6": 0o74757, "7": 0o71122, "8": 0o75757, "9": 0o75717, ".": 0o00002,
 }  # fmt: skip
-"""Three by five dots each, the rows from the top as octal digits."""
+"""Digits of three by five dots each, with the rows from the top as octal digits."""
 
 
 def write_number(picture: NDArray[Any], text: str, row: int, column: int, ink: Any, dot: int = 1) -> None:
-    """Write digits and points into a picture, as far as they lie inside.
+    """Draw digits and points into an image, as far as they are inside.
 
     Parameters
     ----------
     picture : (H, W, ...) array
-        Written into.
+        Image to draw into, in place.
     text : str
         Digits and points.
     row, column : int
-        Of the upper left corner.
+        Upper left corner.
     ink : number or (C,) array
-        What is written.
+        Colour of the digits.
     dot : int
-        Pixels of a dot: a digit is three wide and five high, and the next one starts a dot further on.
+        Size of a dot in pixels. A digit is three dots wide and five high, and the next one starts one dot further on.
 
     """
     for k, glyph in enumerate(text):

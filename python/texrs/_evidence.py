@@ -1,8 +1,8 @@
-"""Slow light of a picture, as far as there is evidence of it.
+"""Slowly changing light of an image, as far as there is evidence of it.
 
-Where things lie closer by chance a picture is brighter too, and that is no light. Light goes over the whole picture: it is a
-polynomial of the place, or waves where the picture is cyclic, of as few terms as say clearly more than fewer. What is left of
-single squares then tells how much chance there is.
+An image is also brighter where elements are denser by chance, which is not light. Light extends over the whole image.
+It is a polynomial of the position, or a sum of waves if the image is periodic. More terms are used only if they explain
+clearly more. The residuals of single squares then measure the amount of chance.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from texrs._colours import shrink
 from texrs._typing import Array
 
 SQUARES = 32
-"""Means are compared of so many squares along the longer side."""
+"""Number of squares along the longer side whose means are compared."""
 MOST = 8
-"""Degree of polynomials, and twice the number of waves, at most."""
+"""Maximum degree of polynomials, and twice the maximum number of waves."""
 BETTER = 0.75
-"""Share of the variance of what is off that each higher degree must leave at most, of squares as they mostly are."""
+"""Maximum share of the residual variance that a higher degree may leave, for typical squares."""
 CHANCE = 2.0
-"""What each term more must say, in shares of what one of all squares does that say something by themselves."""
+"""Minimum gain of each further term, as a multiple of the gain by chance of one among all independent squares."""
 ROUNDS, FAR = 6, 4.0
-"""Steps of the robust fit; standard deviations from which on a square is something else."""
+"""Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
 DIGITS = 8
-"""Of the fit, after the point: its last bits hang on the processor."""
+"""Digits of the fit after the point. Its last bits depend on the processor."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slow:
-    """Something that changes slowly over a picture."""
+    """A quantity that changes slowly over an image."""
 
     factors: tuple[float, ...]
-    """Of terms of `list_terms`; none where it is the same everywhere."""
+    """Factors of the terms of `list_terms`. None if the quantity is constant."""
     waves: tuple[int, int]
     wrap: tuple[bool, bool]
 
     @classmethod
     def of(cls, values: NDArray[np.float64], waves: tuple[int, int], wrap: tuple[bool, bool]) -> Slow:
-        """Return what values (rows, columns) follow, with at most so many bends along each axis."""
+        """Return the trend of values (rows, columns), with a maximum number of bends along each axis."""
         rows, columns = (max(1, round(n * SQUARES / max(values.shape))) for n in values.shape)
         means = shrink(values, (min(rows, values.shape[0]), min(columns, values.shape[1])))
         degrees, terms = list_terms((means.shape[0], means.shape[1]), waves, wrap)
@@ -50,14 +50,14 @@ class Slow:
         for degree in np.unique(degrees)[1:].tolist():
             used = degrees <= degree
             found, left, _ = _fit(terms[used], means)
-            # What so many terms more follow by chance is no evidence.
+            # The gain that this many further terms have by chance is not evidence.
             chance = 1 + CHANCE * (np.count_nonzero(used) - np.count_nonzero(degrees <= best)) / told
             if left * chance < BETTER ** (degree - best) * least:
                 best, factors, least = degree, found, left
         return cls(tuple(factors.tolist()), waves, wrap)
 
     def at(self, shape: tuple[int, int]) -> NDArray[np.float64]:
-        """Return it on so many samples, without its mean."""
+        """Return the trend on a grid of samples, without its mean."""
         if not self.factors:
             return np.zeros(shape)
         _, terms = list_terms(shape, self.waves, self.wrap)
@@ -73,7 +73,7 @@ def list_terms(
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return the degrees of terms (n,), lowest first, and their values on samples, (n, rows * columns)."""
     (down, own), (across, other) = (_list_bends(n, w, c) for n, w, c in zip(shape, waves, wrap, strict=True))
-    # Along a shorter side there are as many bends a length, not as many in all.
+    # A shorter side has the same number of bends for each length, not in total.
     degrees = np.ceil(max(waves) * (own[:, np.newaxis] / waves[0] + other / waves[1]) - 1e-9).astype(np.intp)
     order = np.argsort(degrees, axis=None, kind="stable")
     order = order[degrees.ravel()[order] <= max(waves)]
@@ -83,19 +83,19 @@ def list_terms(
 
 
 def _list_bends(count: int, most: int, wrap: bool) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return functions of the place along an axis (n, count), and their degrees (n,)."""
+    """Return basis functions along an axis (n, count), and their degrees (n,)."""
     at = (2 * np.arange(count) + 1) / count - 1
     bends: list[Array] = [np.ones(count)]
     degrees = [0]
     if wrap:
         for wave in range(1, (most + 1) // 2 + 1):
-            # Rounded: of sines the last bits hang on the processor.
+            # Round, because the last bits of sines depend on the processor.
             bends += [np.round(np.sin(np.pi * wave * at), 9), np.round(np.cos(np.pi * wave * at), 9)]
             degrees += [2 * wave - 1] * 2
     else:
         before: Array = np.zeros(count)
         for degree in range(1, most + 1):
-            # Bonnet's recursion of Legendre's polynomials.
+            # Bonnet's recursion for Legendre polynomials.
             bends.append(((2 * degree - 1) * at * bends[-1] - (degree - 1) * before) / degree)
             before = bends[-2]
             degrees.append(degree)
@@ -103,9 +103,9 @@ def _list_bends(count: int, most: int, wrap: bool) -> tuple[NDArray[np.float64],
 
 
 def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
-    """Return the factors of terms (n, rows * columns) that most values (rows, columns) follow; how it is off.
+    """Return the factors of terms (n, rows * columns) that most values (rows, columns) follow, and their error.
 
-    That is the variance of what is off, and how many values say as much as all that are there, for neighbours are alike.
+    The error is the residual variance, and the number of independent values, because neighbours are similar.
     """
     seen, weight = values.ravel(), np.ones(values.size)
     factors: Array = np.zeros(len(terms))

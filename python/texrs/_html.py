@@ -1,4 +1,4 @@
-"""HTML of pages that are one file: the page, its sections, its pictures."""
+"""HTML pages in one file: the page, its sections, its images."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from texrs._typing import Array
 from texrs._version import __version__
 
 QUALITY, LARGE_QUALITY = 90, 75
-"""Of the JPEG pictures, and of those of millions of pixels."""
+"""JPEG quality of images, and of images with millions of pixels."""
 
 
 def encode_uri(image: Array, *, exact: bool = False, quality: int = QUALITY) -> str:
-    """Put a picture into a data URI: PNG where it must be exact or has an alpha channel, else JPEG."""
+    """Encode an image as a data URI: PNG if it must be exact or has an alpha channel, else JPEG."""
     seen = preview(image)
     if seen.ndim == 3 and seen.shape[2] == 1:
         seen = seen[..., 0]
@@ -29,7 +29,7 @@ def encode_uri(image: Array, *, exact: bool = False, quality: int = QUALITY) -> 
 
 
 def figure(image: Array, caption: str, *, exact: bool = False, share: float = 1.0, note: str = "") -> str:
-    """Show a picture with its caption; ``share`` is its width, of the place that it is given."""
+    """Show an image with its caption. ``share`` is its width as a share of the available width."""
     height, width = image.shape[:2]
     style = f' style="width:{share:.0%}"' if share != 1 else ""
     size = f'width="{width}" height="{height}"{style}'
@@ -38,7 +38,7 @@ def figure(image: Array, caption: str, *, exact: bool = False, share: float = 1.
 
 
 def pair(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
-    """Show a picture, and beside it the same data tiled 2 x 2 as a background."""
+    """Show an image, and next to it the same data tiled 2 x 2 as a background."""
     height, width = image.shape[:2]
     ratio = f"aspect-ratio:{width}/{height}"
     picture = '<div class="ground{}" role="img" aria-label="{}" style="{}"></div>'
@@ -50,27 +50,27 @@ def pair(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
 
 
 def row(*parts: str) -> str:
-    """Put an exemplar before what was made from it."""
+    """Show an exemplar before its result."""
     return f'<div class="row">{"".join(parts)}</div>'
 
 
 def grid(parts: Sequence[str], *, least: int = 150, columns: int = 12) -> str:
-    """Put pictures of one size beside each other, each at least so many pixels wide, so many in a row at most."""
+    """Show images of one size side by side, with a minimum width in pixels and a maximum number in a row."""
     return f'<div class="grid" style="--least:{least}px;--most:{columns}">{"".join(parts)}</div>'
 
 
 def card(given: Sequence[str], made: str) -> str:
-    """Put what was given and what was made of it together; nothing parts them, however narrow the window is."""
+    """Show an input and its result together. They stay together in a narrow window."""
     return f'<div class="card"><div class="given">{"".join(given)}</div>{made}</div>'
 
 
 def cards(parts: Sequence[str]) -> str:
-    """Put cards beside each other, two in a row where there is room."""
+    """Show cards side by side, two in a row if there is room."""
     return f'<div class="cards">{"".join(parts)}</div>'
 
 
 def opening(image: Array, example: str, caption: str, detail: str, *, note: str = "") -> str:
-    """Show a large picture as it is, pixel by pixel, and below it the example and the whole of it, from the same data."""
+    """Show a large image at full size, and below it the example and the whole image, from the same data."""
     height, width = image.shape[:2]
     seen = f'<div class="ground" role="img" aria-label="{escape(caption)}" style="aspect-ratio:{width}/{height}"></div>'
     return (
@@ -86,7 +86,7 @@ def code(text: str) -> str:
 
 
 def section(name: str, title: str, lead: str, body: str) -> str:
-    """Put a section together."""
+    """Return a section."""
     return f'<section id="{escape(name)}"><h2>{escape(title)}</h2><p class="lead">{escape(lead)}</p>{body}</section>'
 
 
@@ -100,7 +100,7 @@ def document(
     command: str = "texrs demo",
     style: str = "",
 ) -> str:
-    """Put the page together."""
+    """Return the page."""
     menu = "".join(f'<a href="#{escape(name)}">{escape(title)}</a>' for name, title in links)
     body = "\n".join(sections)
     return f"""<!doctype html>

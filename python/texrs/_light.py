@@ -1,8 +1,8 @@
-"""Light that changes slowly over what is copied: divided out before, and multiplied on afterwards.
+"""Slowly changing light of copied pixels: divided out before, multiplied back afterwards.
 
-What is looked up elsewhere brings the light of that place along: a patch of the sunny end of a floor is too light at the
-other end. The light is what the logarithms of a map's means follow, by a polynomial of the second degree in the place, where
-that says clearly more than one of a lower degree. It hangs on the map alone, and on where it is known.
+Copied pixels bring the light of their source along: a patch of the sunny end of a floor is too bright at the other
+end. Light is a polynomial of up to the second degree in the position, fitted to the logarithms of local means. A
+higher degree is used only if it explains clearly more. The light depends only on the map and its known pixels.
 """
 
 from __future__ import annotations
@@ -17,34 +17,34 @@ from texrs._arrays import exp_single
 from texrs._typing import Array, Bools, Floats
 
 BLOCKS = 32
-"""The means are those of squares, so many along the shorter side."""
+"""Number of squares along the shorter side whose means are used."""
 FULL = 0.25
-"""Share of a square that must be known."""
+"""Minimum known share of a square."""
 FEWEST = 24
-"""Squares that tell enough."""
+"""Minimum number of squares for a fit."""
 BETTER = 0.75
-"""Share of the squares of what is off that a higher degree must leave at most."""
+"""Maximum share of the squared residuals that a higher degree may leave."""
 ROUNDS, FAR = 6, 4.0
-"""Steps of the robust fit; standard deviations from which on a square is something else."""
+"""Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
 DIGITS = 8
-"""Of the polynomial, after the point: the last bits of a fit hang on the processor."""
+"""Digits of the polynomial after the point. The last bits of a fit depend on the processor."""
 MOST = 1.1
-"""Natural logarithm by which light is followed at most."""
+"""Maximum natural logarithm of the light that is followed."""
 TERMS = (1, 3, 6)
-"""Of polynomials of degree 0, 1 and 2."""
+"""Number of terms of polynomials of degree 0, 1 and 2."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
-    """How bright a map is at each place, as a factor of its mean."""
+    """Brightness of a map at each position, as a factor of its mean."""
 
     shape: tuple[int, int]
     polynomial: tuple[float, ...]
-    """Of (row, column) from the middle, in halves of the longer side."""
+    """Polynomial of (row, column) from the middle, in halves of the longer side."""
 
     @classmethod
     def of(cls, image: Array, where: Bools) -> Light | None:
-        """Return the light of what is marked of a map (H, W, C) of values from 0 on; None where it is even."""
+        """Return the light of the marked pixels of a map (H, W, C) of values from 0 on, or None if it is even."""
         shape = where.shape[0], where.shape[1]
         step = max(4, min(shape) // BLOCKS)
         rows, columns = (n // step for n in shape)
@@ -71,7 +71,7 @@ class Light:
         return cls(shape, tuple(round(float(c), DIGITS) for c in polynomial))
 
     def at(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
-        """Return the factor at places; beyond the map that of the nearest in it."""
+        """Return the factor at positions. Positions beyond the map have the factor of the nearest one in it."""
         y, x = (np.clip(p, 0, n - 1).astype(np.float64) for p, n in zip((rows, columns), self.shape, strict=True))
         terms = _list_terms(y, x, self.shape)
         total = np.zeros(terms.shape[:-1])
@@ -81,7 +81,7 @@ class Light:
 
 
 def measure_lights(image: Array, parts: Sequence[Bools]) -> list[Light | None]:
-    """Return the light of each part of a map (H, W, C); none of maps in which light is nothing."""
+    """Return the light of each part of a map (H, W, C), or no light for maps without colours."""
     # The last of two or of four channels is transparency.
     colours = image[..., :-1] if image.shape[-1] in (2, 4) else image
     if image.dtype.kind not in "uf" or (image.dtype.kind == "f" and not (colours >= 0).all()):
@@ -90,7 +90,7 @@ def measure_lights(image: Array, parts: Sequence[Bools]) -> list[Light | None]:
 
 
 def divide_out(image: Array, lights: Sequence[Light | None], parts: Sequence[Bools]) -> Floats:
-    """Return a map (H, W, C) as it would be in even light."""
+    """Return a map (H, W, C) in even light."""
     even = image.astype(np.float32)
     count = image.shape[-1] - (image.shape[-1] in (2, 4))
     for light, part in zip(lights, parts, strict=True):
@@ -107,7 +107,7 @@ def _list_terms(rows: NDArray[np.float64], columns: NDArray[np.float64], shape: 
 
 
 def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return the coefficients that most values follow, and the sum of squares of what is off, at most `FAR` each."""
+    """Return the coefficients that most values follow, and the sum of squared residuals, each at most `FAR`."""
     weight = np.ones(len(values))
     spread = 1.0
     coefficients = np.zeros(terms.shape[1])

@@ -1,4 +1,4 @@
-"""Uneven light taken out of colours: how bright they are over large parts of a picture, while all that is smaller stays."""
+"""Removal of uneven light from colours: brightness is evened at large scale, and all finer detail stays."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 
 FINE, COARSE = 256, 96
-"""Samples along the longer side: of what things are told apart on, and of the light, which is smooth."""
+"""Samples along the longer side: for the separation of elements, and for the light, which is smooth."""
 SHARE = 0.25
-"""Of the shorter side: what is larger is taken for light."""
+"""Share of the shorter side. Larger structures count as light."""
 LEAST = 0.02
-"""Encoded brightness below which a place is too dark to say how it is lit."""
+"""Encoded brightness below which a position is too dark to show how it is lit."""
 STRONGEST = 1.4
-"""Logarithm of how much encoded values change at most: to a quarter, or four times."""
+"""Logarithm of the maximum change of encoded values: to a quarter, or four times."""
 BRIGHTEST = 1e15
-"""Colours of floats at most: their light, a power of them, stays a number."""
+"""Maximum float colour, so that its light, a power of it, stays finite."""
 TURNS = 3
-"""Of telling bright things from dark ones, and light from both."""
+"""Number of alternations between separating bright from dark elements and estimating the light of both."""
 BINS = 128
 LOOKED_AT = 256
-"""Pixels of the longer side that are enough to find how uneven light is."""
+"""Pixels of the longer side that suffice to measure uneven light."""
 STRIP = 1 << 20
-"""Pixels that are brought into even light at a time."""
+"""Pixels that are corrected at a time."""
 
 
 def flatten_lighting(
@@ -41,35 +41,37 @@ def flatten_lighting(
     size: float | None = None,
     space: Space | None = None,
 ) -> Array:
-    """Return a picture whose light is even: how bright it is over large parts is divided out; hues stay.
+    """Make the light of an image even.
 
-    Bright things and dark ones, such as flowers and leaves, are told apart first, and light is what both vary by, after Wells
-    et al. 1996: a place is hardly in a better light because more flowers stand there. It is taken out as far as there is
-    evidence of it: what bends more often is so only where it says clearly more, and a picture whose parts differ by
-    chance alone comes back as it is.
+    Brightness is divided out at large scale, and hues stay. Bright and dark elements, such as flowers and leaves, are
+    separated first. Light is the variation that both share (Wells et al. 1996), because more flowers do not mean more
+    light. Light is removed as far as there is evidence of it. A more complex light needs more evidence, and an image
+    whose parts differ only by chance is returned unchanged.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Colours, in any dtype, floats of up to 1e15; the last of two or four channels is transparency, which stays.
+        Colours, in any dtype, floats up to 1e15. The last of two or four channels is transparency, which does not
+        change.
     amount : float
-        How much of the unevenness is taken out, 0 to 1.
+        Share of the unevenness to remove, 0 to 1. Default: 1.
     wrap : bool or (bool, bool)
-        Along which axes the picture is cyclic, so that it stays so.
+        Axes along which the image is periodic. It stays periodic.
     size : float, optional
-        Pixels, at least 4: what is larger is evened, elements are to be smaller. By default a quarter of the shorter side.
+        Size in pixels, at least 4, above which variation counts as light. Elements should be smaller. Default: a
+        quarter of the shorter side.
     space : {"srgb", "linear"}, optional
-        How values encode light; by default integers are sRGB and floats linear.
+        Encoding of the values. By default integers are sRGB and floats are linear.
 
     Returns
     -------
     array
-        The same shape and dtype. Values end at the largest of the dtype.
+        Image of the same shape and dtype. Values are clipped at the largest of the dtype.
 
     Raises
     ------
     InvalidInput
-        Not a picture, colours beyond 1e15, or another amount, size or space.
+        If it is not an image, has colours beyond 1e15, or amount, size or space is invalid.
 
     Examples
     --------
@@ -113,7 +115,10 @@ def flatten_lighting(
 
 
 def measure_unevenness(image: Array, space: Space | None = None) -> float:
-    """Return how many times brighter the best lit part of colours is than the worst lit part; 1: no evidence."""
+    """Return the ratio of brightness of the best lit and the worst lit part of colours.
+
+    The ratio 1 means no evidence of uneven light.
+    """
     pixels = as_image(image, "image")
     step = max(1, max(pixels.shape[:2]) // LOOKED_AT)
     few = pixels[::step, ::step]
@@ -124,7 +129,7 @@ def measure_unevenness(image: Array, space: Space | None = None) -> float:
 
 
 def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[bool, bool]) -> Floats:
-    """Return logarithms of how much brighter each part of a picture is to be, on a few samples."""
+    """Return logarithms of the correction of each part of an image, on a few samples."""
     rows, columns = pixels.shape[:2]
     step = max(1.0, max(rows, columns) / FINE)
     shape = max(1, ceil(rows / step)), max(1, ceil(columns / step))
@@ -133,13 +138,13 @@ def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[
         part = slice(start, min(start + max(1, STRIP // columns), rows))
         seen = encode_srgb(to_light(pixels[part][..., :colours], space)).mean(axis=-1, keepdims=True)
         if pixels.shape[-1] > colours:
-            # What is not there is as all the rest is.
+            # Fill unknown pixels with the mean of the known ones.
             there = to_light(pixels[part][..., -1:], "linear")
             mean = (seen * there).sum(axis=(0, 1)) / np.maximum(there.sum(), np.float32(1e-6))
             seen = seen * there + mean * (1 - there)
         values[part] = np.swapaxes(shrink(np.swapaxes(seen, 0, 1), shape[1:]), 0, 1)
     bright = log_single(np.maximum(shrink(values, shape), np.float32(LEAST)))[..., 0].astype(np.float64)
-    # At first by means around each place, which tell things apart in any light.
+    # Start from means around each position, which separate elements in any light.
     few, waves = reduce(shape), [min(MOST, max(1, round(n / over))) for n in pixels.shape[:2]]
     bells = [smooth(few[k], over / 2 * few[k] / pixels.shape[k], wrap[k]) for k in (0, 1)]
     low = enlarge(np.einsum("kl,il->ik", bells[1], np.einsum("ij,jl->il", bells[0], shrink(bright, few))), shape, wrap)
@@ -154,20 +159,20 @@ def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[
 
 
 def reduce(shape: tuple[int, int]) -> tuple[int, int]:
-    """Return how many samples the light is kept on."""
+    """Return the number of samples of the light."""
     rows, columns = (min(max(1, ceil(n * COARSE / max(shape))), n) for n in shape)
     return rows, columns
 
 
 def enlarge(values: NDArray[np.float64], shape: tuple[int, int], wrap: tuple[bool, bool]) -> NDArray[np.float64]:
-    """Return values on more samples, along straight lines."""
+    """Return values on more samples, by linear interpolation."""
     for axis in (0, 1):
         values = mix(values, place(shape[axis], values.shape[axis], wrap[axis]), axis)
     return values
 
 
 def divide(values: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return which values are of the brighter of two kinds that are told apart best (Otsu 1979)."""
+    """Return a mask of the brighter of the two best separable classes of values (Otsu 1979)."""
     low, high = float(values.min()), float(values.max())
     if high - low < 1e-6:
         return np.zeros(values.shape, np.intp)
@@ -180,12 +185,12 @@ def divide(values: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def smooth(count: int, width: float, wrap: bool) -> NDArray[np.float64]:
-    """Return the matrix of means around each sample, weighted by a Gaussian of that width."""
+    """Return the matrix of Gaussian means around each sample."""
     at = np.arange(count)
     apart = (at - at[:, np.newaxis]).astype(np.float64)
     if wrap:
         apart = (apart + count / 2) % count - count / 2
-    # Rounded: of exponentials the last bits hang on the processor.
+    # Round, because the last bits of exponentials depend on the processor.
     bell: Array = np.exp(-0.5 * np.square(apart / max(width, 0.25)))
     weights: Array = np.round(bell, 9)
     means: NDArray[np.float64] = weights / weights.sum(axis=1, keepdims=True)
@@ -193,7 +198,7 @@ def smooth(count: int, width: float, wrap: bool) -> NDArray[np.float64]:
 
 
 def place(count: int, samples: int, wrap: bool) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Return between which samples each pixel lies, and how far it is from the first."""
+    """Return the sample before each pixel, and the distance from it."""
     at = (np.arange(count) + 0.5) * (samples / count) - 0.5
     if not wrap:
         at = np.clip(at, 0, samples - 1)
@@ -205,7 +210,7 @@ def place(count: int, samples: int, wrap: bool) -> tuple[NDArray[np.intp], NDArr
 
 
 def mix(values: Array, between: tuple[Array, Array, Array], axis: int) -> Array:
-    """Return values between samples along an axis."""
+    """Interpolate values between samples along an axis."""
     first, second, share = between
     sides = [1] * values.ndim
     sides[axis] = len(share)

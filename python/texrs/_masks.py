@@ -1,4 +1,4 @@
-"""Masks: which pixels or voxels a user marked, read from whatever holds the marks."""
+"""Masks: pixels or voxels that a user marked, in any supported form."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ __all__ = [
 ]
 
 HALF = 0.5
-"""Least share of white that marks a pixel. JPEG at quality 20 moves black and white by up to 0.46 of their distance."""
+"""Minimum share of white that marks a pixel. JPEG at quality 20 moves black and white by up to 0.46 of their distance.
+"""
 GREY, LEAST_GREY = 1 / 16, 0.01
-"""Least share of white of a grey pixel, and least share of unmarked grey pixels that is reported."""
+"""Minimum share of white of a grey pixel, and minimum share of unmarked grey pixels that is reported."""
 TWO = 0.1
-"""Share of the pixels other than 0 that may lie between the two values of a mask: edges, and noise of JPEG."""
+"""Maximum share of non-zero pixels between the two values of a mask: edges, and noise of JPEG."""
 PLAIN = 0.25
-"""Share of the opaque pixels of a layer that have the same brightness, at least: a stroke is plain, and a picture is not."""
+"""Minimum share of the opaque pixels of a layer with the same brightness: a stroke is plain, and an image is not."""
 MUCH = 0.5
 """Share of an image above which a mask is probably inverted."""
 FARTHEST = 4096
@@ -44,15 +45,17 @@ FARTHEST = 4096
 class Mask:
     """A mask, and how to read it.
 
-    A mask is white where it marks. Any parameter of texrs that takes a mask also takes a `Mask`.
+    White pixels of a mask are marked. Any parameter of texrs that takes a mask also takes a `Mask`.
 
     Parameters
     ----------
     marks : (H, W) or (D, H, W) array, with or without channels, path_like, PIL.Image.Image, str, float or None
-        The marks: an image of the same size, or what the function that takes the mask allows instead. A bool array is taken as
+                The marks: an image of the same size, or what the function that takes the mask allows instead. A bool
+        array is taken as
         it is. A pixel of an image is marked if its largest channel is at least half of white. An image without any
         light
-        pixel contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency
+                pixel contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose
+        transparency
         varies is a layer of a paint program: each pixel is marked that is at least half opaque.
     invert : bool
         If True, the other pixels are marked.
@@ -106,12 +109,12 @@ def as_marks(value: object) -> Mask:
 
 
 def name_marks(mask: Mask, name: str) -> str:
-    """Return what notices call the marks: the name of the file, or of the parameter."""
+    """Return the name of the marks in notices: the file name, or the name of the parameter."""
     return os.path.basename(mask.marks) if isinstance(mask.marks, str | os.PathLike) else name
 
 
 def adjust(mask: Mask, marked: Bools, wrap: Sequence[bool] | None = None) -> Bools:
-    """Return a marked area inverted and grown as a mask says.
+    """Return a marked area, inverted and grown as requested.
 
     Examples
     --------
@@ -125,7 +128,7 @@ def adjust(mask: Mask, marked: Bools, wrap: Sequence[bool] | None = None) -> Boo
 
 
 def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bool] | None = None) -> Bools:
-    """Return which pixels or voxels a mask marks.
+    """Return the pixels or voxels that a mask marks.
 
     Parameters
     ----------
@@ -136,7 +139,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     shape : sequence of int or str
         Length of each axis. A word stands for any length.
     wrap : sequence of bool, optional
-        Axes along which the image is cyclic. Default: none.
+        Axes along which the image is periodic. Default: none.
 
     Returns
     -------
@@ -145,9 +148,9 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     Raises
     ------
     InvalidInput
-        Not numbers, not finite, or of another shape.
+        If the mask is not numbers, not finite, or of another shape.
     FileError
-        The file cannot be read.
+        If the file cannot be read.
 
     Examples
     --------
@@ -173,7 +176,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
 
 
 def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:
-    """Return which pixels of an image are marked, and report what is not certain."""
+    """Return the marked pixels of an image, and report uncertain ones."""
     levels = given
     if given.ndim > axes:
         colours, alpha = (given[..., :-1], given[..., -1]) if given.shape[-1] in (2, 4) else (given, None)
@@ -206,7 +209,7 @@ def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:
 
 
 def _look_through(levels: Array, alpha: Array, called: str) -> Array:
-    """Return the marks of an image whose transparency varies: its opacity, or what is white where it is opaque."""
+    """Return the marks of an image with varying transparency: its opacity, or the white pixels of its opaque part."""
     white, full = _find_white(levels), _find_white(alpha)
     seen = levels[alpha >= HALF * full].astype(np.float64) / white
     dark, light = (float(np.mean(part)) if seen.size else 0.0 for part in (seen < 0.25, seen > 0.75))
@@ -224,30 +227,33 @@ def _look_through(levels: Array, alpha: Array, called: str) -> Array:
 
 
 def _find_white(levels: Array) -> float:
-    """Return the value of white: the largest one of an integer type, 1 of floats within 0 to 1, else the largest float."""
+    """Return the value of white.
+
+    It is the largest value of an integer type, 1 for floats within 0 to 1, else the largest float.
+    """
     if levels.dtype == np.bool_:
         return 1.0
     return float(np.iinfo(levels.dtype).max) if levels.dtype.kind in "ui" else max(1.0, float(levels.max()))
 
 
 def check_share(marked: Bools, name: str, called: str, verb: str, *, invertible: bool = True) -> None:
-    """Refuse a mask that marks nothing, and report one that marks more than half.
+    """Refuse a mask without marked pixels, and report one that marks more than half.
 
     Parameters
     ----------
     marked : (...) bool
         The marked pixels or voxels.
     name, called : str
-        Name of the parameter, and what notices call the mask.
+        Name of the parameter, and name of the mask in notices.
     verb : str
-        What is done with the marked pixels, such as "fill".
+        Verb for the marked pixels, such as "fill".
     invertible : bool
         If True, the notice advises to invert the mask.
 
     Raises
     ------
     InvalidInput
-        Nothing is marked.
+        If no pixel is marked.
 
     Examples
     --------
@@ -267,7 +273,7 @@ def check_share(marked: Bools, name: str, called: str, verb: str, *, invertible:
 
 
 def widen(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Bools:
-    """Grow a mask by a number of pixels on all sides, also across the borders of cyclic axes.
+    """Grow a mask by a number of pixels on all sides, also across the borders of periodic axes.
 
     Examples
     --------
@@ -288,7 +294,7 @@ def widen(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Bools:
 
 
 def fade(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floats:
-    """Return the weight of a filling: 1 where a mask marks, and evenly less to 0 beyond a band around it.
+    """Return the weight of a filling: 1 in the mask, falling linearly to 0 beyond a band around it.
 
     Examples
     --------
@@ -309,7 +315,7 @@ def measure(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floa
     padded = np.pad(mask, [(n, n) for n in reach], mode="wrap")
     far = np.full(padded.shape, np.inf, np.float32)
     if mask.any():
-        # Distances are slow to measure, so measure them only in the box where they can be short.
+        # Measuring distances is slow, so measure only in the box of short distances.
         box = []
         for axis in range(mask.ndim):
             marked = np.flatnonzero(padded.any(axis=tuple(a for a in range(mask.ndim) if a != axis)))

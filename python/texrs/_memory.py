@@ -1,6 +1,6 @@
-"""How much memory this process may take: the least of what the machine has, its container allows, and its limits say.
+"""Memory that this process may take: the minimum of the machine's, the container's and the process's limits.
 
-What is said in the environment, and by the process itself, is in `texrs.limits`.
+`texrs.limits` handles limits from the environment and from the process itself.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ OWN = Path("/proc/self/cgroup")
 
 
 def find_memory() -> int | None:
-    """Return the bytes that this process may take in all, as far as anything tells.
+    """Return the bytes that this process may take in total, if known.
 
     Examples
     --------
@@ -37,19 +37,19 @@ def _read_machine() -> list[int]:
 
 
 def _read_limits() -> list[int]:
-    """Return what ``ulimit -v`` and ``-d`` allow."""
+    """Return the limits of ``ulimit -v`` and ``-d``."""
     try:
         import resource
-    except ImportError:  # Windows
+    except ImportError:  # Windows has no such module.
         return []
     limits = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
     return [limit for limit in limits if limit not in (resource.RLIM_INFINITY, -1)]
 
 
 def _read_groups(root: Path, own: Path) -> list[int]:
-    """Return what control groups of Linux allow, of either version: those that the process is in, and all above them.
+    """Return the limits of the Linux control groups of the process and of all groups above them, versions 1 and 2.
 
-    In a container the names may be those outside of it, where nothing lies; its own limit stands at the root then.
+    Names in a container may be those of the host, where no files exist. Its own limit is then at the root.
     """
     try:
         lines = own.read_text(encoding="utf-8").splitlines()

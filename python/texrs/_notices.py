@@ -95,7 +95,8 @@ def ignore(message: str) -> None:
     Parameters
     ----------
     message : str
-        One sentence that starts with the name of the input: ``"rock: preview.png is not used (its name gives no role)"``.
+        One sentence that starts with the name of the input: ``"rock: preview.png is not used (its name gives no
+        role)"``.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Pictures with a palette, or of few colours: results have no other colours than they have.
+"""Images with a palette or few colours: their results contain only these colours.
 
-Interpolation, antialiasing and the correction of seams would make new colours. Therefore the source map looks up each pixel of
-a result at the nearest pixel of the example.
+Interpolation, antialiasing and the correction of seams would add colours. Each pixel of a result is therefore looked
+up at the nearest pixel of the example.
 """
 
 from __future__ import annotations
@@ -28,23 +28,27 @@ from texrs.synthesis import Synthesis
 __all__ = ["Palette", "ask", "find", "has_few_colours", "keep_material", "keeps_colours", "make_plain"]
 
 MOST = 64
-"""Number of colours that are few. Pixel art has up to 64, and photographs of so few grey levels are rare."""
+"""Maximum number of few colours. Pixel art has up to 64, and photographs with so few grey levels are rare."""
 SPARE = 8
-"""Number of pixels for each colour, at least: a small cut-out of a photograph has a colour for each pixel."""
+"""Minimum number of pixels for each colour. A small crop of a photograph has a colour for each pixel."""
 STEP, SHARE = 8, 0.75
-"""Neighbours that differ do so by 8 of 255 levels, in three of four pairs. Smooth pictures have steps of 1 or 2 levels."""
+"""Minimum difference of different neighbours, of 255 levels, and the minimum share of such pairs.
+
+Smooth images have steps of 1 or 2 levels.
+"""
 ENOUGH = 2**18
-"""Number of pixels, about, whose neighbours are compared: rows and columns that are spread over the picture."""
+"""Approximate number of pixels whose neighbours are compared: rows and columns spread over the image."""
 CHUNK, MANY = 2**16, 2**12
-"""Number of pixels whose colours are listed at once, and least number of colours that one sort of all pixels lists
-faster."""
+"""Number of pixels whose colours are listed at a time, and number of colours above which one sort of all pixels is
+faster.
+"""
 _ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
-"""If True, any picture keeps its colours; if False, none. If None, indexed pictures and those of few colours do."""
+"""If True, every image keeps its colours; if False, none. If None, indexed images and images of few colours do."""
 
 
 @dataclass(frozen=True, slots=True)
 class Palette:
-    """The examples of a verb whose result has no other colours than they have."""
+    """Examples of a verb whose result contains only their colours."""
 
     images: list[Array]
     count: int
@@ -63,7 +67,7 @@ class Palette:
 
 @contextmanager
 def ask(kept: bool | None) -> Iterator[None]:
-    """Decide in a block whether pictures keep their colours; None decides for each picture."""
+    """Choose in a block whether images keep their colours. None decides for each image."""
     token = _ASKED.set(kept)
     try:
         yield
@@ -72,12 +76,12 @@ def ask(kept: bool | None) -> Iterator[None]:
 
 
 def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) -> Palette | None:
-    """Return the examples among the arguments of a verb, if its result has only their colours.
+    """Return the examples among the arguments of a verb if its result contains only their colours.
 
-    A path among the arguments is replaced by the image in it. Arguments that ask for other colours turn this off.
+    A path among the arguments is replaced by its image. Arguments that request other colours disable this.
     """
     asked, weight, how = _ASKED.get(), given.get("screening"), given.get("interpolation")
-    # Values of other types are refused by the verb.
+    # The verb refuses values of other types.
     wanted = isinstance(weight, int | float) and weight not in (0, usual.get("screening"))
     smooth = isinstance(how, str) and how not in ("nearest", usual.get("interpolation"))
     fading = any(isinstance(value, Mask) and value.feather for value in given.values())
@@ -111,7 +115,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
 
 
 def has_few_colours(image: Array) -> bool:
-    """Return whether an image has so few colours that a new one would be seen.
+    """Return whether an image has so few colours that a new one would be visible.
 
     Examples
     --------
@@ -145,13 +149,13 @@ def keeps_colours(image: Array) -> bool:
 
 
 def make_plain(source: SourceMap) -> SourceMap:
-    """Return a source map whose pixels are looked up to the nearest pixel and are not corrected."""
+    """Return a source map with nearest-pixel look-up and without correction."""
     wrap = (False, False) if source.finish is None else source.finish.wrap
     return replace(source, finish=RenderOptions(wrap, interpolation="nearest"))
 
 
 def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
-    """Return a result whose maps are looked up to the nearest pixel, if the colours of its materials are few."""
+    """Return a result with nearest-pixel look-up of all maps if its materials have few colours."""
     asked, bases = _ASKED.get(), [m.base for m in materials]
     few = asked is not False and made.source_map.axes == 2 and all(has_few_colours(base) for base in bases)
     if not few and not asked:
@@ -161,7 +165,7 @@ def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
 
 
 def _keeps(image: Array, indexed: bool) -> bool:
-    """Return whether an image keeps its colours: a palette of many greys is that of a grey photograph."""
+    """Return whether an image keeps its colours. A palette of many greys belongs to a grey photograph."""
     if not indexed or image.dtype != np.uint8:
         return has_few_colours(image)
     grey = image.ndim == 2 or (image.shape[2] >= 3 and bool((image[..., :3] == image[..., :1]).all()))
@@ -169,7 +173,7 @@ def _keeps(image: Array, indexed: bool) -> bool:
 
 
 def _list_images(value: object) -> Iterator[Array]:
-    """Return the images of an argument: arrays, what holds one, or a list of such."""
+    """Return the images in an argument: an array, an object with an image, or a list of them."""
     several = value if isinstance(value, list | tuple) else [value]
     for each in several:
         image = each if isinstance(each, np.ndarray) else getattr(each, "image", None)
@@ -180,7 +184,7 @@ def _list_images(value: object) -> Iterator[Array]:
 
 
 def _list_colours(image: Array, most: int = MANY) -> Array:
-    """Return the colours of an image as numbers, each once; only some of them if there are more than ``most``."""
+    """Return the distinct colours of an image as numbers, or some of them if there are more than ``most``."""
     found, rows = _pack(image[:0]), max(1, CHUNK // max(image.shape[1], 1))
     for first in range(0, image.shape[0], rows):
         found = np.union1d(found, _pack(image[first : first + rows]))

@@ -1,4 +1,4 @@
-"""Stages of long work: as kernels report them, and as they are shown."""
+"""Progress of long work: reports of kernels, and their display."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from texrs.errors import InvalidInput
 from texrs.limits._context import check_time, find_end
 
 if TYPE_CHECKING:
-    # Numpy would come with it.
+    # Import the typing names only here, because they would load NumPy.
     from texrs._typing import Progress
 
 PAUSE = 5.0
-"""Least seconds between two lines of one stage."""
+"""Minimum seconds between two lines of one stage."""
 _ASKED: ContextVar[Callable[[], object] | None] = ContextVar("asked", default=None)
 
 
 @contextmanager
 def answering(progress: Callable[..., object] | None, *place: str | float) -> Iterator[None]:
-    """Let what is called in the block, and is told of no progress, ask by `ask` whether it is to stop.
+    """Connect calls without a progress argument in the block to a listener, by `ask`.
 
     Parameters
     ----------
     progress : callable or None
-        Who listens.
+        The listener.
     *place
-        What it is told each time: the stage and the share of it, or the share alone.
+        First arguments of each call of the listener: the stage and its share, or only the share.
 
     Yields
     ------
     None
 
     """
-    # Where nobody listens to this, who listens to what it is part of is asked.
+    # If nobody listens to this block, ask the listener of the enclosing block.
     token = _ASKED.set(_ASKED.get() if progress is None else lambda: progress(*place))
     try:
         yield
@@ -47,14 +47,14 @@ def answering(progress: Callable[..., object] | None, *place: str | float) -> It
 
 
 def ask() -> None:
-    """Ask who listens, if anyone does, whether to go on; for loops of what is used by many, and knows of no progress."""
+    """Ask the listener, if there is one, whether to continue. For loops in shared code without a progress argument."""
     asked = _ASKED.get()
     if asked is not None:
         _tell(asked)
 
 
 def _tell(asked: Callable[[], object]) -> None:
-    # What a listener does is not watched itself.
+    # Calls made by a listener are not reported to it.
     token = _ASKED.set(None)
     try:
         asked()
@@ -63,27 +63,27 @@ def _tell(asked: Callable[[], object]) -> None:
 
 
 def stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    """Return what a kernel may call with the share that is done of a stage, or none where nobody listens."""
+    """Return a function that a kernel calls with its completed share, or None without a listener."""
     if progress is None:
         return None
-    progress(name, 0.0)  # Short work may be done before it is asked how far it is.
+    progress(name, 0.0)  # Short work may finish before the first report.
     return lambda share: progress(name, share)
 
 
 def listen(progress: Progress | bool | None) -> Progress | None:
-    """Return who listens to a verb: what the caller gave; a bar, for True; or nobody, unless the time is limited.
+    """Return the listener of a verb: the caller's function, a bar for True, or None unless time is limited.
 
     Parameters
     ----------
     progress : callable, bool or None
-        What a verb was given. True shows a bar of tqdm on stderr, or in the notebook, which goes when the verb ends; where tqdm
-        is not installed, a line a stage, and one each five seconds with the share that is done. What is called without one in a
-        block of `answering` asks as `ask` does.
+        Argument of the verb. True shows a bar of tqdm on stderr or in the notebook, which disappears when the verb
+        ends. Without tqdm it prints a line for each stage, and one every five seconds with the completed share. Calls
+        without a listener in a block of `answering` behave like `ask`.
 
     Raises
     ------
     InvalidInput
-        Neither a function nor True, False or None.
+        If it is not a function, True, False or None.
 
     """
     watch = _choose(progress)
@@ -101,7 +101,7 @@ def listen(progress: Progress | bool | None) -> Progress | None:
 
 def _choose(progress: Progress | bool | None) -> Progress | None:
     if progress is None or progress is False:
-        # Who listens here: from within another block of `answering` nobody else would be found.
+        # Find the listener here, because another block of `answering` would hide it.
         asked = _ASKED.get()
         return None if asked is None else lambda stage, share: _tell(asked)
     if progress is True:
@@ -113,7 +113,7 @@ def _choose(progress: Progress | bool | None) -> Progress | None:
 
 
 def show_lines(write: Callable[[str], object]) -> Progress:
-    """Return a callback that writes a line where a stage begins, and one now and then with the share that is done."""
+    """Return a callback that prints a line at the start of each stage, and regularly its completed share."""
     last, since = "", 0.0
 
     def show(stage: str, share: float) -> None:
@@ -127,7 +127,7 @@ def show_lines(write: Callable[[str], object]) -> Progress:
 
 
 def _make_bar() -> Progress | None:
-    """Return a callback that moves a bar, which is closed when nobody calls it any more; None where there is no tqdm."""
+    """Return a callback that moves a bar, or None without tqdm. The bar is closed when the callback is released."""
     try:
         from tqdm.auto import tqdm
     except ImportError:

@@ -1,4 +1,4 @@
-"""How things show themselves: on one line in the console, as a picture in a notebook."""
+"""Display of results: one line in the console, an image in a notebook."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from texrs._arrays import to_unit
 from texrs._typing import Array
 
 LONG = 60
-"""Characters of a value that is written as it is."""
+"""Maximum characters of a value that is written in full."""
 FEW = 8
-"""Entries of a list that are written."""
+"""Maximum number of list entries that are written."""
 
 
 def brief(thing: Any) -> str:
-    """Return the representation of a dataclass on one line: arrays by their dtype and size, and nothing that is as by default.
+    """Return a dataclass on one line: arrays by dtype and size, without default values.
 
-    It is written ``__repr__ = brief`` in the class.
+    Use it as ``__repr__ = brief`` in the class.
 
     Examples
     --------
@@ -60,20 +60,20 @@ def spell(value: object) -> str:
 
 
 def spell_list(several: Sequence[object]) -> str:
-    """Return a list on one line: its first entries, and how many there are."""
+    """Return a list on one line: its first entries and its length."""
     shown = ", ".join(map(repr, several[:FEW]))
     return f"[{shown}, ... {len(several)} in all]" if len(several) > FEW else f"[{shown}]"
 
 
 def measure(image: Array, axes: int) -> str:
-    """Return the size, the channels and the dtype of a picture or a volume."""
+    """Return the size, channels and dtype of an image or a volume."""
     count = image.shape[axes] if image.ndim > axes else 1
     sides = " x ".join(map(str, image.shape[:axes]))
     return f"{sides}, {count} channel{'s' * (count > 1)} of {image.dtype}"
 
 
 def preview(image: Array) -> Array:
-    """Return an 8-bit grey, RGB or RGBA version of an image, to look at."""
+    """Return an 8-bit grey, RGB or RGBA version of an image for display."""
     if image.dtype == np.bool_:
         return image.astype(np.uint8) * np.uint8(255)
     seen = image if image.ndim == 2 or image.shape[-1] in (3, 4) else image[..., 0]
@@ -83,7 +83,7 @@ def preview(image: Array) -> Array:
 
 
 def as_png(image: Array) -> bytes:
-    """Return a picture as the bytes of a PNG file."""
+    """Return an image as the bytes of a PNG file."""
     from texrs.io._image_io import encode
 
     return encode("image", np.ascontiguousarray(preview(image)), "png")

@@ -1,4 +1,4 @@
-"""How many threads the kernels use, and what else is done side by side in as many."""
+"""Number of threads of the kernels, and parallel work in as many threads."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from texrs.errors import Cancelled
 T = TypeVar("T")
 R = TypeVar("R")
 Watch: TypeAlias = Callable[[float], object]
-"""Called with the share of one thing that is done; raises where the work is to stop."""
+"""Called with the completed share of one task. It raises to stop the work."""
 PAUSE = 0.05
-"""Seconds between two looks at how far things are."""
+"""Seconds between two checks of progress."""
 
 
 @contextmanager
@@ -31,17 +31,17 @@ def threads(count: int | None = None) -> Iterator[None]:
     Parameters
     ----------
     count : int, optional
-        1 to 1024. By default ``RAYON_NUM_THREADS``, or as many as there are cores.
+        Number of threads, 1 to 1024. Default: ``RAYON_NUM_THREADS``, or the number of cores.
 
     Yields
     ------
     None
-        The former number is in force again where the block ends.
+        The block restores the former number.
 
     Raises
     ------
     InvalidInput
-        A count that is not an integer from 1 to 1024.
+        If the count is not an integer from 1 to 1024.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def threads(count: int | None = None) -> Iterator[None]:
 
 
 def count_threads() -> int:
-    """Return how many threads are in force here, as the kernels count them."""
+    """Return the number of threads in force, as the kernels count them."""
     count = _rust.set_threads(0)
     _rust.set_threads(count)
     said = os.environ.get("RAYON_NUM_THREADS", "")
@@ -70,9 +70,9 @@ def count_threads() -> int:
 
 
 class SideBySide:
-    """Does things that do not hang on each other in as many threads as are in force, which wait between two times.
+    """Run independent tasks in as many threads as are in force. The threads are reused.
 
-    Use it in a ``with`` block. Results do not depend on the number of threads if the work itself does not.
+    Use it in a ``with`` block. Results do not depend on the number of threads if the tasks do not.
     """
 
     def __init__(self, most: int) -> None:
@@ -96,22 +96,21 @@ class SideBySide:
         things: Sequence[T],
         watch: Callable[[int, float], object] | None = None,
     ) -> list[R]:
-        """Return what the work makes of each thing, in their order.
+        """Return the results of the tasks, in order.
 
         Parameters
         ----------
         work : callable
-            Called with a thing and a function that it calls with the share that is done.
+            Called with an item and a function that it calls with the completed share.
         things : sequence
-            Each is done on its own.
+            Items. Each is an independent task.
         watch : callable, optional
-            Called from this thread alone, with the number of a thing that is being done and its share; raising stops the
-            work.
+            Called only from this thread, with the number of a running task and its share. An exception stops the work.
 
         Raises
         ------
         BaseException
-            What the first of the things in their order raised; none of the others goes on then.
+            Exception of the first failed task in order. No other task continues.
 
         """
         if self._pool is None or len(things) < 2:
@@ -124,7 +123,7 @@ class SideBySide:
         def do_one(number: int, thing: T) -> R:
             def tell(share: float) -> None:
                 if stopped.is_set():
-                    raise Cancelled("stopped beside other work")
+                    raise Cancelled("stopped, because another task failed")
                 shares[number] = share
 
             tell(0.0)

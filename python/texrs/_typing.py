@@ -14,16 +14,16 @@ Floats: TypeAlias = NDArray[np.float32]
 Bools: TypeAlias = NDArray[np.bool_]
 Labels: TypeAlias = NDArray[np.int32]
 Matrix: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
-"""A linear map of two axes by its rows."""
+"""Linear map of two axes, as rows."""
 Path: TypeAlias = str | PathLike[str]
 Interpolation: TypeAlias = Literal["nearest", "linear", "cubic"]
 Progress: TypeAlias = Callable[[str, float], object]
-"""Called with the name of the stage and the share of it that is done; raising stops the work."""
+"""Called with the name of the stage and its completed share. An exception stops the work."""
 
 
 @runtime_checkable
 class Frames(Protocol):
-    """A frame for each point of a lattice, as `texrs.fields` has them."""
+    """A frame for each point of a lattice, as in `texrs.fields`."""
 
     axes: int
 

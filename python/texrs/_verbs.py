@@ -1,4 +1,4 @@
-"""Verbs that take materials wherever they take examples."""
+"""Decorator for verbs that take materials in place of examples."""
 
 from __future__ import annotations
 
@@ -33,29 +33,29 @@ def takes_materials(
     analysed: bool = False,
     check: Callable[[dict[str, Any]], None] = lambda given: None,
 ) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Let a verb take materials for its examples: it decides on what they tell, and all their maps come of it.
+    """Let a verb take materials as examples. It decides from their colours, and all their maps follow.
 
     Parameters
     ----------
     *names : str
-        The verb's parameters that its source map looks into, in the order of its exemplars; one may hold a list.
+        Parameters that the source map of the verb refers to, in the order of its exemplars. One may contain a list.
     beside : tuple of str
-        Parameters of which only what they look like counts.
+        Parameters that only serve as a reference for appearance.
     analysed : bool
-        Whether the verb needs the elements of what it is given, which of a material its colours may tell best.
+        If True, the verb needs the elements of its input. The colours of a material may show them best.
     check : callable
         Called with the arguments of a call with materials. It refuses arguments that only an image can have.
 
     Returns
     -------
     callable
-        Decorates a function that returns a `texrs.Synthesis`, or an iterator of them: its ``material`` is set, and its
-        ``image`` is the map that shows it.
+        Decorator of a function that returns a `texrs.Synthesis` or an iterator of them. It sets ``material``, and
+        ``image`` to the map that represents it.
 
     Raises
     ------
     InvalidInput
-        Some exemplars are materials and others are not, or their maps differ.
+        If some exemplars are materials and others are not, or their maps differ.
 
     """
 
@@ -65,7 +65,7 @@ def takes_materials(
 
         @wraps(verb)
         def run(*args: P.args, **kwargs: P.kwargs) -> T:
-            # What was ignored and assumed is in the report, also if the input was read earlier.
+            # The report contains these notices even if the input was read earlier.
             with collect() as notices:
                 for value in (*args, *kwargs.values()):
                     for each in _as_list(value):
@@ -104,7 +104,7 @@ def takes_materials(
                         [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
                     )
             if lit is True:
-                # What is decided on is in even light already.
+                # The guide image is already in even light.
                 given.arguments["flatten_lighting"] = False
             made: Any = verb(*given.args, **given.kwargs)
             if lit is True:
@@ -122,7 +122,7 @@ def takes_materials(
 
 
 def finish(made: Synthesis, materials: list[Material], progress: Progress | None) -> Synthesis:
-    """Return what a verb made of guides as what it makes of their materials."""
+    """Return the result of a verb on guide images as the result on their materials."""
     made = _palettes.keep_material(made, materials)
     material = apply_materials(materials, made.source_map, progress)
     stages = {"guide" if name == "before_blending" else name: stage for name, stage in made.stages.items()}
@@ -144,7 +144,7 @@ def _report(made: Any, notices: Notices) -> Any:
 
 
 def _report_each(made: Iterator[Any], notices: Notices) -> Iterator[Any]:
-    """Return results one by one; each report contains the notices of the call and of its own work."""
+    """Return results one by one. Each report contains the notices of the call and of its own work."""
     while True:
         # A block must not be open while the caller works with a result.
         with collect() as own:
@@ -155,8 +155,8 @@ def _report_each(made: Iterator[Any], notices: Notices) -> Iterator[Any]:
 
 
 def _analyse(material: object, guide: Array, name: str, progress: Progress | None) -> ElementAnalysis:
-    """Return the elements of a material, which are compared by all its maps."""
-    # Most verbs need none.
+    """Return the elements of a material, compared by all its maps."""
+    # Most verbs do not need elements.
     from texrs.elements import analyse
 
     try:
@@ -168,7 +168,7 @@ def _analyse(material: object, guide: Array, name: str, progress: Progress | Non
 
 
 def _flattened(source: SourceMap) -> SourceMap:
-    """Return the source map of something whose light is to be evened."""
+    """Return a source map that also evens the light."""
     assert source.finish is not None
     return replace(source, finish=replace(source.finish, flatten_lighting=True))
 

@@ -1,7 +1,7 @@
-"""A volume in a page: a slice along each axis, moved by sliders, without a kernel and without a library.
+"""A volume in an HTML page: a slice along each axis with sliders, without a kernel or a library.
 
-The voxels travel as one picture in which the planes lie side by side, and a few lines of JavaScript cut slices from it. Where
-scripts do not run, as in previews of notebooks, three slices are shown as they are.
+The voxels are stored as one image of all planes, and a few lines of JavaScript cut slices from it. Without scripts, as
+in previews of notebooks, three fixed slices are shown.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from texrs._typing import Array
 from texrs.io._image_io import encode
 
 MOST = 2**20
-"""Characters of a page's part, about."""
+"""Approximate maximum number of characters of the page."""
 _STEPS = 12
-"""Tries to come below that, each of fewer voxels."""
+"""Number of attempts to stay below the limit, each with fewer voxels."""
 _SIDE = 260
-"""Pixels of the screen that the longest side of a volume takes."""
+"""Screen pixels of the longest side of a volume."""
 _NAMES = ("plane", "row", "column")
 
 _PAGE = """\
@@ -76,9 +76,9 @@ for (const box of document.querySelectorAll('[id="{id}"]:not([data-on])')) {{
 
 
 def as_page(volume: Array) -> str:
-    """Return HTML that shows a volume (D, H, W, C), of less than about a million characters whatever its size.
+    """Return HTML that shows a volume (D, H, W, C), with less than about a million characters.
 
-    Larger volumes are shown at every second voxel, or fewer.
+    Larger volumes are shown at every second voxel or fewer.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def as_page(volume: Array) -> str:
 
     """
     sides = volume.shape[:3]
-    # The cube root of 2 each time: half the voxels.
+    # Divide the sides by the cube root of 2, which halves the voxels.
     for attempt in range(_STEPS):
         least = 2 ** (attempt / 3)
         step = tuple(max(1, math.floor(least * max(1.0, n / 128))) for n in sides)
@@ -115,14 +115,14 @@ def as_page(volume: Array) -> str:
 
 
 def _as_bytes(volume: Array) -> Array:
-    """Return colours of 8 bits, (D, H, W, 3 or 4), as other pictures are shown; of other numbers of channels the first."""
+    """Return colours of 8 bits, (D, H, W, 3 or 4). Other numbers of channels show the first one."""
     seen = preview(volume) if volume.shape[-1] in (3, 4) else preview(volume[..., :1])
     seen = seen if seen.ndim == 4 else seen[..., np.newaxis]
     return np.repeat(seen, 3, axis=-1) if seen.shape[-1] == 1 else seen
 
 
 def _pack(seen: Array) -> tuple[bytes, int]:
-    """Return a lossless picture of all planes in rows, and how many lie in a row."""
+    """Return a lossless image of all planes in rows, and the number of planes in a row."""
     planes, rows, columns, channels = seen.shape
     wide = min(planes, max(1, round(math.sqrt(planes * rows / columns))))
     tall = -(-planes // wide)

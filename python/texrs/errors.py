@@ -1,4 +1,4 @@
-"""What texrs raises. Every message says which argument, what came and what is allowed."""
+"""Exceptions of texrs. Each message names the argument, the given value and the allowed values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ def __dir__() -> list[str]:
 
 
 class TexrsError(Exception):
-    """Root of everything that texrs raises on purpose."""
+    """Base class of all exceptions of texrs."""
 
 
 class InvalidInput(TexrsError, ValueError):
@@ -18,15 +18,15 @@ class InvalidInput(TexrsError, ValueError):
 
 
 class LimitExceeded(InvalidInput):
-    """The work would need more pixels or more memory than the limit in force."""
+    """The work would need more pixels or memory than the limit in force."""
 
 
 class FileError(TexrsError, OSError):
-    """A file could not be read, decoded or written; nothing was left half-written."""
+    """A file could not be read, decoded or written. No file is left half-written."""
 
 
 class Cancelled(TexrsError):
-    """The caller asked to stop; nothing was left half-written."""
+    """The caller asked to stop. No file is left half-written."""
 
 
 class InputWarning(UserWarning):

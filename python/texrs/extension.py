@@ -1,7 +1,7 @@
-"""More of a plane that was photographed: the picture goes on beyond its borders, in the same perspective.
+"""Extension of a photographed plane beyond the image borders, in the same perspective.
 
-What is beyond them is a hole that is filled by example, as `texrs.remove` fills one, from the plane that the picture shows,
-which is said, or found.
+The area beyond the borders is a hole. It is filled by example, as in `texrs.remove`, from the plane in the image,
+which is given or found.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["extend"]
 
 MOST = 8192
-"""Pixels that are added on a side, at most."""
+"""Maximum number of pixels to add on a side."""
 
 
 @takes_materials("image")
@@ -46,50 +46,53 @@ def extend(
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Make a photograph of a plane larger, on any side, in the same perspective.
+    """Extend a photograph of a plane on any side, in the same perspective.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
         The photograph, any real dtype, each side at least 64.
     top, bottom, left, right : int
-        Pixels that are added there, 0 to 8192; some somewhere. Towards the horizon only as far as it.
+        Pixels to add on this side, 0 to 8192. One side or more must be above 0. Nothing is added beyond the horizon.
     size : int or (rows, columns), optional
-        Size of the larger picture, in pixels: what the sides above do not add to it is added evenly, but towards the horizon
-        only as far as the plane goes, and on the other side then.
+        Size of the larger image, in pixels. Pixels that the sides above do not add are added evenly, but not beyond
+        the horizon: the other side then takes the rest.
     view : PlaneView or Plane, or a sequence of them, optional
-        How the photograph shows the plane, as far as that is to be said; what is not is found. Where that is not sure, or the
-        plane is seen from the front, things are as large as they are seen anywhere. What is no ground, as the sky above a
-        floor, goes on as it lies, but nothing that stands on it. Of several planes, as a floor and a wall, each goes on by
-        itself, up to the line in which they meet; all but one need a ground.
+        Position of the plane in the photograph, as far as it is known. The rest is found. If the result is uncertain,
+        or the plane is seen from the front, elements have the size that they have anywhere in the image. Background
+        such as the sky above a floor continues, but objects on the plane do not. Several planes, such as a floor and a
+        wall, continue separately up to the line where they meet. Only one of them may lack a ground.
     boundary_width : int
-        How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
+        Width in pixels of the band at the border that may change to hide it, 0 to 64. Default: 0.
     screening : float, optional
-        Weight of the values when the colours of what is added are corrected, as in `texrs.inpaint`; None or 0: no correction.
+        Weight of the values in the colour correction of the added pixels, as in `texrs.inpaint`. None or 0: no
+        correction.
     match_lighting : bool
-        Whether slow changes of light, as towards a window, are followed; beyond the photograph it stays as it is at the border.
+        If True, slow changes of light are followed, such as towards a window. Beyond the photograph the light stays as
+        at the border.
     seed : int
-        Chooses among what fits.
+        Seed that chooses among the possible results.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
+        the work. True shows a bar.
 
     Returns
     -------
     Synthesis
-        The larger picture, in the dtype and with the channels of the photograph, of which no pixel changes but those within
-        ``boundary_width``. Its source map leads to the photograph. The report has the planes and what was added.
+        The larger image, in the dtype and with the channels of the photograph. No pixel of the photograph changes,
+        except within ``boundary_width``. Its source map refers to the photograph. The report contains the planes and
+        the added pixels.
 
     Raises
     ------
     InvalidInput
-        Options out of their ranges, nothing to add, two ways to say how the plane lies, or a picture that would reach the
-        horizon.
+        If options are out of their ranges, nothing is added, the plane is described twice, or the image would reach
+        the horizon.
 
     Warns
     -----
     UserWarning
-        A plane that was found with a confidence below 0.4, and is not followed: give corners, or angles.
+        If a plane is found with a confidence below 0.4. It is not followed: give corners or angles.
 
     Examples
     --------
@@ -134,7 +137,7 @@ def extend(
             for v, (said, _), ground in zip(views, settled, grounds, strict=True)
         ]
     watch("plane", 1.0)
-    # Beyond the horizon of a plane that is all there is lies nothing.
+    # Everything else is beyond the horizon of the plane.
     alone = len(add_rest([Part(ground) for ground in grounds], np.zeros((rows, columns), np.bool_), pixels)) == 1
     for axis, before, after in ((1, "left", "right"), (0, "top", "bottom")):
         added[before] += missing[axis] // 2
@@ -160,7 +163,7 @@ def extend(
         )
     made = fill_parts(canvas, hole, parts, boundary=rim, light=follow, seed=number, progress=progress)
     lit = (-added["top"], -added["left"]) if follow else None
-    # It copies nothing from beyond the photograph's borders.
+    # The source is always inside the photograph's borders.
     places = np.moveaxis(np.indices(sides), 0, -1) - first
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
@@ -186,19 +189,19 @@ def extend(
 
 
 def add_sizes(shape: tuple[int, int], added: Mapping[str, int]) -> tuple[int, int]:
-    """Return the sides of a picture with what is added on its sides."""
+    """Return the sides of an image with the added pixels."""
     return shape[0] + added["top"] + added["bottom"], shape[1] + added["left"] + added["right"]
 
 
 def measure_room(plane: Plane, added: Mapping[str, int], axis: int) -> tuple[int, int]:
-    """Return by how many pixels a picture can go on before and after it along an axis, up to the horizon, `MOST` at most."""
+    """Return the pixels that can be added on both ends of an axis, up to the horizon and at most `MOST`."""
     low = -np.array([added["top"], added["left"]])
     high = np.array(plane.shape) - 1 + np.array([added["bottom"], added["right"]])
     low[axis], high[axis] = 0, plane.shape[axis] - 1
     corners = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])], np.float64)
     step = np.zeros(2)
     step[axis] = 1.0
-    # Widths grow evenly along each axis.
+    # Widths grow linearly along each axis.
     rise = float(np.diff(plane.width(np.stack([np.zeros(2), step])))[0])
     found = []
     for end, sign in ((low, -1), (high, 1)):

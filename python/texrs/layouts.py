@@ -1,8 +1,8 @@
-"""Layouts that are drawn, not found: points, lattices, cells and courses that elements are brought into.
+"""Drawn layouts: points, lattices, cells and courses that elements are arranged in.
 
-Each is an entry like that of a picture (`texrs.elements.ElementAnalysis`), whose picture is a drawing of the layout. All that
-takes the arrangement of a texture takes it: the second argument of `texrs.splice`, and a `texrs.TextureDatabase`. `from_dict`
-makes one of a description in plain JSON types, as the command line does.
+Each is a `texrs.elements.ElementAnalysis` like that of an image, with a drawing of the layout as its image. It can be
+the second argument of `texrs.splice`, and an entry of a `texrs.TextureDatabase`. `from_dict` makes one from a
+description in plain JSON types, as the command line does.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ __all__ = ["cells", "courses", "from_dict", "lattice", "points"]
 Points = NDArray[np.float64]
 
 GROUND, THING = 208, 72
-"""Grey values of the drawing."""
+"""Grey values of the background and of the elements in the drawing."""
 DISC = 0.35
-"""Radius that a point is drawn with, of the usual distance to the nearest."""
+"""Radius of a drawn point, as a share of the usual distance to the nearest point."""
 SHORTEST = 16
-"""Pixels along a side, at least."""
+"""Minimum pixels along a side."""
 LARGEST = 1 << 24
-"""Pixels of a drawing, at the most."""
+"""Maximum pixels of a drawing."""
 MOST = 1 << 18
-"""Points or bricks, at the most."""
+"""Maximum number of points or bricks."""
 
 
 def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[bool] = False) -> ElementAnalysis:
@@ -41,21 +41,22 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     Parameters
     ----------
     places : (n, 2) array
-        Rows and columns, in pixels, three or more within ``size``, no two in one place.
+        Rows and columns in pixels, at least three points within ``size``, all different.
     size : int or (rows, columns)
-        Of the drawing, sides of at least 16. With ``texrs.splice(layout_scale=1)`` pixels of it are those of the result.
+        Size of the drawing, sides of at least 16. With ``texrs.splice(layout_scale=1)`` its pixels are those of the
+        result.
     wrap : bool or (bool, bool)
-        Whether the layout repeats along rows and columns.
+        If True, the layout repeats along rows and columns.
 
     Returns
     -------
     ElementAnalysis
-        Disjoint, on a drawing (rows, columns) uint8.
+        Separate elements on a drawing (rows, columns) uint8.
 
     Raises
     ------
     InvalidInput
-        Points that are none, too few, or outside.
+        If there are too few points, or some are outside.
 
     Examples
     --------
@@ -91,26 +92,26 @@ def lattice(
     *,
     origin: Sequence[float] | None = None,
 ) -> ElementAnalysis:
-    """Return the points of a lattice, which goes on beyond the drawing as a lattice does.
+    """Return the points of a lattice, which continues beyond the drawing.
 
     Parameters
     ----------
     size : int or (rows, columns)
-        Of the drawing, sides of at least 16.
+        Size of the drawing, sides of at least 16.
     first, second : (row, column)
-        From a point to two of its neighbours, in pixels: ``(0, 20)`` and ``(17.3, 10)`` for hexagons.
+        Vectors from a point to two of its neighbours, in pixels: ``(0, 20)`` and ``(17.3, 10)`` for hexagons.
     origin : (row, column), optional
-        One of the points; the middle of the drawing by default.
+        One of the points. Default: the middle of the drawing.
 
     Returns
     -------
     ElementAnalysis
-        Disjoint, on a drawing (rows, columns) uint8.
+        Separate elements on a drawing (rows, columns) uint8.
 
     Raises
     ------
     InvalidInput
-        Vectors along one line, or so long that fewer than three points lie in the drawing, or so short that too many do.
+        If the vectors are parallel, or the drawing contains fewer than three or too many points.
 
     Examples
     --------
@@ -139,24 +140,25 @@ def lattice(
 
 
 def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> ElementAnalysis:
-    """Return a layout of cells: a tessellation, as the panes of a window or the stones of a pavement.
+    """Return a layout of cells: a tessellation, such as the stones of a pavement.
 
     Parameters
     ----------
     labels : (H, W) array of int
-        The cell of each pixel, any positive numbers; 0 is joint. Three cells or more, sides of at least 16.
+        Cell of each pixel, any positive number; 0 is joint. There must be at least three cells, and sides of at least
+        16.
     wrap : bool or (bool, bool)
-        Whether it repeats along rows and columns.
+        If True, the layout repeats along rows and columns.
 
     Returns
     -------
     ElementAnalysis
-        Jointed, one a label, on a drawing (H, W) uint8.
+        Jointed cells, one for each label, on a drawing (H, W) uint8.
 
     Raises
     ------
     InvalidInput
-        No labels, or too few.
+        If there are fewer than three labels.
 
     Examples
     --------
@@ -189,34 +191,34 @@ def courses(
     joint: float = 2.0,
     seed: int = 0,
 ) -> ElementAnalysis:
-    """Return courses of bricks or stones, each free along its own: a wall.
+    """Return a wall of courses of bricks or stones. Each course is independent of the others.
 
     Parameters
     ----------
     size : int or (rows, columns)
-        Of the drawing, sides of at least 16.
+        Size of the drawing, sides of at least 16.
     height : float, or sequence of float
-        Of a course, joint included, in pixels, 4 or more; several heights follow each other again and again.
+        Height of a course in pixels, joint included, at least 4. Several heights repeat in order.
     length : float
-        Usual length of a brick, joint included, in pixels, 4 or more.
+        Usual length of a brick in pixels, joint included, at least 4.
     shift : float
-        How much each course is moved along against the one above, in lengths: 0.5 is a running bond, 0 a stack.
+        Shift of each course against the one above, in brick lengths: 0.5 is a running bond, 0 a stack.
     vary : float
-        How much lengths differ, 0 to 0.9: bricks are ``1 - vary`` to ``1 + vary`` times as long as is usual.
+        Variation of lengths, 0 to 0.9: bricks are ``1 - vary`` to ``1 + vary`` times the usual length.
     joint : float
-        Width of the joints, in pixels, 0 to half of the height.
+        Width of the joints in pixels, 0 to half of the height.
     seed : int
-        Chooses lengths that vary.
+        Seed that chooses varying lengths.
 
     Returns
     -------
     ElementAnalysis
-        Jointed, on a drawing (rows, columns) uint8.
+        Jointed cells on a drawing (rows, columns) uint8.
 
     Raises
     ------
     InvalidInput
-        A number out of its range, or so large that fewer than three bricks are seen.
+        If a number is out of its range, or so large that fewer than three bricks are visible.
 
     Examples
     --------
@@ -252,7 +254,7 @@ def courses(
 
 
 def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
-    """Make a layout of a description in plain JSON types.
+    """Make a layout from a description in plain JSON types.
 
     Parameters
     ----------
@@ -267,7 +269,7 @@ def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
     Raises
     ------
     InvalidInput
-        No such layout, or an argument that it does not have or that is out of range.
+        If the layout does not exist, or has no such argument, or the argument is out of range.
 
     Examples
     --------
@@ -324,7 +326,7 @@ def _draw_points(at: Points, shape: tuple[int, int], wrap: tuple[bool, bool]) ->
     grid = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)
     far, nearest = cKDTree(at).query(grid, distance_upper_bound=radius)
     owner: Labels = np.where(np.isfinite(far), nearest + 1, 0).reshape(shape).astype(np.int32)
-    # A point whose disc lies under others keeps its pixel.
+    # A point whose disc is below others keeps its pixel.
     pixel = np.clip(np.rint(at), 0, np.array(shape) - 1).astype(np.intp)
     owner[pixel[:, 0], pixel[:, 1]] = np.arange(1, len(at) + 1)
     image = np.where(owner > 0, THING, GROUND).astype(np.uint8)

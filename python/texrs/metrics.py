@@ -1,14 +1,15 @@
-"""How good a texture is, judged by where it comes from.
+"""Quality of a synthesised texture, measured from its source map.
 
-Looked for are things that seams tear, lines that break off there, blur along seams, places that are shown again and again, and
-what of the exemplar is never shown.
+The figures measure torn elements, lines that break off at seams, blur along seams, repeated places, and parts of the
+exemplar that are never shown.
 
-A source map says where seams are, so only these are looked at, and an exemplar says what is usual: each figure counts what
-the exemplar does not have itself, so a piece of it scores 0. Two figures are of tears. One goes by the elements of a
-segmentation. The other one, lines that break off, knows nothing of elements, so that a cut which keeps out of what was taken
-for elements is not praised for that alone: an edge of the exemplar that runs into a seam must go on beyond it.
+The source map gives the seams, so only these are examined. The exemplar gives the usual values: each figure counts the
+excess over the exemplar, so a crop of it scores 0. Two figures measure tears. One uses the elements of a segmentation.
+The other one measures lines that break off, without elements. A cut along wrongly segmented outlines is therefore not
+rewarded by itself: an edge of the exemplar that meets a seam must continue beyond it.
 
-How near the windows at seams are to windows of the exemplar is no judge: the nearest are those of things that were fused.
+The distance of windows at seams to the nearest windows of the exemplar is not a useful figure, because it is smallest
+for fused elements.
 """
 
 from __future__ import annotations
@@ -34,42 +35,46 @@ def __dir__() -> list[str]:
 
 
 REACH, INSIDE = 8.0, 1 / 8
-"""Depth in pixels from which on a pixel is as deep inside an element as any, and the share of that which counts as inside."""
+"""Depth in pixels of a pixel fully inside an element, and the share of this depth that counts as inside."""
 VISIBLE, UNSEEN = 90, 0.25
-"""Percentile of the exemplar's own differences beyond which one is seen, and what a tear counts that is not."""
+"""Percentile of the exemplar's own differences above which a difference is visible, and the weight of an invisible
+tear.
+"""
 EDGE, TURNED = 85, 0.6
-"""Percentile of the exemplar's gradients beyond which one is of a line, and the share of it that must be missing for a line to
-break off."""
+"""Percentile of the exemplar's gradients above which one belongs to a line, and the share of it that must be missing
+for a broken line.
+"""
 BAND = 3
-"""Pixels on both sides of a seam in which blur is looked for."""
+"""Width in pixels on both sides of a seam for the measurement of blur."""
 CELL = 8
-"""Use is counted in cells of so many pixels a side."""
+"""Side of the cells that count use, in pixels."""
 GROUND = 0.1
-"""What ground counts for, where there are elements."""
+"""Weight of the background if there are elements."""
 ALIKE = 4
-"""Frames are alike that are the same to so many steps a unit."""
+"""Steps a unit for the comparison of frames. Frames with equal steps count as equal."""
 TORN, BROKEN, BLUR, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.1, 0.1
-"""What the figures count for in the score."""
+"""Weights of the figures in the score."""
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """What is wrong with a texture: 0 is the best of each figure but ``coverage``.
+    """Faults of a texture. The best value of each figure is 0, except for ``coverage``.
 
     Attributes
     ----------
     torn : float
-        Length of the seams inside of elements, as a share of the outlines that so much texture should have. Where no step
-        is seen that the exemplar does not have, a quarter counts.
+        Length of seams that cross elements, divided by the expected total outline length. Invisible seams count a
+        quarter.
     broken : float
-        Lines that break off at seams, as a share of the same lines, beyond what is usual in the exemplar.
+        Length of lines that break off at seams, divided by the length of such lines, minus the usual share in the
+        exemplar.
     seam_blur : float
-        Detail that is missing beside seams, as a share of what the exemplar has there; 0 to 1.
+        Share of the detail that is missing next to seams, compared with the exemplar; 0 to 1.
     repetition : float
-        How often what is shown is shown again exactly alike, those places that stand out counting for more, over what
-        pieces drawn blindly would give: 0 for nothing twice, 1 as if so drawn, a quarter if they were mirrored, too.
+        Amount of exact repetition compared with random patches, weighted by how conspicuous the places are. It is 0 if
+        nothing repeats, 1 if patches are random, and a quarter if they are also mirrored.
     coverage : float
-        Share of the exemplar that is shown, 0 to 1, as far as there is room for it.
+        Share of the exemplar that is shown, 0 to 1, relative to the available area.
 
     Examples
     --------
@@ -88,7 +93,7 @@ class Quality:
 
     @property
     def score(self) -> float:
-        """All in one figure: the less, the better."""
+        """Weighted sum of the figures. Lower is better."""
         flaws = TORN * self.torn + BROKEN * self.broken + BLUR * self.seam_blur
         return flaws + REPETITION * self.repetition + UNUSED * (1 - self.coverage)
 
@@ -98,7 +103,7 @@ class Quality:
         Returns
         -------
         dict of str to float
-            Rounded to four places.
+            Figures rounded to four places.
 
         Examples
         --------
@@ -118,20 +123,20 @@ def evaluate(
     elements: ElementOptions = ElementOptions(),
     wrap: bool | tuple[bool, bool] = False,
 ) -> Quality:
-    """Judge a texture that was made from one exemplar.
+    """Evaluate a texture that was made from one exemplar.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
-        What it was made from.
+        Exemplar of the texture.
     source : SourceMap
-        Where each pixel comes from, shape (h, w).
+        Source of each pixel, shape (h, w).
     image : (h, w) or (h, w, C) array, optional
-        The texture, if its colours were corrected; blur is looked for in it.
+        The texture, if its colours were corrected. It is used to measure blur.
     elements : ElementOptions
-        How the elements of the exemplar are found.
+        Options of the segmentation of the exemplar.
     wrap : bool or (rows, columns)
-        Axes along which it is cyclic.
+        Axes along which the texture is periodic.
 
     Returns
     -------
@@ -140,7 +145,7 @@ def evaluate(
     Raises
     ------
     InvalidInput
-        A source map into several exemplars or of another one's shape, or an image of another shape.
+        If the source map has several exemplars or one of another shape, or the image has another shape.
 
     Examples
     --------
@@ -177,28 +182,28 @@ def evaluate(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Traits:
-    """What is usual in an exemplar.
+    """Usual values of an exemplar.
 
     Attributes
     ----------
     colours : (H, W, C) float32
-        What is compared.
+        Colours for comparison.
     depth : (H, W) float32
-        How deep inside an element each pixel is, 0 to 1.
+        Depth of each pixel inside an element, 0 to 1.
     outlines : float
-        Pairs of neighbours a pixel that an outline parts.
+        Number of pairs of neighbours that an outline separates, divided by the pixels.
     step : float
-        The difference of neighbours beyond which one is seen.
+        Difference of neighbours above which it is visible.
     slopes : (H, W, 2 C) float32
-        Gradients: of all channels along rows, then along columns.
+        Gradients of all channels along rows, then along columns.
     line : float
-        Size of a gradient from which on it is of a line.
+        Minimum gradient of a line.
     broken : float
-        Share of the pairs of neighbours at which a line breaks off.
+        Share of the pairs of neighbours with a line that breaks off.
     lines : float
-        Share of the pairs of neighbours at which there is a line.
+        Share of the pairs of neighbours on a line.
     salience : (h, w) float64
-        How much each cell stands out, 1 on the average.
+        Conspicuousness of each cell, 1 on average.
 
     """
 
@@ -219,7 +224,7 @@ class Traits:
 
 
 def measure_traits(exemplar: Exemplar, elements: ElementOptions) -> Traits:
-    """Measure what is usual in an exemplar."""
+    """Measure the usual values of an exemplar."""
     from scipy.ndimage import gaussian_filter
 
     colours, parts = exemplar.guidance, exemplar.segment(elements)
@@ -239,9 +244,11 @@ def measure_traits(exemplar: Exemplar, elements: ElementOptions) -> Traits:
 
 
 def measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
-    """Return how much each cell stands out: how far its mean and its contrast are from the usual, in standard deviations.
+    """Return how conspicuous each cell is.
 
-    Where there are elements, ground counts for little: nobody sees that it is shown twice.
+    This is the deviation of its mean and contrast from the usual ones, in standard deviations.
+
+    Background counts little if there are elements, because its repetition is not noticed.
     """
     rows, columns = (-(-n // CELL) for n in colours.shape[:2])
     fill = ((0, rows * CELL - colours.shape[0]), (0, columns * CELL - colours.shape[1]), (0, 0))
@@ -265,18 +272,18 @@ class Seam:
     after: tuple[NDArray[np.intp], ...]
 
     def look_across(self, image: Floats) -> tuple[Floats, Floats]:
-        """Return what an image of the exemplar shows on both sides."""
+        """Return the values of an image of the exemplar on both sides."""
         first, second = (gather(image, self.source.coordinates[at], interpolation="nearest") for at in self.sides)
         return first, second
 
     @property
     def sides(self) -> tuple[tuple[NDArray[np.intp], ...], tuple[NDArray[np.intp], ...]]:
-        """The pixels on both sides."""
+        """Pixels on both sides."""
         return self.at, self.after
 
 
 def list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[np.intp], ...], ...]:
-    """Return the pixels of a picture that have a neighbour along an axis, and these neighbours."""
+    """Return the pixels of an image that have a neighbour along an axis, and these neighbours."""
     at = np.nonzero(np.ones([n - (a == axis) for a, n in enumerate(shape)], bool))
     return at, tuple(index + (a == axis) for a, index in enumerate(at))
 
@@ -292,7 +299,7 @@ def find_seam(source: SourceMap, axis: int, wrap: bool) -> Seam:
 
 
 def measure_tears(traits: Traits, seams: list[Seam], area: int) -> float:
-    """Return the length of seams inside elements as a share of the outlines in so much texture."""
+    """Return the length of seams inside elements, divided by the expected outline length."""
     length = 0.0
     for seam in seams:
         depth = np.minimum(*seam.look_across(traits.depth[..., np.newaxis]))[:, 0]
@@ -303,22 +310,23 @@ def measure_tears(traits: Traits, seams: list[Seam], area: int) -> float:
 
 
 def measure_breaks(traits: Traits, seams: list[Seam], area: int) -> float:
-    """Return the lines that break off at seams as a share of the lines in so much texture, beyond what is usual."""
+    """Return the share of lines that break off at seams, minus the usual share."""
     found, _ = find_breaks(traits.slopes, traits.line, seams)
     excess = float(found.sum()) - traits.broken * len(found)
     return max(0.0, excess) / max(traits.lines * area, 1.0)
 
 
 def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, Bools]:
-    """Mark the pairs at which a line breaks off that crosses from one side to the other, and those at which there is one.
+    """Return masks of the pairs with a broken crossing line, and of the pairs with any line.
 
-    A line that crosses is a strong gradient along the seam. Beyond it there must be one like it, no more than a pixel aside,
-    but where one side has an edge of its own along the seam: there a thing ends, and what lies below it goes on unseen.
+    A crossing line is a strong gradient along the seam. Beyond the seam there must be a similar one, at most a pixel
+    aside. An edge along the seam on one side is an exception: there an element ends, and the line continues hidden
+    below it.
     """
     ends = np.zeros(seams[0].source.shape, bool)
     for seam in seams:
         for at in seam.sides:
-            # Of both axes: along a slanted outline a seam goes in steps.
+            # Use both axes, because a seam along a slanted outline goes in steps.
             ends[at] |= np.abs(list_slopes(slopes, seam, at, seam.axis)[1]).mean(axis=-1) > line
     broken, lines = [], []
     for seam in seams:
@@ -335,7 +343,7 @@ def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, 
 
 
 def list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], along: int) -> list[Array]:
-    """Return the gradients along an axis of the output where pixels come from, and a pixel to each side."""
+    """Return the gradients along an output axis at the sources of pixels, and one pixel to each side."""
     source = seam.source
     frame = source.jacobian_array()
     ways = np.zeros((len(at[0]), 2), np.float32)
@@ -352,19 +360,19 @@ def list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], al
 
 
 def measure_blur(traits: Traits, source: SourceMap, seams: list[Seam], image: Floats) -> float:
-    """Return the share of the detail that is missing beside seams, where the image should show what its sources do."""
+    """Return the share of the detail of the sources that is missing next to seams."""
     from scipy.ndimage import binary_dilation, laplace
 
     at_seam = np.zeros(source.shape, bool)
     for seam in seams:
         for side in seam.sides:
             at_seam[side] = True
-    # Not at the seams themselves, which may be sharp where nothing else is.
+    # Leave out the seams themselves, which may be sharp even if their surroundings are not.
     near = binary_dilation(at_seam, iterations=1)
     band = binary_dilation(near, iterations=BAND - 1) & ~near
     if not band.any():
         return 0.0
-    # What is scaled or turned is softer, but not in seam_blur: the source itself says what there should be.
+    # Scaled or rotated pixels are softer, which is not seam blur: the source gives the expected detail.
     wanted, shown = (
         np.abs(np.stack([laplace(seen[..., c]) for c in range(seen.shape[-1])], axis=-1)[band]).mean()
         for seen in (gather(traits.colours, source.coordinates, interpolation="cubic"), image)
@@ -373,13 +381,13 @@ def measure_blur(traits: Traits, source: SourceMap, seams: list[Seam], image: Fl
 
 
 def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
-    """Return how often what is shown is shown again exactly alike, and the share of the exemplar that is shown."""
+    """Return the amount of exact repetition, and the share of the exemplar that is shown."""
     rows, columns = traits.salience.shape
     last = np.array(traits.colours.shape[:2]) - 1
     row, column = np.moveaxis(np.clip(np.rint(source.coordinates), 0, last).astype(np.intp) // CELL, -1, 0)
     cell = (row * columns + column).ravel()
     area = np.bincount(cell, minlength=rows * columns)
-    # What is turned, scaled or mirrored is not alike.
+    # Rotated, scaled or mirrored copies do not count as equal.
     key, ways = cell, number_frames(source)
     if ways is not None:
         key = ways.ravel() * (rows * columns) + cell
@@ -394,7 +402,7 @@ def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
 
 
 def number_frames(source: SourceMap) -> NDArray[np.intp] | None:
-    """Return a number for each pixel, the same for those that show the exemplar turned and scaled about alike."""
+    """Return a number for each pixel, equal for pixels with about the same rotation and scale."""
     frame = source.jacobian_array()
     if frame is None:
         return None

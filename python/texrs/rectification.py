@@ -1,8 +1,8 @@
-"""The flat texture of a plane that was photographed aslant.
+"""The flat texture of a photographed oblique plane.
 
-The plane is flattened at one resolution. What would be blurred there, for the camera saw it from too far away or too much
-foreshortened, is not used: of the rest the largest rectangle is the texture, and where a larger or a cyclic one is asked for
-it is grown from that. The source map leads to the photograph, so any map in register with that is rectified alike.
+The plane is flattened at one resolution. Parts that would be blurred, because they are too far away or too much
+foreshortened, are not used. The largest rectangle of the rest is the texture. A larger or tileable one is grown from
+it. The source map refers to the photograph, so any map in register with it is rectified in the same way.
 """
 
 from __future__ import annotations
@@ -31,19 +31,20 @@ from texrs.tiling import tile
 __all__ = ["rectify"]
 
 SHARP = 0.5
-"""Pixels of the photograph for each of the texture, along the direction that has fewest, from which on it is sharp enough."""
+"""Minimum number of photograph pixels in each texture pixel for a sharp result, along the direction with the fewest.
+"""
 SMALLEST = 32
-"""Pixels across the smallest flat texture."""
+"""Minimum side of the flat texture, in pixels."""
 LEAST = 0.05
-"""Nearer to the horizon than this share of the middle's scale nothing is used."""
+"""Minimum scale that is used, as a share of the scale in the middle. Smaller scales are near the horizon."""
 LARGER = 8
-"""The flattened plane has at most so many times the pixels of the photograph."""
+"""Maximum pixels of the flattened plane, as a multiple of the photograph's."""
 SHOWN = 640
-"""The plane is first flattened with at most so many pixels a side."""
+"""Maximum pixels a side of the first flattening."""
 CELLS = 160
-"""The largest rectangle is looked for on a lattice of so many cells a side."""
+"""Cells a side of the lattice that is searched for the largest rectangle."""
 COURSES = 0.35
-"""How much edges must agree in two directions at right angles for the texture to be turned until these are level."""
+"""Minimum agreement of edges in two perpendicular directions for the texture to be rotated until they are level."""
 
 
 @takes_materials("image")
@@ -58,46 +59,46 @@ def rectify(
     interpolation: Interpolation = "cubic",
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Make the flat texture of a plane that was photographed aslant.
+    """Make a flat texture from a photograph of an oblique plane.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
         The photograph, any real dtype, each side at least 64.
     view : PlaneView or Plane, optional
-        How the photograph shows the plane, as far as that is to be said; what is not is found.
+        Position of the plane in the photograph, as far as it is known. The rest is found.
     resolution : float, optional
-        Pixels of the texture for one of the photograph's middle, 0.05 to 8. By default as large as things are seen in the mean
-        of it.
+        Pixels of the texture for one pixel in the middle of the photograph, 0.05 to 8. By default the mean scale of
+        the photograph.
     size : int or (rows, columns), optional
-        Of the texture, in pixels. By default all that is sharp, as a rectangle. What is larger is grown by example, what is
-        smaller is its middle.
+        Size of the texture, in pixels. By default the largest sharp rectangle. A larger size is grown by example, and
+        a smaller one is its middle.
     wrap : bool or (rows, columns), optional
-        Axes along which the texture is to be cyclic (`texrs.tile`); None: neither.
+        Axes along which the texture will be tileable (`texrs.tile`). Default: none.
     seed : int
-        Chooses what is grown.
+        Seed of the growth.
     interpolation : {"cubic", "linear", "nearest"}
-        Between pixels of the photograph.
+        Interpolation between pixels of the photograph.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
+        the work. True shows a bar.
 
     Returns
     -------
     Synthesis
-        The texture, in the dtype and with the channels of the photograph; its source map leads to the photograph, with the
-        frames of the plane, by which normals turn. The stages are ``"flat"``, all of the plane that is seen,
-        ``"sharp"``, what of that is used, and ``"before_blending"``. The report has the plane.
+        The texture, in the dtype and with the channels of the photograph. Its source map refers to the photograph,
+        with the frames of the plane, which also rotate normals. The stages are ``"flat"`` (the visible part of the
+        plane), ``"sharp"`` (the part that is used), and ``"before_blending"``. The report contains the plane.
 
     Raises
     ------
     InvalidInput
-        Options out of their ranges, two ways to say how the plane lies, or a plane of which too little is sharp.
+        If options are out of their ranges, the plane is described twice, or too little of it is sharp.
 
     Warns
     -----
     UserWarning
-        A plane that was found with a confidence below 0.4: give corners, or angles.
+        If the plane is found with a confidence below 0.4: give corners or angles.
 
     Examples
     --------
@@ -135,7 +136,7 @@ def rectify(
     known, _ = lay(plane, start, sides, fine)
     texture = known.render(pixels, interpolation=interpolation, antialias=True)
     laid, grown = grow(texture, asked, cyclic, number, watch)
-    # Seams of a texture that is grown are made to disappear as those of any other.
+    # Seams of a grown texture are corrected like those of any other.
     rest = {} if laid.finish is None else {"screening": laid.finish.screening, "across": laid.finish.across}
     source = laid.compose(known).with_finish(cyclic, interpolation=interpolation, antialias=True, **rest)
     as_it_is = source.shape == known.shape and not any(cyclic)
@@ -162,7 +163,7 @@ def rectify(
 
 
 def list_points(ground: Bools) -> NDArray[np.intp]:
-    """Return the outermost pixels of a picture that are ground, and every few of the others: enough to measure a plane by."""
+    """Return the outermost ground pixels of an image and a sample of the others: enough to measure a plane."""
     step = max(1, min(ground.shape) // 256)
     thin = np.zeros_like(ground)
     thin[::step, ::step] = thin[[0, -1]] = thin[:, [0, -1]] = True
@@ -170,7 +171,7 @@ def list_points(ground: Bools) -> NDArray[np.intp]:
 
 
 def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float:
-    """Return the resolution that is asked for, or that of the photograph in the mean of what is seen of the plane."""
+    """Return the requested resolution, or the mean resolution of the visible plane."""
     width = plane.width(list_points(ground))
     if np.count_nonzero(width > LEAST) < SMALLEST:
         raise InvalidInput(
@@ -184,12 +185,12 @@ def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float
             return resolution
         if asked is not None:
             raise InvalidInput(f"resolution: at most {most:.3g} for this plane, got {resolution:.3g}")
-        # Where it is coarser, more of the plane is sharp, up to its horizon.
+        # A coarser resolution makes more of the plane sharp, up to its horizon.
         resolution = 0.9 * most
 
 
 def measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the least and the largest (row, column) of what may be sharp of a plane."""
+    """Return the minimum and maximum (row, column) of the part of a plane that may be sharp."""
     grid = list_points(ground)
     near = grid[plane.width(grid) > max(LEAST, SHARP * resolution)]
     if len(near) < SMALLEST:
@@ -200,37 +201,37 @@ def measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDAr
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """All of a plane that may be sharp, flattened at every so many pixels of a texture."""
+    """The part of a plane that may be sharp, flattened at a distance of several texture pixels."""
 
     source: SourceMap
     sharp: Bools
     low: NDArray[np.float64]
-    """Point of the plane that the first pixel shows."""
+    """Point of the plane at the first pixel."""
     step: int
     resolution: float
-    """Of the texture."""
+    """Resolution of the texture."""
 
     @classmethod
     def of(cls, plane: Plane, ground: Bools, resolution: float) -> Sheet:
-        """Flatten a plane, and find where it is seen sharp enough for a resolution."""
+        """Flatten a plane, and find where it is sharp enough for a resolution."""
         from scipy.ndimage import minimum_filter
 
         low, high = measure_extent(plane, ground, resolution)
         sides = (high - low) * resolution
         step = max(1, ceil(float(sides.max()) / SHOWN))
         source, inside = lay(plane, low, (int(sides[0] / step) + 1, int(sides[1] / step) + 1), resolution / step)
-        # What lies between the samples must be ground too.
+        # The pixels between the samples must be ground too.
         solid = ground if step == 1 or ground.all() else minimum_filter(ground, 2 * step + 1)
         nearest = np.rint(source.coordinates).astype(np.intp)
         inside &= solid[nearest[..., 0], nearest[..., 1]]
-        # The least singular value: how few pixels of the photograph a pixel sees.
+        # The smallest singular value: the minimum number of photograph pixels that a pixel covers.
         frames = source.jacobians()
         squares, area = np.square(frames).sum(axis=(-2, -1)), cross(frames[..., 0, :], frames[..., 1, :])
         fewest = np.sqrt(np.maximum(squares - np.sqrt(np.maximum(squares**2 - 4 * area**2, 0)), 0) / 2)
         return cls(source, np.asarray(inside & (fewest >= SHARP * step)), low, step, resolution)
 
     def find_rectangle(self) -> tuple[NDArray[np.float64], tuple[int, int]]:
-        """Return the first point of about the largest rectangle that is sharp, and its sides in pixels of the texture."""
+        """Return the first point of approximately the largest sharp rectangle, and its sides in texture pixels."""
         top, bottom, left, right = find_rectangle(self.sharp)
         start = self.low + np.array([top, left]) * (self.step / self.resolution)
         rows, columns = (max(0, (n - 1) * self.step + 1) for n in (bottom - top, right - left))
@@ -243,7 +244,7 @@ def cross(one: Array, other: Array) -> Array:
 
 
 def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resolution: float) -> tuple[SourceMap, Bools]:
-    """Return the map of a rectangle of a plane from a point on, and where it lies within the photograph."""
+    """Return the map of a rectangle of a plane, and its position within the photograph."""
     most = np.array(plane.shape) - 1
     flat = low + np.moveaxis(np.indices(sides), 0, -1) / resolution
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -254,7 +255,7 @@ def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resoluti
 
 
 def level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
-    """Turn a plane so that courses, where its flat texture has any, lie along an axis."""
+    """Rotate a plane so that courses of its flat texture, if there are any, are along an axis."""
     from scipy.ndimage import binary_erosion, gaussian_filter
 
     light = guidance(flat).mean(axis=-1, dtype=np.float64)
@@ -271,7 +272,7 @@ def level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
 
 
 def find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
-    """Return where about the largest rectangle of a mask begins and ends, in rows and columns: of cells that are full."""
+    """Return the rows and columns of approximately the largest rectangle of full cells in a mask."""
     step = max(1, -(-max(mask.shape) // CELLS))
     rows, columns = (n // step for n in mask.shape)
     cells = np.asarray(mask[: rows * step, : columns * step].reshape(rows, step, columns, step).all(axis=(1, 3)))
@@ -279,7 +280,7 @@ def find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
     best = (0, 0, 0, 0, 0)
     for row in range(rows):
         heights[:-1] = np.where(cells[row], heights[:-1] + 1, 0)
-        # Columns whose heights grow: of each the rectangle as far as it is the lowest.
+        # Keep columns of growing heights: each gives a rectangle as far as it is the lowest.
         open_: list[tuple[int, int]] = []
         for column, height in enumerate(heights.tolist()):
             start = column
@@ -299,7 +300,7 @@ def cut(source: SourceMap, box: tuple[slice, slice]) -> SourceMap:
 def grow(
     flat: Array, size: tuple[int, ...] | None, wrap: tuple[bool, ...], seed: int, watch: Progress
 ) -> tuple[SourceMap, str]:
-    """Return the map of a texture of any size, cyclic or not, into a flat one, and by what it was made."""
+    """Return the map of a texture of any size, tileable or not, into a flat one, and the method."""
     shape = (flat.shape[0], flat.shape[1])
     if any(wrap):
         made = tile(flat, wrap=wrap, size=size, progress=watch)

@@ -1,8 +1,8 @@
-"""Something taken out of a photograph: what is behind it is filled in, in the perspective of the plane that is seen there.
+"""Removal of an object from a photograph: the background is filled in, in the perspective of the plane behind it.
 
-Completion with everything on (`texrs.inpaint`): the plane is found in what is known of the ground, patches are copied from
-the ground alone, each as large as things are there, and colours follow the light. What lies beyond the ground, as the sky
-above a floor, is filled from what is not ground; so is each of several planes from its own.
+This is `texrs.inpaint` with all options. The plane is found in the known ground. Patches are copied from the ground
+only, at the scale of their position, and colours follow the light. Areas off the ground, such as the sky above a
+floor, are filled from such areas. Each of several planes is filled from its own pixels.
 """
 
 from __future__ import annotations
@@ -28,11 +28,13 @@ from texrs.synthesis import Synthesis
 __all__ = ["remove"]
 
 MARGIN = 1 / 150
-"""By how much a mask is widened, of the shorter side: outlines are drawn too close, and things have soft edges."""
+"""Growth of a mask, as a share of the shorter side, because outlines are drawn too tightly and objects have soft
+edges.
+"""
 RIM = 1 / 40
-"""How far around it seams may run, of the shorter side."""
+"""Width of the band around the mask that seams may use, as a share of the shorter side."""
 THINGS = 1 / 12
-"""The same where things lie apart: those that the mask cuts through go as a whole."""
+"""The same for separate elements: those that the mask cuts are removed as a whole."""
 
 
 @takes_materials("image")
@@ -49,7 +51,7 @@ def remove(
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Take something out of a photograph.
+    """Remove an object from a photograph.
 
     Parameters
     ----------
@@ -59,46 +61,47 @@ def remove(
         Mask of the object to remove and of its shadow, white where it marks. See `texrs.Mask` for how a mask is read,
         inverted, grown and feathered.
     view : PlaneView or Plane, or a sequence of them, optional
-        How the photograph shows the plane that it stands on, as far as that is to be said; what is not is found. Where that
-        is not sure, or the plane is seen from the front, things are filled in as large as they are seen anywhere. Of several
-        planes, as a floor and a wall, each is filled in by itself; all but one need a ground.
+        Position of the plane behind the object in the photograph, as far as it is known. The rest is found. If the
+        result is uncertain, or the plane is seen from the front, the filling has the size of elements anywhere in the
+        image. Several planes, such as a floor and a wall, are filled separately. Only one of them may lack a ground.
     margin : int, optional
-        Pixels by which the mask is widened, 0 to 64; by default 1/150 of the shorter side.
+        Growth of the mask in pixels, 0 to 64. Default: 1/150 of the shorter side.
     boundary_width : int, optional
-        Pixels around that which may change too, 0 to 64, so that seams run where they show least, between things; by default
-        1/40 of the shorter side, of planes whose things lie apart 1/12. Only what seams run around changes.
+        Width in pixels of the band around the mask that may also change, 0 to 64, so that seams run where they are
+        least visible. Default: 1/40 of the shorter side, or 1/12 for planes with separate elements. Only pixels that a
+        seam encloses change.
     patch_size : int, optional
         Side of the patches in pixels, as in `texrs.inpaint`.
     screening : float, optional
-        Weight of the values when the colours of what is filled in are corrected, as in `texrs.inpaint`; None or 0: no
+        Weight of the values in the colour correction of the filled pixels, as in `texrs.inpaint`. None or 0: no
         correction.
     match_lighting : bool
-        Whether slow changes of light, as towards a window, are followed: they are divided out of what is copied, and those of
-        where it goes multiplied on.
+        If True, slow changes of light are followed, such as towards a window. The light of the source is divided out,
+        and the light of the target is multiplied in.
     seed : int
-        Chooses among what fits.
+        Seed that chooses among the possible results.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
+        the work. True shows a bar.
 
     Returns
     -------
     Synthesis
-        The photograph without it, in its dtype and with its channels; nothing changes but what is marked, its margin and
-        boundary. Its source map leads to the photograph. The stages are ``"known"``, ``"ground"``, each plane in a shade of
-        its own, ``"patches"`` and ``"before_blending"``. The report contains the planes that were followed, and ``"filled"``,
-        the share of the image that is filled, 0 to 1, margin included.
+        The photograph without the object, in its dtype and with its channels. Only the mask, its margin and its
+        boundary change. The source map refers to the photograph. The stages are ``"known"``, ``"ground"`` (each plane
+        in its own shade), ``"patches"`` and ``"before_blending"``. The report contains the planes that were followed,
+        and ``"filled"``, the filled share of the image with the margin, 0 to 1.
 
     Raises
     ------
     InvalidInput
-        Options out of their ranges, a mask or ground of another shape, nothing marked, nothing left, or two ways to say how the
-        plane lies.
+        If options are out of their ranges, or a mask or ground has another shape. Also if nothing is marked, no source
+        remains, or the plane is described twice.
 
     Warns
     -----
     UserWarning
-        A plane that was found with a confidence below 0.4, and is not followed: give corners, or angles.
+        If a plane is found with a confidence below 0.4. It is not followed: give corners or angles.
 
     Examples
     --------

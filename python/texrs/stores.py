@@ -1,22 +1,23 @@
-"""Past one process: results of any number in a store, made by any workers, each once.
+"""Work beyond one process: many results in a store, computed by any workers, each once.
 
-Needs the extra: ``pip install texrs[dask]``. The scheduler is the caller's: this process, some of this machine, or a cluster of
-Dask. What travels to workers is small: an exemplar's pixels, options and the digest of both; what is known of the
-exemplar is worked out there, once a worker. A worker has one pool of threads. A texture says beforehand what memory a worker
-takes (`texrs.SolidTexture.estimate_memory`).
+Needs the extra: ``pip install texrs[dask]``. The caller chooses the scheduler: this process, several processes of this
+machine, or a cluster of Dask. Only the exemplar's pixels, the options and their digest travel to workers. Each worker
+analyses the exemplar once, and has one pool of threads. `texrs.SolidTexture.estimate_memory` gives the memory of a
+worker in advance.
 
 Notes
 -----
-What a volume costs, by ``benches/stores_table.py`` (``volume``, ``model``), on particles of 48^3 in chunks of 128^3: it is put
-together from boxes, here of 39^3, of about 0.06 processor seconds each, and a worker makes those twice that lie along the
-sides of what it makes. So the cost is how many boxes there are: for 1024^3 and ``cache_bytes=512 << 20`` 1.35 times as many
-as fill it by 1, 2 or 8 workers (1.49 times with half the cache), and 1.83 times by 64, which have 8 chunks each; for 512^3
-1.35, 1.49, 1.83 and 3.13 times. 1024^3 was made by two workers of 0.77 GiB at most (1.06 are stated beforehand), with chunks
-row by row, in 3331 processor seconds for 58 thousand boxes; along the curve that they follow now there are 49 thousand.
-An estimate, which nobody has measured: 64 workers make 1024^3 in 3900 processor seconds, a minute each, at three quarters of
-the efficiency of one. It supposes that cores of a cluster are as fast and have the memory to themselves, that a shared disk
-takes 3 GB in that minute, and that the scheduler hands out 512 tasks of 8 seconds without delay. What limits it are the boxes
-that are made twice; 4096^3, of which 64 workers have 512 chunks each, takes 1.35 times as many as fill it again.
+Cost of a volume, by ``benches/stores_table.py`` (``volume``, ``model``), on particles of 48^3 in chunks of 128^3. A
+volume is assembled from boxes, here of 39^3, of about 0.06 processor seconds each. Each worker computes the boxes at
+the borders of its part again, so the cost is the number of boxes. With ``cache_bytes=512 << 20``, 1 to 8 workers
+compute 1.35 times the boxes that fill 1024^3 (1.49 times with half the cache), and 64 workers of 8 chunks each 1.83
+times. 512^3 takes 1.35, 1.49, 1.83 and 3.13 times. Two workers of at most 0.77 GiB (1.06 in the estimate) computed
+1024^3 in 3331 processor seconds for 58 thousand boxes, row by row. The present order of chunks along a curve needs 49
+thousand boxes. An estimate that was not measured: 64 workers compute 1024^3 in 3900 processor seconds, a minute each,
+at three quarters of the efficiency of one. It assumes cores of the same speed with their own memory, and a shared disk
+that takes 3 GB in that minute. It also assumes a scheduler that starts 512 tasks of 8 seconds without delay. The limit
+is the number of boxes computed twice. With 512 chunks for each of 64 workers, 4096^3 takes 1.35 times the boxes that
+fill it.
 
 See Also
 --------
@@ -59,27 +60,28 @@ def map_to_zarr(
     overwrite: bool = False,
     progress: Progress | bool | None = None,
 ) -> Stored:
-    """Compute a function for each item, such as a variant for each seed, and stream the results to a Zarr store.
+    """Compute a function for each item, and stream the results to a Zarr store.
 
-    A result is there whole or not at all, and each is computed once: what a run that was stopped has left, whatever stopped it,
-    is gone on with when the same call is made again.
+    An item may be a seed of a variant, for example. A result is stored completely or not at all, and each is computed
+    once. The same call continues a run that was stopped for any reason.
 
     Parameters
     ----------
     function : callable
-        Such as ``functools.partial(texrs.design, image, 256)``. It returns a `texrs.Synthesis` (whose image is kept, and of a
-        material all maps), an array, or a mapping of arrays by name; those of all items have one shape.
+        A function such as ``functools.partial(texrs.design, image, 256)``. It returns a `texrs.Synthesis` (its image
+        is stored, or all maps of a material), an array, or a mapping of arrays by name. The arrays of all items have
+        one shape.
     items : sequence
-        What it is called with: a tuple is its arguments, a mapping its named ones, anything else its only one.
+        Arguments of each call: a tuple of arguments, a mapping of named ones, or a single argument.
     path : path_like
-        A folder, which workers see too. Each map is an array of it, whose leading axes are the items.
+        A folder that the workers can also access. Each map is an array in it, whose leading axes are the items.
     shape : int or sequence of int, optional
-        How the items lie: (20, 20) for a matrix of sources and targets, row by row; by default in one row.
+        Arrangement of the items: (20, 20) for a matrix of sources and targets, row by row. By default one row.
     key : str, optional
-        Says what is computed; by default a digest of the function and the items. A store of another is refused.
+        Identifier of the computation. By default a digest of the function and the items. A store with another key is
+        refused.
     scheduler : None, int, str or distributed.Client
-        Who computes.
-        {scheduler}
+        Scheduler of the work. {scheduler}
     threads : int, optional
         {threads}
     overwrite : bool
@@ -90,18 +92,18 @@ def map_to_zarr(
     Returns
     -------
     Stored
-        How many items there are, and how many were computed now.
+        Number of items, and number of items computed in this call.
 
     Raises
     ------
     Failed
-        Some items failed; the others are there.
+        If some items failed. The others are stored.
     WorkerLost
-        An item ended three workers.
+        If an item ended three workers.
     InvalidInput
-        Nothing to compute, another number than ``shape`` has, or no such scheduler.
+        If there is nothing to compute, ``shape`` has another number of items, or the scheduler does not exist.
     FileError
-        The store holds something else, or cannot be written.
+        If the store contains other results, or cannot be written.
 
     Examples
     --------
@@ -130,16 +132,16 @@ def map_to_zarr(
 
 
 def open_store(path: Path, name: str | None = None, *, level: int = 0) -> Any:
-    """Open what is stored as an array of Dask, with channels last.
+    """Open a stored result as an array of Dask, with channels last.
 
     Parameters
     ----------
     path : path_like
         A store that `map_to_zarr` or ``to_zarr`` wrote, or any OME-Zarr image.
     name : str, optional
-        The map, where there are several.
+        Name of the map, if there are several.
     level : int
-        Of an image, 0 the finest.
+        Level of an image. 0 is the finest.
 
     Returns
     -------
@@ -148,9 +150,9 @@ def open_store(path: Path, name: str | None = None, *, level: int = 0) -> Any:
     Raises
     ------
     FileError
-        There is no such store or map.
+        If the store or the map does not exist.
     InvalidInput
-        Several maps and no name, or there is no Dask.
+        If there are several maps and no name, or Dask is not installed.
 
     Examples
     --------
@@ -175,7 +177,7 @@ def open_store(path: Path, name: str | None = None, *, level: int = 0) -> Any:
 
 
 def _find_array(group: Any, array: Any, where: str, name: str | None, level: int) -> Any:
-    """Return the array of a map, of one level."""
+    """Return the array of one level of a map."""
     names = [*group.group_keys(), *group.array_keys()]
     if "ome" not in group.attrs and "multiscales" not in group.attrs:
         if name is None and len(names) != 1:

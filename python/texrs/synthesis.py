@@ -1,4 +1,4 @@
-"""What a verb returns: the picture, its source map, the stages and a report."""
+"""Result of a verb: the image, its source map, the stages and a report."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class Synthesis:
     image : (rows, columns[, C]) or (planes, rows, columns[, C]) array
         The result, in the dtype and with the channels of the exemplar.
     source_map : SourceMap
-        Where each pixel comes from; ``source_map.render(exemplar)`` is ``stages["before_blending"]``, exactly.
+        Source of each pixel. ``source_map.render(exemplar)`` equals ``stages["before_blending"]`` exactly.
     stages : mapping of str to array
-        Pictures of the stages, in the order in which they were made. ``"before_blending"`` is the result before any colour
+        Images of the stages, in the order of the work. ``"before_blending"`` is the result before any colour
         correction.
     report : mapping of str to object
-        What was decided and measured: JSON types only.
+        Decisions and measurements, as JSON types only.
     material : Material, optional
-        All maps of the result, where the exemplar was a `texrs.Material`; ``image`` is the one that shows it then.
+        All maps of the result, if the exemplar was a `texrs.Material`. ``image`` is then the map that represents it.
 
     Examples
     --------
@@ -65,17 +65,17 @@ class Synthesis:
         Parameters
         ----------
         folder : path_like
-            Made where it is missing; files of these names are replaced.
+            Folder, created if needed. Files with these names are replaced.
 
         Returns
         -------
         list of pathlib.Path
-            The files, in the order of the stages. Of a volume three slices through its middle are shown.
+            The files, in the order of the stages. Volumes are shown by three slices through their middle.
 
         Raises
         ------
         FileError
-            A file cannot be written.
+            If a file cannot be written.
 
         Examples
         --------
@@ -86,7 +86,7 @@ class Synthesis:
         >>> result = Synthesis(picture, SourceMap.identity((4, 4)), {"before_blending": picture})
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in result.save_stages(folder)]
-        ['01-composite.png', 'report.json']
+        ['01-before-blending.png', 'report.json']
 
         """
         from texrs.io import atomic, write
@@ -104,17 +104,17 @@ class Synthesis:
         return paths
 
     def _repr_png_(self) -> bytes:
-        """Show the image, or slices of a volume, in a notebook."""
+        """Return the PNG that a notebook shows: the image, or slices of a volume."""
         return as_png(self._flatten(self.image))
 
     def _repr_html_(self) -> str | None:
-        """Show a volume in a notebook by slices with sliders; of a picture nothing, so that it is shown as one."""
+        """Return a volume as slices with sliders for a notebook. Images return None and are shown as images."""
         if self.source_map.axes == 2:
             return None
         return as_page(as_image(self.image, "image", axes=3))
 
     def _flatten(self, stage: Array) -> Array:
-        """Return slices of what is as large as a volume; anything else is a picture already."""
+        """Return slices of a volume. Images are returned unchanged."""
         if self.source_map.axes == 2 or stage.shape[:3] != self.source_map.shape:
             return stage
         from texrs.volume import slices
@@ -123,17 +123,17 @@ class Synthesis:
 
 
 class ResultList(list[Any]):
-    """A list of results that shows itself side by side in a notebook.
+    """A list of results that is shown side by side in a notebook.
 
     Parameters
     ----------
     iterable : iterable of Synthesis, Exemplar, ElementAnalysis, SourceMap, Field or array
-        What shows itself, or pictures (H, W[, C]).
+        Objects with an image, or images (H, W[, C]).
 
     Raises
     ------
     InvalidInput
-        When it is shown: something that has no picture.
+        If an object without an image is shown.
 
     Examples
     --------
@@ -149,7 +149,7 @@ class ResultList(list[Any]):
         return f"ResultList({spell_list(self)})"
 
     def _repr_html_(self) -> str:
-        """Show all that there is, side by side."""
+        """Return all results side by side."""
         return "".join(f'<img src="data:image/png;base64,{b64encode(_draw(each)).decode()}">\n' for each in self)
 
 
