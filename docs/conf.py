@@ -23,6 +23,7 @@ exclude_patterns = [
     "generated/drawings/*.md",
     "generated/strips/*.md",
     "generated/install.md",
+    "generated/parameters/*.md",
     "generated/extra",
     "gallery/README.rst",
     "generated/gallery/*.ipynb",
@@ -53,6 +54,8 @@ html_sidebars = {name: [] for name in (*ALONE, *(f"generated/{name}" for name in
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,
+    # The reference has a page for each function.
+    "collapse_navigation": True,
     "header_links_before_dropdown": 5,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],

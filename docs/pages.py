@@ -1,13 +1,13 @@
-"""Pages that are made from the code: the API by its docstrings, the commands by their parsers, the words of ARCHITECTURE.md."""
+"""Pages that are made from the code: the commands by their parsers, the words of ARCHITECTURE.md."""
 
 from __future__ import annotations
 
-import inspect
 import re
 import shutil
 from pathlib import Path
-from types import ModuleType
 from typing import Any
+
+from api import write_api, write_tables
 
 import texrs
 
@@ -17,73 +17,17 @@ NOTICE = "% Made by docs/pages.py.\n\n"
 def write_pages(docs: Path) -> None:
     """Write all such pages anew, to the folder ``generated``."""
     out = docs / "generated"
-    for each in ("api", "commands.md", "performance.md", "words.md"):
+    for each in ("api", "parameters", "commands.md", "performance.md", "words.md"):
         if (out / each).is_dir():
             shutil.rmtree(out / each)
     (out / "api").mkdir(parents=True, exist_ok=True)
     write_api(out / "api")
+    write_tables(out / "parameters")
     (out / "commands.md").write_text(list_commands(), encoding="utf-8")
     (out / "performance.md").write_text(list_benches(docs.parent / "benches"), encoding="utf-8")
     (out / "install.md").write_text(tabulate_installs(docs / "install.json"), encoding="utf-8")
     write_comparison(out)
     (out / "words.md").write_text(list_words(docs.parent / "ARCHITECTURE.md"), encoding="utf-8")
-
-
-# --- API -------------------------------------------------------------------------------------------------------------
-
-
-def list_modules() -> list[ModuleType]:
-    """Return the public modules, by name."""
-    found, left = [], [texrs]
-    while left:
-        module = left.pop()
-        found.append(module)
-        left += [m for n in module.__all__ if isinstance(m := getattr(module, n), ModuleType)]
-    return sorted(found, key=lambda m: m.__name__)
-
-
-def write_api(folder: Path) -> None:
-    """Write a page a module, with all that is public in it, and a page that lists them."""
-    names = []
-    for module in list_modules():
-        name = module.__name__
-        names.append(name)
-        lines = [name, "=" * len(name), "", f".. automodule:: {name}", "   :no-members:", ""]
-        entries = [(n, getattr(module, n)) for n in module.__all__ if not n.startswith("_")]
-        if module is not texrs:
-            # What is also a name of texrs itself is described there.
-            above = [n for n, value in entries if getattr(texrs, n, None) is value]
-            entries = [(n, value) for n, value in entries if n not in above]
-            lines += [f"Also `texrs.{n}`." for n in above] + [""]
-        for kind, wanted in (("autofunction", inspect.isroutine), ("autoclass", inspect.isclass)):
-            some = [n for n, value in entries if wanted(value)]
-            if not some:
-                continue
-            title = "Functions" if kind == "autofunction" else "Classes"
-            if module is texrs and kind == "autoclass":
-                # Both together are a page of more than a megabyte.
-                (folder / f"{name}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
-                title = f"{name}: classes"
-                lines = [title, "=" * len(title), ""]
-                names.append(f"{name}.classes")
-            else:
-                lines += [title, "-" * len(title), ""]
-            for n in some:
-                lines += [f".. {kind}:: {name}.{n}"]
-                if kind == "autoclass":
-                    lines += ["   :members:"]
-                lines += [""]
-        (folder / f"{names[-1]}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    listed = [f"- [{m.__name__}]({m.__name__}.rst): {_first_line(m)}" for m in list_modules()]
-    listed.insert(1, "- [texrs: classes](texrs.classes.rst)")
-    text = f"{NOTICE}# API reference\n\nAll that is public, by module.\n\n" + "\n".join(listed)
-    text += '\n\nThe kernels in Rust have <a href="../../rust/texrs/index.html">a reference of their own</a>.'
-    text += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(names) + "\n```\n"
-    (folder / "index.md").write_text(text, encoding="utf-8")
-
-
-def _first_line(module: ModuleType) -> str:
-    return (module.__doc__ or "").strip().splitlines()[0]
 
 
 # --- commands --------------------------------------------------------------------------------------------------------

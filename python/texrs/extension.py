@@ -83,6 +83,26 @@ def extend(
         except within ``boundary_width``. Its source map refers to the photograph. The report contains the planes and
         the added pixels.
 
+        Stages:
+
+        - ``known``: The image with the marked part in one colour.
+        - ``ground``: Each plane in a shade of its own.
+        - ``patches``: Each patch in a shade of its own.
+        - ``composite``: The result before colours are corrected.
+
+        Report:
+
+        - ``added``: Pixels at the ``top``, ``bottom``, ``left`` and ``right``.
+        - ``patches``: For each plane, the number of patches.
+        - ``replaced_outside``: Number of known pixels that changed.
+        - ``boundary_width``: Width of the band that could change, in pixels.
+        - ``screening``: Weight of the values in the colour correction.
+        - ``light``: Whether slow changes of light were followed.
+        - ``seed``: The seed.
+        - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in the
+          image.
+        - ``ground``: For each plane, the share of the image where it is visible.
+
     Raises
     ------
     InvalidInput

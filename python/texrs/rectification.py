@@ -90,6 +90,24 @@ def rectify(
         with the frames of the plane, which also rotate normals. The stages are ``"flat"`` (the visible part of the
         plane), ``"sharp"`` (the part that is used), and ``"before_blending"``. The report contains the plane.
 
+        Stages:
+
+        - ``flat``: All of the plane that is visible, flattened.
+        - ``sharp``: The part of it that is sharp enough.
+        - ``composite``: The result before seams are corrected.
+
+        Report:
+
+        - ``plane``: ``slant``, ``tilt``, ``fov`` and ``turn`` in degrees, the ``shape`` of the image and the ``confidence``.
+        - ``found``: Whether the plane was found in the image.
+        - ``resolution``: Pixels of the texture for one pixel in the middle of the photograph.
+        - ``sharp``: Share of the flattened plane that is sharp enough.
+        - ``rectangle``: (rows, columns) of the largest sharp rectangle.
+        - ``grown``: How the rest was made, in words.
+        - ``wrap``: Whether the result repeats along (rows, columns).
+        - ``seed``: The seed.
+        - ``interpolation``: Interpolation between pixels of the photograph.
+
     Raises
     ------
     InvalidInput

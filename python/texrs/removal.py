@@ -92,6 +92,28 @@ def remove(
         in its own shade), ``"patches"`` and ``"before_blending"``. The report contains the planes that were followed,
         and ``"filled"``, the filled share of the image with the margin, 0 to 1.
 
+        Stages:
+
+        - ``known``: The image with the marked part in one colour.
+        - ``ground``: Each plane in a shade of its own.
+        - ``patches``: Each patch in a shade of its own.
+        - ``composite``: The result before colours are corrected.
+
+        Report:
+
+        - ``filled``: Share of the image that was filled, 0 to 1.
+        - ``patches``: For each plane, the number of patches.
+        - ``replaced_outside``: Number of known pixels that changed.
+        - ``boundary_width``: Width of the band that could change, in pixels.
+        - ``screening``: Weight of the values in the colour correction.
+        - ``light``: Whether slow changes of light were followed.
+        - ``seed``: The seed.
+        - ``margin``: Pixels that were added around the mask.
+        - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in the
+          image.
+        - ``ground``: For each plane, the share of the image where it is visible.
+        - ``beyond``: Share of the image that was filled without a plane.
+
     Raises
     ------
     InvalidInput

@@ -247,6 +247,16 @@ class CornerTiles(InParts):
         Synthesis
             The image, of a material all maps, and the source map, whose labels are those of the atlas.
 
+            Stages:
+
+            - ``composite``: The window.
+
+            Report:
+
+            - ``side``: Side of a tile, in pixels.
+            - ``seed``: The seed.
+            - ``origin``: (row, column) of the first pixel.
+
         Raises
         ------
         InvalidInput

@@ -131,6 +131,27 @@ def tile(
         ``tiling`` is what `texrs.check_tiling` finds in the result with its source map. If a border or a seam is visible,
         other joints are tried. ``warnings`` lists those that stay visible.
 
+        Stages:
+
+        - ``swapped``: The image with its halves exchanged, not cut yet.
+        - ``pieces``: The part of the image that each pixel is from.
+        - ``composite``: The result before colours are corrected.
+
+        Report:
+
+        - ``method``: "tile", or "quilt" if the result is larger than the image.
+        - ``size``: (rows, columns).
+        - ``wrap``: Whether the result repeats along (rows, columns).
+        - ``screening``: Weight of the values in the colour correction.
+        - ``flatten``: Whether uneven light was evened out.
+        - ``already``: Axes along which the image tiles already.
+        - ``resized``: For each axis, the reason for another size.
+        - ``overlap``: For each axis, the overlap in pixels; 0 if the ends are covered.
+        - ``joints``: For each axis: ``overlap``, ``cover``, number of joints that were tried, ``cost`` and cost of a pair of
+          pixels.
+        - ``in_place``: Share of the pixels from the same place of the image.
+        - ``tiling``: What `texrs.check_tiling` finds along each axis that wraps: ``tiles``, ``seam`` and ``place``.
+
     Raises
     ------
     InvalidInput

@@ -146,6 +146,41 @@ def design(
         The image in the exemplar's dtype and channels, its source map, pictures of the stages, and the log of
         operations.
 
+        Stages:
+
+        - ``segmentation``: The first example, each element in a colour.
+        - ``deformed``: The moved elements of the first copy.
+        - ``holes``: Pixels of this copy that no element covers.
+        - ``completed``: This copy with filled holes.
+        - ``composite``: The texture before colours are corrected.
+
+        Report:
+
+        - ``method``: "default" or "paper".
+        - ``seed``: The seed.
+        - ``size``: (rows, columns).
+        - ``wrap``: Whether the texture repeats along (rows, columns).
+        - ``elements``: Number of elements that were found in all examples.
+        - ``segmentation``: Kind of elements of the first example: "components", "grid" or "none".
+        - ``reason``: Why this kind was chosen, one sentence.
+        - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses".
+        - ``motion``: For each example: "move" or "keep".
+        - ``tried``: For each example, the figures of either motion, or None if it was given. They are ``score`` (0 is best),
+          ``torn``, ``broken``, ``fog``, ``repetition`` and ``share`` of `texrs.judging.judge`.
+        - ``courses``: For each example, the courses that it was laid in, or None.
+        - ``stretched``: For each example, the (2, 2) matrix that made its lattice fit the size, or None.
+        - ``rotate``: Largest rotation that was used, in degrees.
+        - ``shares``: Number of pixels from each example.
+        - ``density``: For each scattered example, its density as ``asked``, ``reached`` and in the example (``own``), and the
+          number of ``things``; else None.
+        - ``holes``: For each copy, the share of its pixels that were filled.
+        - ``screening``: Weight of the values in the colour correction.
+        - ``seams``: Visibility of the seams ``before`` and ``after`` the correction: number of ``edges``, ``mean`` (1 is that
+          of the example) and share of ``outliers``.
+        - ``operations``: For each copy, the operations on each element. An entry names the ``element``, its ``operations``
+          and its ``place``.
+        - ``tiling``: What `texrs.check_tiling` finds along each axis that wraps: ``tiles``, ``seam`` and ``place``.
+
     Raises
     ------
     InvalidInput
@@ -280,7 +315,7 @@ def design_variants(
     Returns
     -------
     iterator of Synthesis
-        See `design`.
+        Results as of `design`.
 
     Raises
     ------

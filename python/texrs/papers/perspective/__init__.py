@@ -146,6 +146,29 @@ def perspective(
         patches are cut from and ``"target"`` the scale map that was followed; and a report, in which ``"measured"`` tells
         of a ``scale_map`` "auto" what it is of, as `texrs.planes.ScaleEstimate` has it, and how sure that is.
 
+        Stages:
+
+        - ``sheet``: The flattened example that patches are cut from.
+        - ``target``: The scale map that was followed.
+        - ``composite``: The result.
+
+        Report:
+
+        - ``method``: "default" or "paper".
+        - ``seed``: The seed.
+        - ``scale_weight``: Weight of the scale.
+        - ``measured``: What a ``scale_map`` "auto" found, as `texrs.planes.Sizes`; else None.
+        - ``sheet``: ``kind`` and ``resolution`` of the flattened example.
+        - ``surface``: Whether the target is a surface.
+        - ``turned``: Whether a direction was given.
+        - ``outside``: ``share`` of the target beyond the scales of the example, and the largest ``factor``.
+        - ``scale_error``: Mean error of the scale, as a natural logarithm.
+        - ``wrap``: Whether the result repeats along (rows, columns).
+        - ``interpolation``: Interpolation between samples of the example.
+        - ``elements``: Number of elements that were found.
+        - ``stitched``: Number of ``patches``, mean cost of the ``seams`` and number of ``healed`` patches.
+        - ``energies``: For the paper's method, the energy of each round, by level.
+
     Raises
     ------
     InvalidInput

@@ -143,6 +143,32 @@ def solid(
         The volume, in the exemplar's dtype; its source map, whose frames are those of its patches; as stages, pictures of the
         middle plane at each level; and a report.
 
+        Stages:
+
+        - ``patches``: Patches in their first places. For quality "preserve" and "optimise".
+        - ``blocks``: Blocks in their first places. For quality "fast" and the paper.
+        - ``level N``: The middle plane after level N, counted from 1.
+        - ``composite``: The result before known voxels are set.
+
+        Report:
+
+        - ``method``: "default", "paper" or "paper-compensated".
+        - ``quality``: "preserve", "fast" or "optimise"; None for the paper.
+        - ``seed``: The seed.
+        - ``field``: The field in words, or None.
+        - ``repeats``: Axes along which the example repeats.
+        - ``interpolation``: Interpolation between samples of the example.
+        - ``held``: Number of constrained points.
+        - ``guided``: Whether a guide was given.
+        - ``elements``: Number of separate elements that were found, or None.
+        - ``stitched``: Number of ``patches``, whether they were ``bent``, mean cost of the ``seams`` and number of ``healed``
+          patches; None if points were corrected.
+        - ``levels``: For each level: its ``shape``, number of ``passes`` and the share of points that ``changed``.
+        - ``spacing``: (plane, row, column) distances, if they were given.
+        - ``patches``: How patches were chosen; only if they were.
+        - ``tried``: The figures of each way that was tried, or None. They are ``score`` (0 is best), ``torn``, ``broken``,
+          ``fog``, ``repetition`` and ``share`` of `texrs.judging.judge`.
+
     Raises
     ------
     InvalidInput
@@ -259,8 +285,8 @@ def synthesize(
     Returns
     -------
     Synthesis
-        The picture, in the exemplar's dtype; its source map, whose frames are those of its patches; pictures of the
-        stages; and a report.
+        The image, in the exemplar's dtype; its source map, whose frames are those of its patches. The stages and the keys of
+        the report are as in `solid`.
 
     Raises
     ------

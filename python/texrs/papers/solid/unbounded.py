@@ -172,6 +172,19 @@ class Texture(Endless):
             The image, and of a material all maps; its source map, whose labels are the patches of the window, counted within
             it, and whose frames are those of rigid patches, else the field as it lies over the window; and a report.
 
+            Stages:
+
+            - ``composite``: The window.
+
+            Report:
+
+            - ``quality``: "preserve" or "fast".
+            - ``seed``: The seed.
+            - ``origin``: First pixel or voxel of the window.
+            - ``field``: The field in words, or None.
+            - ``repeats``: Axes along which the example repeats.
+            - ``interpolation``: Interpolation between samples of the example.
+
         Raises
         ------
         InvalidInput

@@ -174,6 +174,54 @@ def splice(
         (``report["method"]`` is "cells") the map lies between pixels, and each has its target; by knots ("nets") each has
         that whose knot it hangs on.
 
+        Stages:
+
+        - ``points of a``: Elements of ``a``.
+        - ``points of b``: Elements of ``b``.
+        - ``mask``: Mask of the elements of ``a``.
+        - ``matching``: Line from each element to its target.
+        - ``warped mesh``: Mesh that moves the elements.
+        - ``before refinement``: Elements in their new places.
+        - ``filled``: The result with a filled background.
+        - ``cells of a``: Cells of ``a``, for method "cells".
+        - ``net of a``: Knots and lines of ``a``, for method "nets".
+        - ``layout of b``: Elements of ``b``, for both methods.
+        - ``target cells``: Outlines of the target cells.
+        - ``target net``: Knots and lines of the target.
+        - ``assignment``: Cells in the colour of their source.
+        - ``cuts``: Borders between the pieces.
+        - ``composite``: The result.
+
+        Report:
+
+        - ``method``: "default", "paper", "cells" or "nets".
+        - ``seed``: The seed.
+        - ``size``: (rows, columns).
+        - ``layout``: Kind of the layout of ``a``: "disjoint", "jointed" or "connected".
+        - ``scale``: Factor that the layout of ``b`` was scaled by.
+        - ``angle``: Angle that this layout was turned by, in degrees.
+        - ``gain``: Part of the scale that makes room for the elements of ``a``.
+        - ``targets``: Number of targets.
+        - ``candidates``: Number of elements to choose from, with those beyond the borders.
+        - ``cost``: Mean squared distance from an element to its target, in pixels squared.
+        - ``realised``: Share of their ways that elements were moved, 0 to 1.
+        - ``screening``: Weight of the values in the colour correction.
+        - ``holes``: Share of the pixels that were filled.
+        - ``triangles``: Number of triangles of the mesh.
+        - ``flipped``: Share of triangles that are turned over.
+        - ``flipped_rigid``: Share of triangles inside of elements that are turned over.
+        - ``system``: Size of the grid that the equations were solved on.
+        - ``strength``: The strength, for methods "cells" and "nets".
+        - ``allow_rotation``: Whether cells could turn, for method "cells".
+        - ``continued``: How the layout was continued beyond its image.
+        - ``cells``: For method "cells": ``count``, number of ``usable`` cells, ``size`` in pixels, ``polarity`` and
+          ``confidence``.
+        - ``knots``: For method "nets": ``count``, ``spacing`` in pixels and number of ``lines``.
+        - ``grown``: Share of the pixels that no knot covers, for method "nets".
+        - ``present``: Share of the targets whose element is visible.
+        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), ``realised``, the
+          number of the ``element`` and its ``point`` in ``a``. Cells also have a ``turn`` and a ``scale``.
+
     Raises
     ------
     InvalidInput
@@ -324,6 +372,42 @@ def self_splice(
         The picture; a source map of whole pixels of ``elements``, whose label is the target (counted from 1, as in the report)
         that a rigid pixel belongs to, or 0; pictures of the stages; and a report. Where nothing is moved the picture is the
         texture, exactly; of separate elements, all that does not move is.
+
+        Stages:
+
+        - ``resized``: The texture in the new size, if a size was given.
+        - ``points of a``: Elements of ``a``.
+        - ``mask``: Mask of the elements of ``a``.
+        - ``matching``: Line from each element to its target.
+        - ``warped mesh``: Mesh that moves the elements.
+        - ``before refinement``: Elements in their new places.
+        - ``filled``: The result with a filled background.
+        - ``composite``: The result.
+
+        Report:
+
+        - ``method``: "default" or "paper".
+        - ``seed``: The seed.
+        - ``size``: (rows, columns).
+        - ``layout``: Kind of the layout of ``a``: "disjoint", "jointed" or "connected".
+        - ``scale``: Factor that the layout of ``b`` was scaled by.
+        - ``angle``: Angle that this layout was turned by, in degrees.
+        - ``gain``: Part of the scale that makes room for the elements of ``a``.
+        - ``targets``: Number of targets.
+        - ``candidates``: Number of elements to choose from, with those beyond the borders.
+        - ``cost``: Mean squared distance from an element to its target, in pixels squared.
+        - ``realised``: Share of their ways that elements were moved, 0 to 1.
+        - ``screening``: Weight of the values in the colour correction.
+        - ``holes``: Share of the pixels that were filled.
+        - ``triangles``: Number of triangles of the mesh.
+        - ``flipped``: Share of triangles that are turned over.
+        - ``flipped_rigid``: Share of triangles inside of elements that are turned over.
+        - ``system``: Size of the grid that the equations were solved on.
+        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), ``realised``, the
+          number of the ``element`` and its ``point`` in ``a``. Cells also have a ``turn`` and a ``scale``.
+        - ``changed``: Share of the pixels that changed.
+        - ``edit``: The steps, each with all its options.
+        - ``elements``: Places of the elements before the edit, if a size was given.
 
     Raises
     ------
