@@ -46,7 +46,7 @@ TASKS = (
         ("rectify", "remove", "extend", "perspective", "Plane", "PlaneView"),
         ("planes", "scale_maps"),
     ),
-    Task("Volumes", ("solid",), ("solid",), ("volume",)),
+    Task("Volumes", ("solid", "microstructure"), ("solid",), ("volume",)),
     Task("Fields", ("field",), (), ("fields",)),
     Task("Larger than memory", ("large",), ("SolidTexture", "PlaneTexture", "CornerTiles"), ("stores",)),
     Task("Meshes", ("mesh",), (), ("painting",)),
@@ -128,8 +128,9 @@ def write_api(folder: Path) -> None:
         shown = ", ".join(f"[{n.rpartition('.')[2]}]({n}.rst)" for n in some[:6])
         text += f"- **[{task.title}]({slug}.rst)**: {shown}{' ...' if len(some) > 6 else ''}\n"
     lead = (
-        "Each public function and class has a page. The pages are grouped by task. The kernels in Rust have\n"
-        '<a href="../../rust/texrs/index.html">a reference of their own</a>.'
+        "Each public function and class has a page. The pages are grouped by task. [The result](../results.md) describes\n"
+        "what all verbs return, and [Conventions](../../conventions.md) the order of axes, sizes and types. The kernels in\n"
+        'Rust have <a href="../../rust/texrs/index.html">a reference of their own</a>.'
     )
     toctree = "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(slugs) + "\n```\n"
     (folder / "index.md").write_text(f"{NOTICE}# API reference\n\n{lead}\n\n{text}{toctree}", encoding="utf-8")

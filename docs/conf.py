@@ -48,8 +48,8 @@ html_extra_path = ["generated/extra"]
 html_css_files = ["texrs.css"]
 html_show_sourcelink = False
 # Pages that no section holds.
-ALONE = ("index", "install", "five-minutes", "promises", "coming-from", "genindex", "search")
-MADE = ("words", "comparison", "performance", "commands")
+ALONE = ("index", "install", "five-minutes", "promises", "coming-from", "conventions", "help", "genindex", "search")
+MADE = ("words", "comparison", "performance", "commands", "results", "messages")
 html_sidebars = {name: [] for name in (*ALONE, *(f"generated/{name}" for name in MADE))}
 html_theme_options = {
     "navigation_with_keys": False,

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from api import write_api, write_tables
+from messages import make_messages
+from results import make_results
 
 import texrs
 
@@ -17,12 +19,14 @@ NOTICE = "% Made by docs/pages.py.\n\n"
 def write_pages(docs: Path) -> None:
     """Write all such pages anew, to the folder ``generated``."""
     out = docs / "generated"
-    for each in ("api", "parameters", "commands.md", "performance.md", "words.md"):
+    for each in ("api", "parameters", "results.md", "messages.md", "commands.md", "performance.md", "words.md"):
         if (out / each).is_dir():
             shutil.rmtree(out / each)
     (out / "api").mkdir(parents=True, exist_ok=True)
     write_api(out / "api")
     write_tables(out / "parameters")
+    (out / "results.md").write_text(make_results(), encoding="utf-8")
+    (out / "messages.md").write_text(make_messages(Path(texrs.__file__).parent), encoding="utf-8")
     (out / "commands.md").write_text(list_commands(), encoding="utf-8")
     (out / "performance.md").write_text(list_benches(docs.parent / "benches"), encoding="utf-8")
     (out / "install.md").write_text(tabulate_installs(docs / "install.json"), encoding="utf-8")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 import re
 
-import texrs
 from api import as_markdown, find, read_parameters
+
+import texrs
 
 NOTICE = "% Made by docs/results.py.\n\n"
 VERBS = (
@@ -55,9 +56,9 @@ def make_results() -> str:
     """Return the page."""
     text = f"{NOTICE}# The result\n\n"
     text += (
-        "Every verb returns a {py:obj}`texrs.Synthesis`: the image, the source map, pictures of the stages, and a report of what was\n"
-        "decided and measured. `result.report` contains JSON types only. On the command line, `--stages FOLDER` writes all stages and\n"
-        "the report, and `texrs info FILE` prints how a file was made.\n\n"
+        "Every verb returns a {py:obj}`texrs.Synthesis`: the image, the source map, pictures of the stages, and a report\n"
+        "of decisions and measurements. `result.report` contains JSON types only. On the command line, `--stages FOLDER`\n"
+        "writes all stages and the report, and `texrs info FILE` prints how a file was made.\n\n"
     )
     text += "| attribute | contents |\n|---|---|\n"
     for name, kind, about in read_parameters(texrs.Synthesis):
