@@ -11,9 +11,13 @@ from pathlib import Path
 
 NOTICE = "% Made by docs/messages.py.\n\n"
 ERRORS = {"InvalidInput", "FileError", "LimitExceeded"}
-VERBS = ["add", "ask", "check", "choose", "convert", "copy", "crop", "draw", "enlarge", "give", "increase", "install", "leave", "look", "lower", "make", "mark", "move", "name", "pass", "put", "raise", "read", "reduce", "remove", "rename", "repeat", "run", "save", "say", "see", "set", "start", "state", "take", "tell", "try", "unpack", "use", "wait", "write"]
+VERBS = (
+    "add|ask|check|choose|convert|copy|crop|draw|enlarge|give|increase|install|leave|look|lower|make|"
+    "mark|move|name|pass|put|raise|read|reduce|remove|rename|repeat|run|save|say|see|set|start|state|"
+    "take|tell|try|unpack|use|wait|write"
+)
 """Words that a remedy begins with."""
-REMEDY = re.compile(rf"[;.(] ?(?:or |so |then |please )?((?:{'|'.join(VERBS)})\b.*?)\)?$")
+REMEDY = re.compile(rf"[;.(] ?(?:or |so |then |please )?((?:{VERBS})\b.*?)\)?$")
 VALUE = "…"
 
 
@@ -99,6 +103,33 @@ KINDS = (
         r"is no |holds? no|not (?:an?|the) |cut off|not all of|not packed|not JSON",
         "The file or the value is of another kind.",
         "Give one of the kind in the message.",
+    ),
+    kind(
+        r"twice|differ|contradicts|reach|several results|two (?:maps|frames)|of another length",
+        "Two parts of the input do not agree.",
+        "Make them agree, or leave one out.",
+    ),
+    kind(
+        r"not read|are read|reads? |decoded|encoding|holds|content|Pillow|compressed",
+        "The file contains something that texrs does not read.",
+        "Convert it with another program to a format in [Files](../guides/files.md).",
+    ),
+    kind(
+        r"version|made by|made again|SHA-256|says how",
+        "The file is from another version, or its inputs changed.",
+        "Make it again with this version.",
+    ),
+    kind(
+        r"folder|suffix|locked|other processes|write-protected|removed|gone",
+        "The file system, or another process, prevents it.",
+        "Choose another path, or end the other process.",
+    ),
+    kind(r"up to|allowed", "The value or the size is out of its range.", "Give a value in the range of the message."),
+    kind(r"is needed|belongs", "An argument is missing.", "Give it."),
+    kind(
+        r"field|function|steps?|corrections|points?",
+        "A part of the argument cannot be used.",
+        "Change the part that the message names.",
     ),
     kind(
         r"needs? |must |belongs? ",

@@ -38,6 +38,8 @@ def read_returns(name: str) -> tuple[Entries, Entries]:
     found: dict[str, Entries] = {"Stages": {}, "Report": {}}
     if other := re.search(r"\bas (?:of|in) `(\w+)`", " ".join(text)):
         found["Stages"], found["Report"] = read_returns(other.group(1))
+        for name in re.findall(r"without ``(\w+)``", " ".join(text)):
+            found["Report"].pop(name)
     section, key = "", ""
     for line in text:
         if line in ("Stages:", "Report:"):

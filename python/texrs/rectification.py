@@ -94,7 +94,7 @@ def rectify(
 
         - ``flat``: All of the plane that is visible, flattened.
         - ``sharp``: The part of it that is sharp enough.
-        - ``composite``: The result before seams are corrected.
+        - ``before_blending``: The result before seams are corrected.
 
         Report:
 

@@ -97,7 +97,7 @@ def remove(
         - ``known``: The image with the marked part in one colour.
         - ``ground``: Each plane in a shade of its own.
         - ``patches``: Each patch in a shade of its own.
-        - ``composite``: The result before colours are corrected.
+        - ``before_blending``: The result before colours are corrected.
 
         Report:
 
@@ -106,7 +106,7 @@ def remove(
         - ``replaced_outside``: Number of known pixels that changed.
         - ``boundary_width``: Width of the band that could change, in pixels.
         - ``screening``: Weight of the values in the colour correction.
-        - ``light``: Whether slow changes of light were followed.
+        - ``match_lighting``: Whether slow changes of light were followed.
         - ``seed``: The seed.
         - ``margin``: Pixels that were added around the mask.
         - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in the

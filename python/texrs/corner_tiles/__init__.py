@@ -249,11 +249,11 @@ class CornerTiles(InParts):
 
             Stages:
 
-            - ``composite``: The window.
+            - ``before_blending``: The window.
 
             Report:
 
-            - ``side``: Side of a tile, in pixels.
+            - ``tile_size``: Side of a tile, in pixels.
             - ``seed``: The seed.
             - ``origin``: (row, column) of the first pixel.
 

@@ -141,7 +141,7 @@ def inpaint(
 
         - ``known``: The image with its hole in one colour.
         - ``patches``: Each patch in a shade of its own.
-        - ``composite``: The result before colours are corrected.
+        - ``before_blending``: The result before colours are corrected.
 
         Report:
 
@@ -149,16 +149,16 @@ def inpaint(
         - ``seed``: The seed.
         - ``filled``: Share of the image that was filled, 0 to 1.
         - ``scaled``: Whether scale maps were used.
-        - ``measured``: What a ``scale_map`` "auto" found, as `texrs.planes.Sizes`; else None.
+        - ``measured``: What a ``scale_map`` "auto" found, as `texrs.planes.ScaleEstimate`; else None.
         - ``exemplar_measured``: The same for the exemplar.
         - ``replaced_outside``: Number of known pixels that changed.
         - ``patch_size``: Side of the patches, in pixels.
-        - ``tried``: Sides of patches that were tried, each with the cost of its seams.
+        - ``candidates``: Sides of patches that were tried, each with the cost of its seams.
         - ``patches``: Number of patches.
         - ``allow_mirror``: Whether patches could be mirrored.
         - ``screening``: Weight of the values in the colour correction.
         - ``wrap``: Whether the image repeats along (rows, columns).
-        - ``levels``: For method "optimise", for each level: its ``shape``, number of ``passes`` and the share of points that
+        - ``levels``: Levels of method "optimise", each with its ``shape``, number of ``passes`` and the share of points that
           ``changed``.
         - ``seams``: Mean cost of the seams. Only for volumes.
         - ``labels``: Whether the values are labels. Only for volumes.

@@ -133,9 +133,9 @@ def tile(
 
         Stages:
 
-        - ``swapped``: The image with its halves exchanged, not cut yet.
-        - ``pieces``: The part of the image that each pixel is from.
-        - ``composite``: The result before colours are corrected.
+        - ``shifted``: The image with its halves exchanged, not cut yet.
+        - ``source_regions``: The part of the image that each pixel is from.
+        - ``before_blending``: The result before colours are corrected.
 
         Report:
 
@@ -143,7 +143,7 @@ def tile(
         - ``size``: (rows, columns).
         - ``wrap``: Whether the result repeats along (rows, columns).
         - ``screening``: Weight of the values in the colour correction.
-        - ``flatten``: Whether uneven light was evened out.
+        - ``flatten_lighting``: Whether uneven light was evened out.
         - ``already``: Axes along which the image tiles already.
         - ``resized``: For each axis, the reason for another size.
         - ``overlap``: For each axis, the overlap in pixels; 0 if the ends are covered.

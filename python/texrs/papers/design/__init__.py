@@ -152,7 +152,7 @@ def design(
         - ``deformed``: The moved elements of the first copy.
         - ``holes``: Pixels of this copy that no element covers.
         - ``completed``: This copy with filled holes.
-        - ``composite``: The texture before colours are corrected.
+        - ``before_blending``: The texture before colours are corrected.
 
         Report:
 
@@ -165,12 +165,12 @@ def design(
         - ``reason``: Why this kind was chosen, one sentence.
         - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses".
         - ``motion``: For each example: "move" or "keep".
-        - ``tried``: For each example, the figures of either motion, or None if it was given. They are ``score`` (0 is best),
-          ``torn``, ``broken``, ``fog``, ``repetition`` and ``share`` of `texrs.judging.judge`.
+        - ``candidates``: For each example, the figures of either motion, or None if it was given. They are ``score`` (0 is
+          best), ``torn``, ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
         - ``courses``: For each example, the courses that it was laid in, or None.
-        - ``stretched``: For each example, the (2, 2) matrix that made its lattice fit the size, or None.
+        - ``lattice_stretch``: For each example, the (2, 2) matrix that made its lattice fit the size, or None.
         - ``rotate``: Largest rotation that was used, in degrees.
-        - ``shares``: Number of pixels from each example.
+        - ``pixel_counts``: Number of pixels from each example.
         - ``density``: For each scattered example, its density as ``asked``, ``reached`` and in the example (``own``), and the
           number of ``things``; else None.
         - ``holes``: For each copy, the share of its pixels that were filled.

@@ -150,14 +150,14 @@ def perspective(
 
         - ``sheet``: The flattened example that patches are cut from.
         - ``target``: The scale map that was followed.
-        - ``composite``: The result.
+        - ``before_blending``: The result.
 
         Report:
 
         - ``method``: "default" or "paper".
         - ``seed``: The seed.
         - ``scale_weight``: Weight of the scale.
-        - ``measured``: What a ``scale_map`` "auto" found, as `texrs.planes.Sizes`; else None.
+        - ``measured``: What a ``scale_map`` "auto" found, as `texrs.planes.ScaleEstimate`; else None.
         - ``sheet``: ``kind`` and ``resolution`` of the flattened example.
         - ``surface``: Whether the target is a surface.
         - ``turned``: Whether a direction was given.

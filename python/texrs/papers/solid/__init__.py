@@ -148,7 +148,7 @@ def solid(
         - ``patches``: Patches in their first places. For quality "preserve" and "optimise".
         - ``blocks``: Blocks in their first places. For quality "fast" and the paper.
         - ``level N``: The middle plane after level N, counted from 1.
-        - ``composite``: The result before known voxels are set.
+        - ``before_blending``: The result before known voxels are set.
 
         Report:
 
@@ -156,9 +156,9 @@ def solid(
         - ``quality``: "preserve", "fast" or "optimise"; None for the paper.
         - ``seed``: The seed.
         - ``field``: The field in words, or None.
-        - ``repeats``: Axes along which the example repeats.
+        - ``periodic_axes``: Axes along which the example repeats.
         - ``interpolation``: Interpolation between samples of the example.
-        - ``held``: Number of constrained points.
+        - ``constrained_points``: Number of constrained points.
         - ``guided``: Whether a guide was given.
         - ``elements``: Number of separate elements that were found, or None.
         - ``stitched``: Number of ``patches``, whether they were ``bent``, mean cost of the ``seams`` and number of ``healed``
@@ -166,8 +166,8 @@ def solid(
         - ``levels``: For each level: its ``shape``, number of ``passes`` and the share of points that ``changed``.
         - ``spacing``: (plane, row, column) distances, if they were given.
         - ``patches``: How patches were chosen; only if they were.
-        - ``tried``: The figures of each way that was tried, or None. They are ``score`` (0 is best), ``torn``, ``broken``,
-          ``fog``, ``repetition`` and ``share`` of `texrs.judging.judge`.
+        - ``candidates``: The figures of each way that was tried, or None. They are ``score`` (0 is best), ``torn``, ``broken``,
+          ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
 
     Raises
     ------
@@ -286,7 +286,7 @@ def synthesize(
     -------
     Synthesis
         The image, in the exemplar's dtype; its source map, whose frames are those of its patches. The stages and the keys of
-        the report are as in `solid`.
+        the report are as in `solid`, without ``spacing``.
 
     Raises
     ------

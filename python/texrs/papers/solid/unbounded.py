@@ -174,7 +174,7 @@ class Texture(Endless):
 
             Stages:
 
-            - ``composite``: The window.
+            - ``before_blending``: The window.
 
             Report:
 
@@ -182,7 +182,7 @@ class Texture(Endless):
             - ``seed``: The seed.
             - ``origin``: First pixel or voxel of the window.
             - ``field``: The field in words, or None.
-            - ``repeats``: Axes along which the example repeats.
+            - ``periodic_axes``: Axes along which the example repeats.
             - ``interpolation``: Interpolation between samples of the example.
 
         Raises

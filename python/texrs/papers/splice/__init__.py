@@ -176,35 +176,35 @@ def splice(
 
         Stages:
 
-        - ``points of a``: Elements of ``a``.
-        - ``points of b``: Elements of ``b``.
-        - ``mask``: Mask of the elements of ``a``.
+        - ``source points``: Elements of the first texture.
+        - ``target points``: Elements of the layout.
+        - ``mask``: Mask of these elements.
         - ``matching``: Line from each element to its target.
         - ``warped mesh``: Mesh that moves the elements.
         - ``before refinement``: Elements in their new places.
         - ``filled``: The result with a filled background.
-        - ``cells of a``: Cells of ``a``, for method "cells".
-        - ``net of a``: Knots and lines of ``a``, for method "nets".
-        - ``layout of b``: Elements of ``b``, for both methods.
+        - ``source cells``: Cells of the first texture, for method "cells".
+        - ``source net``: Knots and lines of the first texture, for method "nets".
+        - ``target layout``: Elements of the layout, for both methods.
         - ``target cells``: Outlines of the target cells.
         - ``target net``: Knots and lines of the target.
         - ``assignment``: Cells in the colour of their source.
         - ``cuts``: Borders between the pieces.
-        - ``composite``: The result.
+        - ``before_blending``: The result.
 
         Report:
 
         - ``method``: "default", "paper", "cells" or "nets".
         - ``seed``: The seed.
         - ``size``: (rows, columns).
-        - ``layout``: Kind of the layout of ``a``: "disjoint", "jointed" or "connected".
-        - ``scale``: Factor that the layout of ``b`` was scaled by.
+        - ``layout``: Kind of the own layout: "disjoint", "jointed" or "connected".
+        - ``scale``: Factor that the other layout was scaled by.
         - ``angle``: Angle that this layout was turned by, in degrees.
-        - ``gain``: Part of the scale that makes room for the elements of ``a``.
+        - ``gain``: Part of the scale that makes room for the elements.
         - ``targets``: Number of targets.
         - ``candidates``: Number of elements to choose from, with those beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.
-        - ``realised``: Share of their ways that elements were moved, 0 to 1.
+        - ``displacement_reached``: Share of their ways that elements were moved, 0 to 1.
         - ``screening``: Weight of the values in the colour correction.
         - ``holes``: Share of the pixels that were filled.
         - ``triangles``: Number of triangles of the mesh.
@@ -220,7 +220,7 @@ def splice(
         - ``grown``: Share of the pixels that no knot covers, for method "nets".
         - ``present``: Share of the targets whose element is visible.
         - ``matches``: For each target: its place (``target``), the place where the element is (``found``), ``realised``, the
-          number of the ``element`` and its ``point`` in ``a``. Cells also have a ``turn`` and a ``scale``.
+          number of the ``element`` and its ``point`` in the example. Cells also have a ``turn`` and a ``scale``.
 
     Raises
     ------
@@ -376,27 +376,28 @@ def self_splice(
         Stages:
 
         - ``resized``: The texture in the new size, if a size was given.
-        - ``points of a``: Elements of ``a``.
-        - ``mask``: Mask of the elements of ``a``.
+        - ``source points``: Elements of the first texture.
+        - ``target points``: Elements of the layout.
+        - ``mask``: Mask of these elements.
         - ``matching``: Line from each element to its target.
         - ``warped mesh``: Mesh that moves the elements.
         - ``before refinement``: Elements in their new places.
         - ``filled``: The result with a filled background.
-        - ``composite``: The result.
+        - ``before_blending``: The result.
 
         Report:
 
         - ``method``: "default" or "paper".
         - ``seed``: The seed.
         - ``size``: (rows, columns).
-        - ``layout``: Kind of the layout of ``a``: "disjoint", "jointed" or "connected".
-        - ``scale``: Factor that the layout of ``b`` was scaled by.
+        - ``layout``: Kind of the own layout: "disjoint", "jointed" or "connected".
+        - ``scale``: Factor that the other layout was scaled by.
         - ``angle``: Angle that this layout was turned by, in degrees.
-        - ``gain``: Part of the scale that makes room for the elements of ``a``.
+        - ``gain``: Part of the scale that makes room for the elements.
         - ``targets``: Number of targets.
         - ``candidates``: Number of elements to choose from, with those beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.
-        - ``realised``: Share of their ways that elements were moved, 0 to 1.
+        - ``displacement_reached``: Share of their ways that elements were moved, 0 to 1.
         - ``screening``: Weight of the values in the colour correction.
         - ``holes``: Share of the pixels that were filled.
         - ``triangles``: Number of triangles of the mesh.
@@ -404,7 +405,7 @@ def self_splice(
         - ``flipped_rigid``: Share of triangles inside of elements that are turned over.
         - ``system``: Size of the grid that the equations were solved on.
         - ``matches``: For each target: its place (``target``), the place where the element is (``found``), ``realised``, the
-          number of the ``element`` and its ``point`` in ``a``. Cells also have a ``turn`` and a ``scale``.
+          number of the ``element`` and its ``point`` in the example. Cells also have a ``turn`` and a ``scale``.
         - ``changed``: Share of the pixels that changed.
         - ``edit``: The steps, each with all its options.
         - ``elements``: Places of the elements before the edit, if a size was given.
