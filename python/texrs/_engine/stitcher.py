@@ -95,7 +95,7 @@ class Shown(NamedTuple):
     distortion : (points) float32
         Difference of the patch from the field. Empty if all points have one frame.
     table : (patches, K) int32
-                Data of each patch: its centre, relative to the first point of the part; the source coordinates and the
+        Data of each patch: its centre, relative to the first point of the part; the source coordinates and the
         Jacobian of the centre. Then the side, in units of 1/4096 of a sample, and whether it is rigid.
 
     """

@@ -28,7 +28,7 @@ class Settings:
     cell, rounds, candidates : int
         Patch-based initialisation: side of a cell, number of half-rounds of choosing, and candidates of each choice.
     contrast, continuation, repetition : float
-                Patch-based initialisation. Division of misfits by the contrast of the pieces; cost of continuing
+        Patch-based initialisation. Division of misfits by the contrast of the pieces; cost of continuing
         exactly where a
         neighbour ends; cost of showing the same samples as a neighbour.
     acceptance : float

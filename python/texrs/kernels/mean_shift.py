@@ -32,7 +32,7 @@ def mean_shift(
 ) -> Array:
     """Filter an image by mean shift: each pixel becomes the mode of its density.
 
-        Each pixel moves to the mean position and colour of a square window until it stays. Only pixels whose colours
+    Each pixel moves to the mean position and colour of a square window until it stays. Only pixels whose colours
     are within a range of its own count (Comaniciu and Meer [1]_, flat kernels). The result is close to that of
     ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. It supports any dtype and any number of channels, and does not
     depend on the number of threads or the processor.

@@ -85,7 +85,7 @@ class PatchIndex:
     Raises
     ------
     InvalidInput
-                If images are missing, values are beyond the range of float32, different numbers of channels, or a mask
+        If images are missing, values are beyond the range of float32, different numbers of channels, or a mask
         that does
         not fit its image.
 

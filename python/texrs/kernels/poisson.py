@@ -182,10 +182,10 @@ def blend(
     mask : (H, W) array_like of bool
         Pixels to take from the source.
     screening : float
-                Weight of the source's own values compared with its gradients, at least 0. If 0, the colours adapt
+        Weight of the source's own values compared with its gradients, at least 0. If 0, the colours adapt
         completely to the target; if 1, they hardly change. Default: 0.
     mixed : bool
-                If True, use the larger of the two differences at each pair of pixels. The texture of the target is
+        If True, use the larger of the two differences at each pair of pixels. The texture of the target is
         then visible in flat parts of the source.
     wrap : bool or (bool, bool)
         Axes along which the images are periodic.

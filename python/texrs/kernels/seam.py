@@ -63,7 +63,7 @@ class OldSeams:
     Attributes
     ----------
     kept : sequence of array_like
-                ``M(p, q, S, T)``, at least 0, the cost if both keep A. 0 without an old seam: the pair then has its
+        ``M(p, q, S, T)``, at least 0, the cost if both keep A. 0 without an old seam: the pair then has its
         ordinary cost.
     ab : sequence of array_like
         ``M(p, q, S, B)``, at least 0, the cost if ``p`` keeps A and ``q`` takes B.
@@ -125,7 +125,7 @@ def cut(
 ) -> Cut:
     """Find the least visible seam between two overlapping images, by an exact minimum cut [1]_.
 
-        Pixels that only one image covers take this image. Pixels of a core inside the overlap are hard constraints:
+    Pixels that only one image covers take this image. Pixels of a core inside the overlap are hard constraints:
     they take
     its image. Next, pixels adjacent to one that only A covers take A, then pixels adjacent to one that only B covers
     take B. The others are chosen so that the total cost of all pairs of neighbours that the seam separates is minimal.
@@ -142,7 +142,7 @@ def cut(
         Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must cover its core. By
         default none.
     penalty : float or array_like of float, optional
-                Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus
+        Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus
         the mean of its two penalties,
         which keeps seams out of elements that should stay whole.
     old : OldSeams, optional
@@ -229,7 +229,7 @@ def cut_strip(
 ) -> Cut:
     """Find the least visible seam from border to border of two images that overlap completely.
 
-        The first line along ``axis`` takes A, and the last one takes B. The seam may turn back, because it is the
+    The first line along ``axis`` takes A, and the last one takes B. The seam may turn back, because it is the
     exact minimum cut. It is found as a shortest path on the dual of the grid, hundreds of times faster than by maximum
     flow [1]_.
 
@@ -372,7 +372,7 @@ def binary_labels(
     unary : (H, W, 2) or (D, H, W, 2) array_like of float
         Cost of False and cost of True at each point. Infinity forbids a label.
     pairwise : float or sequence
-                Cost of neighbours with different labels, at least 0: one number for all, or one entry for each axis.
+        Cost of neighbours with different labels, at least 0: one number for all, or one entry for each axis.
         An entry is a number, or an array of the grid's shape, where the entry of ``p`` is for ``p`` and the next
         point. It may also be a tuple of two arrays: False before True, and True before False.
     wrap : bool or sequence of bool

@@ -102,7 +102,7 @@ def finish(
 ) -> SourceMap:
     """Return the source map into the exemplars. The arrays are consumed.
 
-        Axes in ``rolled`` begin at a calm line, so that the border of the texture does not follow an edge. They begin
+    Axes in ``rolled`` begin at a calm line, so that the border of the texture does not follow an edge. They begin
     at the
     first calm line for 0, and at the last one for 1.
     """
