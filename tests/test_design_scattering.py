@@ -119,11 +119,11 @@ def test_things_go_around_the_ends_of_cyclic_axes(grit, pebbles):
     [
         ({"density": 1.2}, "^density: must be shares"),
         ({"density": -0.1}, "^density: must be shares"),
-        ({"density": [0.2, 0.2]}, "^density: needs a number"),
-        ({"density": np.zeros((5, 5))}, "^density: needs a number"),
+        ({"density": [0.2, 0.2]}, "^density: must be one number"),
+        ({"density": np.zeros((5, 5))}, "^density: must be one number"),
         ({"density": "much"}, "^density"),
-        ({"density": 0.2, "weights": [1, 1]}, "^density: .* not for use with weights"),
-        ({"density": 0.2, "method": "paper"}, "^density: .* not for use with method"),
+        ({"density": 0.2, "weights": [1, 1]}, "^density: .*cannot be combined with weights"),
+        ({"density": 0.2, "method": "paper"}, "^density: .*cannot be combined with method"),
     ],
 )
 def test_densities_are_checked(grit, pebbles, options, message):
@@ -132,9 +132,9 @@ def test_densities_are_checked(grit, pebbles, options, message):
 
 
 def test_there_must_be_things(grit, pebbles):
-    with pytest.raises(InvalidInput, match="^density: scatters things of other exemplars"):
+    with pytest.raises(InvalidInput, match="^density: must have at least two exemplars"):
         texrs.design(grit, 64, density=0.2)
     plain = np.full((64, 64, 3), 90, np.uint8)
     assert isinstance(texrs.Exemplar(plain).segment(), Segmentation)
-    with pytest.raises(InvalidInput, match="^density: of exemplar 1 no separate things"):
+    with pytest.raises(InvalidInput, match="^density: must have separate elements in exemplar 1"):
         texrs.design([pebbles, plain], 64, density=0.2)

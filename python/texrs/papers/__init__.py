@@ -1,1 +1,1 @@
-"""One paper a file, each read from top to bottom; the verbs are exported by `texrs` itself."""
+"""Implementations of the papers, one package each. `texrs` exports their functions."""

@@ -1,54 +1,76 @@
-"""DESIGN: many natural textures from one example.
+"""Synthesise many natural textures from one example (DESIGN).
 
 J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", The Visual Computer 22,
-2006. The flow, in the paper's order:
+2006. The steps, in the paper's order:
 
-1. segment the exemplar into layers and child layers (section 3.2);
-2. deform each child by translations, rotations, mirrors and scales that a logistic map chooses (section 3.3, Eq. 1 and 2);
-3. stitch the deformed layers by graph cut (section 3.4, Eq. 3) and mark the holes (Eq. 4);
-4. fill the holes by example (section 3.4);
-5. repeat for several tiles and stitch them into the large texture (section 3.1, step 4);
-6. correct its colours so that the seams disappear (section 3.6, Eq. 5 and 6).
+1. Segment the exemplar into layers and child layers (section 3.2).
 
-Departures, with their reasons:
+2. Deform each child by translations, rotations, mirrors and scales that a logistic map chooses (section 3.3, Eq. 1 and 2).
 
-- Children are elements, not colour layers: a layer moved as a whole tears the elements that its border crosses.
-- The literal generator uses one number for the operation and for its extent, so it never enlarges and often does
-  nothing; here each operation takes three values of the map. Each child has its own start, after a burn-in.
-- An element that the border of the exemplar cuts only slides along that border; elements keep out of each other.
-- In a cut, the inside of an element is a hard constraint, and a context band of its surroundings is offered with it:
-  otherwise the minimum cut makes a wholly overlapped element vanish.
-- Where patches of the large texture meet, cuts pay the square of the difference, and for the depth inside of the elements that
-  meet there, so seams run between them and out of edges that do not fit (see `texrs.quilting`).
-- Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
-  heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
-  pieces of its neighbours.
-- Holes are filled with background alone where the example has enough of it. Where it has not, what is left of an element in a
-  heap whose place another one took stays. The inside of elements is never filled over: patches would tear them.
-- Where moved elements are judged clearly worse than the example as it is, they stay where they are, and variety comes from
-  patches alone: both are tried at a small size (see `texrs.metrics`). In heaps of fruit, where elements can only be cut out
-  roughly, torn outlines fall to a third.
-- Nothing is mirrored along an axis on which something tells the example from its mirror image (light from one side, leaves
-  that hang), or at all where ``rotate=0`` says that it has an upper side, unless that is asked for. Nor is it turned where it
-  has directions of its own (bark, brickwork); where it repeats on a lattice, elements move from place to place of the lattice
-  and nowhere else.
-- What repeats on a lattice is stretched and sheared a little, by 15 % at most, so that a whole number of periods goes around
-  a cyclic texture, and patches are taken in step with each other: else bricks run together where the courses close. The
-  report's "lattice_stretch" says by how much.
-- What lies in courses without repeating along them, as a wall of stones of all lengths, is made level and laid course by
-  course, as tall as the texture, a few times, those as tall exchanged for each other; patches are free along the courses and
-  keep their places across, so all joints go through (`texrs.papers.design.sheets`). The report's "courses" says what was found.
-- A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
-  wrap, where the paper folds a finished picture that was never chosen to fit.
-- Several exemplars are each stitched into a texture of the full size. Which one shows is asked by a map, or drawn as
-  territories of smooth noise; a cut moves their borders to outlines, by an element at most (`texrs.papers.design.mixing`).
-  Dealing patches to exemplars gives rectangles, and no map is obeyed. Colours are not corrected where exemplars meet.
-  Or things of the others are scattered over the first one, as densely as asked (`texrs.papers.design.scattering`).
-- The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
-  takes those of the picture itself; some weight on the values keeps the colours from drifting. Along the outline of a thing
-  the step stays.
+3. Stitch the deformed layers by graph cut (section 3.4, Eq. 3) and mark the holes (Eq. 4).
 
-``method="paper"`` leaves the departures out (`texrs.papers.design.literal`), but for the torus and the squares.
+4. Fill the holes by example (section 3.4).
+
+5. Repeat for several deformed copies ("tiles") and stitch them into the large texture (section 3.1, step 4).
+
+6. Correct its colours so that the seams disappear (section 3.6, Eq. 5 and 6).
+
+Departures from the paper, with their reasons:
+
+- The child layers are elements, not colour layers. A layer that moves as a whole tears the elements that its border
+  crosses.
+
+- The printed generator uses one number for the operation and for its extent. It therefore never enlarges and often
+  does nothing. Here each operation takes three values of the map. Each child has its own start, after a burn-in.
+
+- An element that the border of the exemplar cuts only slides along that border. Elements do not overlap.
+
+- In a cut, the inside of an element is a hard constraint. A context band of its surroundings is offered with it.
+  Without these, the minimum cut removes an element that is wholly overlapped.
+
+- Seams between patches of the large texture cost the squared difference, plus the depth inside the elements that meet
+  there. Seams therefore run between elements, and avoid edges that do not fit (see `texrs.quilting`).
+
+- Elements of one shape that are in a heap take each other's places. They are turned and scaled to the shape that they
+  fill. Most elements of a heap of leaves stay, because no background would remain if all moved. An element brings only
+  background along, not parts of its neighbours.
+
+- Holes are filled with background only, if the example has enough of it. Otherwise, if another element took an
+  element's place in a heap, the uncovered rest of the old element stays. The inside of elements is never filled over,
+  because patches would tear it.
+
+- If moved elements score clearly worse than elements in place, they stay, and only patches give variety. Both ways are
+  tried at a small size (see `texrs.metrics`). Elements in heaps of fruit can only be cut out roughly. There this
+  reduces the length of torn outlines to a third.
+
+- Images are not mirrored along an axis if the example differs from its mirror image. Reasons are light from one side
+  or hanging leaves. ``rotate=0`` states that the example has an upper side, and then mirroring is off.
+  ``allow_mirror`` overrides both. Examples with directions of their own (bark, brickwork) are not turned. On a
+  lattice, elements move only from one lattice position to another.
+
+- An example on a lattice is stretched and sheared by at most 15 %. A whole number of periods then fits a tileable
+  texture. Patches are shifted by whole periods only, so that bricks do not merge where the courses close. The report's
+  "lattice_stretch" contains the stretch.
+
+- An example in courses that do not repeat, such as a wall of stones of all lengths, is levelled. Its courses are laid
+  on top of each other, as tall as the texture, several times, with courses of equal height exchanged. Patches move
+  freely along the courses and keep their place across them, so that all joints continue
+  (`texrs.papers.design.sheets`). The report's "courses" describes the courses that were found.
+
+- A tileable texture (section 3.5) is stitched on the torus from the start. Patches are chosen to fit both sides of the
+  border. The paper instead folds a finished image whose patches were not chosen to fit there.
+
+- Each of several exemplars is stitched into a texture of the full size. A map, or territories of smooth noise, choose
+  which texture is visible. A cut moves their borders to outlines, by at most the size of an element
+  (`texrs.papers.design.mixing`). Assigning patches to exemplars, as in the paper, gives rectangles and cannot follow a
+  map. Colours are not corrected where exemplars meet. With ``density``, elements of the other exemplars are scattered
+  over the first one (`texrs.papers.design.scattering`).
+
+- The colour correction restores the differences of the sources on both sides of a seam. The paper restores the
+  differences of the image itself. A weight on the values keeps the colours from drifting. The step along the outline
+  of an element is kept.
+
+``method="paper"`` leaves out the departures (`texrs.papers.design.literal`), except for the torus and the squares.
 """
 
 from __future__ import annotations
@@ -98,53 +120,58 @@ def design(
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
-        The example, any real dtype, at least 16 pixels a side. Several, of one dtype and one number of channels, are
-        mixed. An entry of analysed elements, as `splice` takes them, brings its own elements along.
+        The example, of any real dtype, at least 16 pixels a side. Several exemplars of one dtype and number of
+        channels are mixed. A set of analysed elements, as for `splice`, contains its own elements.
     size : int or (rows, columns), optional
-        Size of the result, in pixels, at least 16 a side; twice the exemplar by default.
+        Size of the result, in pixels, at least 16 a side. Default: twice the exemplar.
     seed : int
-        Chooses the texture, 0 to 2^64 - 1: the same exemplar, options, seed and version give the same bytes.
+        Number that selects the texture, 0 to 2^64 - 1. The same exemplar, options, seed and version give the same
+        bytes. Default: 0.
     wrap : bool or (rows, columns), optional
-        Axes along which the result repeats without a seam; None: both.
+        Axes along which the result repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of n exemplars in the result, or which one is where, or their shares everywhere; equal by default. Borders
-        follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
+        Share of each exemplar: n numbers, a map of exemplar numbers, or a map of n shares per pixel. Default: equal
+        shares. Borders follow outlines, at most one element away from their place in a map. The total shares are kept
+        within 3 %.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the area on which things of all exemplars but the first are seen, 0 to 1, of each or of all, on the whole or
-        place by place: they are scattered over a texture of the first, each whole, those of the last on top. Not for use
-        with ``weights``. The report's "density" says what was asked and reached, and what their own exemplar has.
+        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number, one for each
+        of these exemplars, or maps. Whole elements are scattered over a texture of the first exemplar. Elements of the
+        last exemplar are on top. Cannot be combined with ``weights``. The report's "density" contains the requested
+        and the reached densities, and the densities in the exemplars. Default: elements are not scattered.
     elements : ElementOptions or ElementAnalysis
-        How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
+        Options that control how elements are found, or the result of `texrs.elements.analyse`, whose ``labels`` are
+        used. Default: the default options.
     deformation : DeformationOptions
-        How elements are deformed.
+        Options that control how elements are deformed. Default: the default options.
     motion : {"auto", "move", "keep"}
-        What is done with elements. "move": they are deformed, as the paper has it. "keep": they stay as they are, and
-        patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
-        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move. What lies in
-        courses is laid course by course unless they move.
+        Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
+        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and takes the
+        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses is
+        laid course by course unless elements move. Default: "auto".
     copies : int
-        Deformed copies of the exemplar that the result is stitched from, 1 to 64.
+        Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
-        Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
-        default.
+        Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side. Default: a sixth of the
+        shorter side, 12 to 32.
     screening : float, optional
-        Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear (section 3.6): the smaller, the
-        wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
-        of several exemplars with ``across=False``.
+        Weight that keeps the values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller weight
+        spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in the
+        same way, with ``across=False`` if there are several exemplars. Default: 0.15.
     method : {None, "paper"}
-        "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
-        by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
-        match; colours are corrected without weight on the values. The ``segmentation`` of elements and ``translate``,
-        ``rotate`` and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
+        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired, for comparison. The
+        printed generator moves whole colour layers, once each or ``operations`` times. They are stitched at the plain
+        cost, holes take the best match, and colours are corrected without a weight on the values. The ``segmentation``
+        of elements has no effect then, nor have ``translate``, ``rotate`` and ``mirror`` of their deformation, nor the
+        amount of ``screening``. Default: the algorithm with the departures above.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
+        the work stops. True shows a progress bar. Default: none.
 
     Returns
     -------
     Synthesis
-        The image in the exemplar's dtype and channels, its source map, pictures of the stages, and the log of
-        operations.
+        The ``image`` in the exemplar's dtype and channels, its ``source_map``, images of the ``stages``, and the
+        ``report``. The report's "operations" contains the operations on each element.
 
         Stages:
 
@@ -184,9 +211,9 @@ def design(
     Raises
     ------
     InvalidInput
-        An argument of the wrong type or out of range.
+        An argument has the wrong type or is out of range.
     LimitExceeded
-        A size of more than 2^28 pixels, or that needs more memory than the machine has.
+        The size exceeds 2^28 pixels, or needs more memory than the machine has.
 
     See Also
     --------
@@ -194,9 +221,10 @@ def design(
 
     Notes
     -----
-    For each pixel of the result 18 bytes are needed, or 14 and twice those of a pixel of the image where that is more,
-    and 0.5 GB beside it: 5.9 GB for 16384 x 16384 pixels of 8-bit RGB. ``method="paper"`` takes 24 more. Several
-    exemplars take 100 more and 75 for each, and a map of ``weights`` 8 for each.
+    Each pixel of the result needs 18 bytes, or 14 bytes plus twice the bytes of a pixel of the image if this is more.
+    Another 0.5 GB are needed in any case: 5.9 GB for 16384 x 16384 pixels of 8-bit RGB. ``method="paper"`` needs 24
+    more bytes per pixel. Several exemplars need 100 more and 75 for each exemplar, and a map of ``weights`` needs 8
+    for each exemplar.
 
     References
     ----------
@@ -262,67 +290,71 @@ def design_variants(
 ) -> Iterator[Synthesis]:
     """Design several different textures from one example, which is analysed once.
 
-    The arguments are checked at once, and each texture is made when it is asked for, so that those before it are there
-    when the work is stopped. All are what `design` makes with their seed.
+    The arguments are checked at once. Each texture is generated on request, so that finished textures are available if
+    the work stops. Each equals the result of `design` with its seed.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
-        The example, any real dtype, at least 16 pixels a side. Several, of one dtype and one number of channels, are
-        mixed. An entry of analysed elements, as `splice` takes them, brings its own elements along.
+        The example, of any real dtype, at least 16 pixels a side. Several exemplars of one dtype and number of
+        channels are mixed. A set of analysed elements, as for `splice`, contains its own elements.
     count : int
-        How many, 1 to 4096.
+        Number of textures, 1 to 4096.
     size : int or (rows, columns), optional
-        Size of each texture, in pixels, at least 16 a side; twice the exemplar by default.
+        Size of each texture, in pixels, at least 16 a side. Default: twice the exemplar.
     seed : int
-        Chooses the textures, 0 to 2^64 - 1: they have the seeds ``seed``, ``seed + 1``, ...
+        Number that selects the textures, 0 to 2^64 - 1. Their seeds are ``seed``, ``seed + 1``, ... Default: 0.
     wrap : bool or (rows, columns), optional
-        Axes along which each texture repeats without a seam; None: both.
+        Axes along which each texture repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of n exemplars in each texture, or which one is where, or their shares everywhere; equal by default. Borders
-        follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
+        Share of each exemplar: n numbers, a map of exemplar numbers, or a map of n shares per pixel. Default: equal
+        shares. Borders follow outlines, at most one element away from their place in a map. The total shares are kept
+        within 3 %.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the area on which things of all exemplars but the first are seen, 0 to 1, of each or of all, on the whole or
-        place by place: they are scattered over a texture of the first, each whole, those of the last on top. Not for use
-        with ``weights``. The report's "density" says what was asked and reached, and what their own exemplar has.
+        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number, one for each
+        of these exemplars, or maps. Whole elements are scattered over a texture of the first exemplar. Elements of the
+        last exemplar are on top. Cannot be combined with ``weights``. The report's "density" contains the requested
+        and the reached densities, and the densities in the exemplars. Default: elements are not scattered.
     elements : ElementOptions or ElementAnalysis
-        How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
+        Options that control how elements are found, or the result of `texrs.elements.analyse`, whose ``labels`` are
+        used. Default: the default options.
     deformation : DeformationOptions
-        How elements are deformed.
+        Options that control how elements are deformed. Default: the default options.
     motion : {"auto", "move", "keep"}
-        What is done with elements. "move": they are deformed, as the paper has it. "keep": they stay as they are, and
-        patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
-        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move. What lies in
-        courses is laid course by course unless they move.
+        Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
+        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and takes the
+        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses is
+        laid course by course unless elements move. Default: "auto".
     copies : int
-        Deformed copies of the exemplar that each texture is stitched from, 1 to 64.
+        Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
-        Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
-        default.
+        Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side. Default: a sixth of the
+        shorter side, 12 to 32.
     screening : float, optional
-        Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear (section 3.6): the smaller, the
-        wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
-        of several exemplars with ``across=False``.
+        Weight that keeps the values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller weight
+        spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in the
+        same way, with ``across=False`` if there are several exemplars. Default: 0.15.
     method : {None, "paper"}
-        "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
-        by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
-        match; colours are corrected without weight on the values. The ``segmentation`` of elements and ``translate``,
-        ``rotate`` and ``mirror`` of their deformation play no part, nor does the amount of ``screening``.
+        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired, for comparison. The
+        printed generator moves whole colour layers, once each or ``operations`` times. They are stitched at the plain
+        cost, holes take the best match, and colours are corrected without a weight on the values. The ``segmentation``
+        of elements has no effect then, nor have ``translate``, ``rotate`` and ``mirror`` of their deformation, nor the
+        amount of ``screening``. Default: the algorithm with the departures of `design`.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
+        the work stops. True shows a progress bar. Default: none.
 
     Returns
     -------
     iterator of Synthesis
-        Results as of `design`.
+        One result per seed, as of `design`.
 
     Raises
     ------
     InvalidInput
-        An argument of the wrong type or out of range.
+        An argument has the wrong type or is out of range.
     LimitExceeded
-        A size of more than 2^28 pixels, or that needs more memory than the machine has.
+        The size exceeds 2^28 pixels, or needs more memory than the machine has.
 
     Examples
     --------
@@ -355,7 +387,7 @@ def design_variants(
 
 
 def make_textures(arguments: Arguments) -> Iterator[Synthesis]:
-    """Segment the exemplars, and make a texture for each seed."""
+    """Segment the exemplars, and synthesise a texture for each seed."""
     plans = segment(arguments)
     for number, seed in enumerate(arguments.seeds, start=1):
         made = make_texture(plans, arguments, seed)
@@ -365,9 +397,9 @@ def make_textures(arguments: Arguments) -> Iterator[Synthesis]:
 
 
 def segment(arguments: Arguments) -> list[Plan]:
-    """Segment each exemplar, and settle how its elements may move: step 1."""
+    """Segment each exemplar, and decide how its elements may move (step 1)."""
     plans: list[Plan] = []
-    # The printed algorithm moves whole layers.
+    # The printed algorithm moves whole layers, so elements are not segmented.
     elements = replace(arguments.elements, segmentation="none") if arguments.literal else arguments.elements
     arguments.watch("segment", 0.0)
     for number, exemplar in enumerate(arguments.guides):
@@ -382,7 +414,7 @@ def segment(arguments: Arguments) -> list[Plan]:
 
 
 def make_texture(plans: Sequence[Plan], arguments: Arguments, seed: int) -> Synthesis:
-    """Make one texture of analysed exemplars: steps 2 to 6."""
+    """Synthesise one texture from analysed exemplars (steps 2 to 6)."""
     tiles, composite = make_composite(plans, arguments, seed)
     picture = look_up(composite, arguments)
     image, seams = correct_colours(composite, picture, arguments)
@@ -394,5 +426,5 @@ def make_texture(plans: Sequence[Plan], arguments: Arguments, seed: int) -> Synt
 
 
 def report_share(watch: Progress, number: int, count: int, stage: str, share: float) -> None:
-    """Report the share of one of several alike."""
+    """Report the progress of one of several equal parts."""
     watch(stage, (number + share) / count)

@@ -1,4 +1,4 @@
-"""The arguments of `texrs.design`, checked before any work begins."""
+"""Arguments of `texrs.design`, checked before any work begins."""
 
 from __future__ import annotations
 
@@ -41,34 +41,34 @@ Method: TypeAlias = Literal["paper"] | None
 Choice: TypeAlias = Literal["auto", "move", "keep"]
 
 MINIMUM_SIDE = 16
-"""An exemplar with a shorter side holds no texture to speak of."""
-LARGER = "texrs.CornerTiles makes an endless design, and gives it in parts"
-"""How larger ones are made."""
+"""Shortest side of an exemplar, in pixels. A shorter side is too small for a texture."""
+LARGER = "texrs.CornerTiles creates an unbounded design in parts"
+"""Hint for errors about size: the way to synthesise larger textures."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arguments:
-    """What is asked of `texrs.design`."""
+    """Checked arguments of `texrs.design`."""
 
     exemplars: list[Exemplar]
     guides: list[Exemplar]
-    """The same on one scale, which decisions are made on."""
+    """The same exemplars on one scale of values. Decisions are based on these."""
     size: tuple[int, int]
     seeds: list[int]
     wrap: tuple[bool, bool]
     shares: NDArray[np.float64]
-    """Of each exemplar: (n,) for the whole, or (rows, columns, n)."""
+    """Share of each exemplar: (n,) for the whole texture, or (rows, columns, n)."""
     density: NDArray[np.float64] | None
-    """Share of the area on which things of each exemplar but the first are seen: (n - 1,), or (rows, columns, n - 1)."""
+    """Share of the area that elements of each exemplar after the first cover: (n - 1,), or (rows, columns, n - 1)."""
     elements: ElementOptions
     deformation: DeformationOptions
     motion: Choice
     copies: int
     side: int | None
-    """Of the patches that fill holes."""
+    """Side of the patches that fill holes, in pixels; None for the default."""
     screening: float
     literal: bool
-    """Whether the paper is followed as printed."""
+    """If True, the paper is followed as printed."""
     watch: Progress
 
     @property
@@ -78,7 +78,7 @@ class Arguments:
 
     @property
     def images(self) -> list[Array]:
-        """The exemplars as they were given."""
+        """The exemplars in their original dtype and values."""
         return [e.image for e in self.exemplars]
 
 
@@ -106,7 +106,7 @@ def check_arguments(
     chosen = take_entries(given, exemplars, elements)
     for name, value, kind in (("elements", chosen, ElementOptions), ("deformation", deformation, DeformationOptions)):
         if not isinstance(value, kind):
-            raise InvalidInput(f"{name}: needs {kind.__name__}(...), got {value!r}")
+            raise InvalidInput(f"{name}: must be {kind.__name__}(...), got {value!r}")
     check_together(exemplars, chosen.labels)
     sides = size if size is not None else [2 * n for n in exemplars[0].shape]
     rows, columns = as_size(sides, minimum=MINIMUM_SIDE, way=LARGER)
@@ -115,7 +115,9 @@ def check_arguments(
     as_method(method, None, "paper")
     if density is not None and (weights is not None or method is not None):
         other = "weights" if weights is not None else "method"
-        raise InvalidInput(f"density: scatters things over the first exemplar, and is not for use with {other}")
+        raise InvalidInput(
+            f"density: cannot be combined with {other}, because it scatters elements over the first exemplar"
+        )
     as_choice(motion, "motion", ("auto", "move", "keep"))
     arguments = Arguments(
         exemplars,
@@ -139,16 +141,16 @@ def check_arguments(
 
 
 def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], elements: Any) -> Any:
-    """Return how elements are found: where entries of analysed ones are given, by their labels.
+    """Return how elements are found, with the labels of the analysed exemplars.
 
-    What is said of the elements beside stands above an entry that the exemplar came in.
+    If ``elements`` is set explicitly, it overrides the labels of the analysed exemplars.
     """
     if isinstance(elements, ElementAnalysis):
         shapes = [e.shape for e in exemplars]
         if shapes != [elements.mask.shape]:
             raise InvalidInput(
-                f"elements: those of one texture of {elements.mask.shape} are for one exemplar of that shape, got {shapes}; "
-                "of several exemplars each can be an entry itself"
+                f"elements: must have the shape of the only exemplar, got {elements.mask.shape} for {shapes}; "
+                "for several exemplars, pass each ElementAnalysis as exemplar"
             )
         return ElementOptions(labels=part_at_borders(elements))
     plain = isinstance(elements, ElementOptions) and (elements.layers, elements.segmentation) == (None, "auto")
@@ -159,7 +161,7 @@ def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], element
 
 
 def part_at_borders(entry: ElementAnalysis) -> NDArray[np.integer[Any]]:
-    """Return the labels of an entry, elements that go on around a border of it in two: they are moved within the exemplar."""
+    """Return the labels of analysed elements, split at periodic borders. Elements move within the exemplar only."""
     from scipy.ndimage import label
 
     if not any(entry.wrap):
@@ -169,20 +171,20 @@ def part_at_borders(entry: ElementAnalysis) -> NDArray[np.integer[Any]]:
 
 
 def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:
-    """Check that exemplars can be mixed."""
+    """Check that the exemplars can be mixed."""
     if not exemplars:
-        raise InvalidInput("exemplar: at least one is needed, got none")
+        raise InvalidInput("exemplar: must be at least one, got none")
     kinds = [(e.pixels.dtype.name, e.pixels.shape[-1]) for e in exemplars]
     if len(set(kinds)) > 1:
-        raise InvalidInput(f"exemplar: several must agree in dtype and channels, got {kinds}")
+        raise InvalidInput(f"exemplar: must have the same dtype and channels in all exemplars, got {kinds}")
     if isinstance(labels, list | tuple) and len(labels) != len(exemplars):
-        raise InvalidInput(f"labels: needs one an exemplar, {len(exemplars)}, got {len(labels)}")
+        raise InvalidInput(f"labels: must be a list of {len(exemplars)}, one per exemplar, got {len(labels)}")
     if labels is not None and not isinstance(labels, list | tuple) and len(exemplars) > 1:
-        raise InvalidInput("labels: needs a list of one an exemplar when there are several")
+        raise InvalidInput("labels: must be a list with one per exemplar if there are several exemplars")
 
 
 def scale_together(exemplars: list[Exemplar]) -> list[Exemplar]:
-    """Return exemplars whose values are brought to [0, 1] on one scale; integers are by themselves."""
+    """Return exemplars scaled to [0, 1] together; integers are unchanged, because their dtype sets the scale."""
     if len(exemplars) == 1 or exemplars[0].pixels.dtype.kind != "f":
         return exemplars
     pixels = [e.pixels for e in exemplars]
@@ -199,16 +201,16 @@ def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.
     if array.shape == size and np.asarray(weights).dtype.kind in "iu":
         if array.min() < 0 or array.max() >= count:
             raise InvalidInput(
-                f"weights: a map of exemplars holds 0 to {count - 1}, got {array.min()} to {array.max()}"
+                f"weights: must be 0 to {count - 1} in a map of exemplars, got {array.min()} to {array.max()}"
             )
         return np.eye(count)[array.astype(np.intp)]
     if array.shape not in ((count,), (*size, count)):
         raise InvalidInput(
-            f"weights: needs one an exemplar, {count}, a map of exemplars {size} of integers, "
-            f"or weights {(*size, count)}; got shape {array.shape}"
+            f"weights: must be {count} numbers (one per exemplar), integers of shape {size}, "
+            f"or numbers of shape {(*size, count)}; got shape {array.shape}"
         )
     if not np.isfinite(array).all() or array.min() < 0 or (array.sum(axis=-1) <= 0).any():
-        raise InvalidInput("weights: must be finite, not negative, and positive somewhere in each place")
+        raise InvalidInput("weights: must be finite and not negative, with a positive sum in each pixel")
     shares: NDArray[np.float64] = array / array.sum(axis=-1, keepdims=True)
     return shares
 
@@ -216,7 +218,9 @@ def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.
 def as_density(density: object, count: int, size: tuple[int, ...]) -> NDArray[np.float64]:
     """Check the densities of all exemplars but the first: (count - 1,), or (rows, columns, count - 1) over the texture."""
     if count < 2:
-        raise InvalidInput("density: scatters things of other exemplars over the first, and there is but one")
+        raise InvalidInput(
+            "density: must have at least two exemplars, because elements of the others are scattered over the first; got one"
+        )
     array = try_array(density, np.float64)
     if array.ndim == 0:
         array = np.full(count - 1, float(array))
@@ -224,9 +228,9 @@ def as_density(density: object, count: int, size: tuple[int, ...]) -> NDArray[np
         array = np.repeat(array[..., np.newaxis], count - 1, axis=-1)
     if array.shape not in ((count - 1,), (*size, count - 1)):
         raise InvalidInput(
-            f"density: needs a number, one for each exemplar but the first, {count - 1}, or a map {size} or "
+            f"density: must be one number, {count - 1} numbers (one per exemplar after the first), or a map {size} or "
             f"{(*size, count - 1)}; got shape {array.shape}"
         )
     if not np.isfinite(array).all() or array.min() < 0 or array.sum(axis=-1).max() > 1:
-        raise InvalidInput("density: must be shares of the area, 0 to 1, that together are at most 1")
+        raise InvalidInput("density: must be shares of the area, 0 to 1, with a sum of at most 1")
     return array

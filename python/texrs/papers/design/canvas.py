@@ -1,4 +1,4 @@
-"""The canvas that deformed elements are stitched on by graph cut: section 3.4, Eq. 3 and 4 of `texrs.papers.design`."""
+"""Canvas that deformed elements are stitched on by graph cut: section 3.4, Eq. 3 and 4 of `texrs.papers.design`."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from texrs.source_map import SourceMap
 __all__ = ["Canvas", "Draft", "Tile"]
 
 AGREEMENT = 0.6
-"""Largest mean difference between the surroundings of an element and those that it comes to, in standard deviations."""
+"""Largest mean difference between the surroundings of an element and those of its new place, in standard deviations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """A tile whose holes are still open: colours, where they come from, and what is covered (the mask of Eq. 4)."""
+    """A tile with open holes: colours, source positions, and the covered pixels (the mask of Eq. 4)."""
 
     colours: Floats
     coordinates: Floats
-    """Where each pixel comes from, in the mirror image of the exemplar."""
+    """Source position of each pixel in the mirror image of the exemplar."""
     label: NDArray[np.uint32]
     covered: Bools
     frames: list[NDArray[np.float64]]
-    """The Jacobian of each label."""
+    """The Jacobian matrix of each label."""
     mirror: Flip
-    """The mirror image of the exemplar that it was made from."""
+    """Mirror image of the exemplar that the tile is built from."""
     log: list[dict[str, Any]]
-    """What was done to each element."""
+    """Operations on each element."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,26 +45,26 @@ class Tile:
     source: SourceMap
     colours: Floats
     holes: float
-    """Share of it that was open."""
+    """Share of the tile that was open, 0 to 1."""
     mirror: Flip
-    """The mirror image of the exemplar that it was made from."""
+    """Mirror image of the exemplar that the tile is built from."""
     log: list[dict[str, Any]]
-    """What was done to each element."""
+    """Operations on each element."""
     stages: dict[str, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Canvas(Draft):
-    """A draft in the making, and where elements lie on it."""
+    """A draft in progress, and the places of the elements on it."""
 
     hard: Bools
-    """Hard constraints: what is for certain of the elements that are placed."""
+    """Hard constraints: pixels that certainly belong to placed elements."""
     occupied: Labels
-    """Elements that others keep out of."""
+    """Label of the element that occupies each pixel; other elements keep out."""
 
     @classmethod
     def start(cls, picture: Floats, mirror: Flip, covered: Bools, hard: Bools, occupied: Labels) -> Canvas:
-        """Start from what is covered of a picture, which is one of the mirror images of the exemplar."""
+        """Start from the covered pixels of an image, which is one of the mirror images of the exemplar."""
         own, log = SourceMap.identity(covered.shape), [{"element": 0, "mirror": list(mirror)}]
         return cls(picture.copy(), own.coordinates, own.label, covered, [np.eye(2)], mirror, log, hard, occupied)
 
@@ -72,24 +72,25 @@ class Canvas(Draft):
     def start_on_background(
         cls, picture: Floats, mirror: Flip, labels: Labels, still: frozenset[int], free: bool
     ) -> Canvas:
-        """Start from the background: everything but the elements that move and the pixel around them."""
+        """Start from the background: all pixels except the moving elements and a border of one pixel around them."""
         from scipy.ndimage import binary_dilation, binary_erosion
 
         rest = np.isin(labels, sorted(still))
         covered: Bools = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
         hard: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(INNER), border_value=1)
-        # Where elements lie apart, an element keeps out of places that others may still leave: then it can always stay.
+        # If elements are apart, an element keeps out of the places of others that may still move. Each element can
+        # then stay in its own place.
         occupied = labels.copy() if free else np.where(hard, labels, 0)
         return cls.start(picture, mirror, covered, hard, occupied)
 
     @classmethod
     def start_on_picture(cls, picture: Floats, mirror: Flip) -> Canvas:
-        """Start from the whole picture, which any element may cover."""
+        """Start from the whole image, which any element may cover."""
         everywhere = np.ones(picture.shape[:2], bool)
         return cls.start(picture, mirror, everywhere, ~everywhere, np.zeros(picture.shape[:2], np.int32))
 
     def suits(self, picture: Floats, placement: Placement) -> bool:
-        """Return whether the context band of an element is much like what it comes to lie on."""
+        """Return whether the context band of an element is similar to the pixels that it would cover."""
         band = (placement.distance < 0) & (placement.distance > -CONTEXT) & placement.inside
         if not band.any():
             return False
@@ -98,7 +99,7 @@ class Canvas(Draft):
         return bool(difference < AGREEMENT * picture.std(axis=(0, 1)).mean())
 
     def open_remains(self, labels: Labels, element: Element, label: int) -> None:
-        """Open what is left of an element whose place another one has taken, but for a border of a pixel."""
+        """Open the visible rest of an element whose place another one took, except for borders one pixel wide."""
         from scipy.ndimage import binary_opening
 
         low = np.maximum(element.origin.astype(int), 0)
@@ -110,7 +111,7 @@ class Canvas(Draft):
     def stitch(self, picture: Floats, labels: Labels, placement: Placement, element: int) -> None:
         """Cut an element and its context band into the canvas (Eq. 3)."""
         window, hard = placement.window, placement.hard
-        # Of its surroundings only background comes along: pieces of other elements would be torn ones.
+        # Only background comes along from the surroundings, because parts of other elements would look torn.
         ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
         offered = ((placement.distance > -1) | ((placement.distance > -CONTEXT) & ground)) & placement.inside
         colours = gather(picture, placement.coordinates, interpolation="cubic")
@@ -118,7 +119,8 @@ class Canvas(Draft):
         taken = offered
         if (offered & known).any():
             old_hard = self.hard[window] & known & ~hard
-            # Divided by the local gradient, costs would lead the seam along strong edges, where what is left of it shows.
+            # Costs divided by the local gradient would lead the seam along strong edges, where the rest of them stays
+            # visible.
             seam = cut(self.colours[window], colours, known, offered, core_a=old_hard, core_b=hard, cost="paper")
             taken = seam.mask & offered
         self.colours[window][taken] = colours[taken]

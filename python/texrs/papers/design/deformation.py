@@ -1,8 +1,8 @@
-"""Elements deformed and stitched over the background: sections 3.3 and 3.4 of `texrs.papers.design`.
+"""Deform elements and stitch them over the background: sections 3.3 and 3.4 of `texrs.papers.design`.
 
-Elements that lie apart are moved, and leave holes. In a heap, on a lattice, and where they are only the cells of a grid,
-all is full: there an element comes to lie where another one was, cut into the picture as it is. In a heap of leaves, of
-which none has another one's shape, most rest, or there would be nothing left to lie on.
+Elements that are apart move, and leave holes. A heap, a lattice and a grid of cells are full. There an element is cut
+into the image at the place of another one. Most elements of a heap of leaves stay: no two shapes are equal, and no
+background would remain if all moved.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ from texrs.papers.design.plan import Plan
 __all__ = ["classify", "deform_elements"]
 
 DENSE, RAGGED = 0.42, 0.825
-"""Share of the image that elements cover from which on they lie in a heap, and the solidity below which few of them have the
-shape of another one: leaves and flowers, which move as if they lay apart."""
+"""Share of the image above which elements form a heap, and the solidity below which they are leaves.
+
+Leaves and flowers rarely have the shape of another element, so they move as if they were apart.
+"""
 MOVED, MOVED_RAGGED = 0.7, 0.12
-"""Share of places that others may take, and share of a heap of leaves that moves."""
+"""Share of the elements whose place others may take, and share of a heap of leaves that moves."""
 
 Arrangement: TypeAlias = Literal["apart", "layers", "leaves", "heap", "full"]
 
 
 def classify(parts: Segmentation) -> Arrangement:
-    """Return how elements lie: apart, in a heap of things of one shape or of leaves, so that all is full, or as layers."""
+    """Return the arrangement: apart, full, a heap of elements of one shape, a heap of leaves, or whole layers."""
     if parts.lattice is not None or parts.kind == "grid":
         return "full"
     if parts.kind == "none":
@@ -46,37 +48,37 @@ def classify(parts: Segmentation) -> Arrangement:
 
 
 def choose_resting(arrangement: Arrangement, count: int, seed: int, tile: int) -> frozenset[int]:
-    """Choose the elements that stay where they are."""
+    """Choose the elements that stay in place."""
     share = {"apart": 1.0, "layers": 1.0, "leaves": MOVED_RAGGED, "heap": MOVED, "full": MOVED}[arrangement]
     return frozenset(e for e in range(1, count + 1) if uniform(seed, tile, e, 0, 4) >= share)
 
 
 def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
-    """Deform each element of an exemplar, and stitch them over its background by graph cut.
+    """Deform each element of an exemplar, and stitch the elements over its background by graph cut.
 
     Parameters
     ----------
     plan : Plan
-        The exemplar, its elements, and what they may do.
+        The exemplar, its elements, and their permitted operations.
     seed, tile : int
-        Choose the operations.
+        Numbers that select the operations.
 
     Returns
     -------
     Draft
-        With holes where nothing lies.
+        The tile, with holes where no element and no background is.
 
     """
     if plan.still:
         return rest(plan, tile)
     parts = plan.parts
-    # The background takes one of the mirrors, and the elements are cut out of the mirrored picture.
+    # The background takes one of the mirror images, and the elements are cut out of the mirrored image.
     mirror = plan.mirrors[int(uniform(seed, tile, 0, 0, 1) * len(plan.mirrors))]
     picture, labels, moves = flip(plan.guide, mirror), flip(parts.elements, mirror), plan.moves.mirror(mirror)
     elements, arrangement = measure_elements(labels), classify(parts)
     resting, full = choose_resting(arrangement, parts.count, seed, tile), arrangement in ("heap", "full")
     heap = Heap.measure(elements, labels) if arrangement == "heap" else None
-    # Where all is full, an element has its place, which another one may take: nothing is left open.
+    # In a full arrangement, the image stays below the elements, so holes do not occur.
     canvas = (
         Canvas.start_on_picture(picture, mirror)
         if full
@@ -100,23 +102,23 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
         canvas.log.append(describe(mover, operations, full=full))
         if operations or not full:
             canvas.stitch(picture, labels, placement, mover.label)
-        # Filled with pieces of other things, what is left would be torn once more.
+        # Open the rest of the replaced element, because parts of other elements next to it would tear it again.
         if heap is not None and plan.pure:
             canvas.open_remains(labels, element, len(canvas.frames) - 1)
     return canvas
 
 
 def rest(plan: Plan, tile: int) -> Draft:
-    """Return the exemplar as it is, in one of its mirror images after the other."""
+    """Return the unchanged exemplar, in each of its mirror images in turn."""
     mirror = plan.mirrors[tile % len(plan.mirrors)]
     return Canvas.start_on_picture(flip(plan.guide, mirror), mirror)
 
 
 def describe(element: Element, operations: Sequence[Operation], *, full: bool) -> dict[str, Any]:
-    """Return what the log tells of an element that was moved."""
+    """Return the log entry of an element that was moved."""
     if not full:
         return {"element": element.label, "operations": [o.describe() for o in operations]}
-    # The way to another one's place is no operation of the element's own.
+    # The translation to the place of another element is not an operation of the element itself.
     own = [o.describe() for o in operations if o.kind != "T"]
     place = [round(sum(o.shift()[axis] for o in operations)) for axis in range(2)]
     return {"element": element.label, "operations": own, "place": place}

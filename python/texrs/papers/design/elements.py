@@ -1,4 +1,4 @@
-"""Elements, measured, moved and fitted in among others: section 3.3 of `texrs.papers.design`."""
+"""Measure elements, move them, and fit them among others: section 3.3 of `texrs.papers.design`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from texrs.papers.design.operations import TRIES, Moves, Operation, compose
 __all__ = ["CONTEXT", "INNER", "Element", "Placement", "fit", "measure_elements", "place"]
 
 CONTEXT = 6.0
-"""Width in pixels of the context band: the surroundings that are offered to the cut with an element."""
+"""Width of the context band, in pixels: the surroundings that are offered to the cut with an element."""
 INNER = 3.0
-"""Depth in pixels from which on an element is a hard constraint of the cut."""
+"""Depth in pixels beyond which the inside of an element is a hard constraint of the cut."""
 
 
 GOOD, BAD = 0.03, 0.12
-"""The collision score that is taken at once, and the one that is refused."""
+"""Collision score up to which a placement is accepted at once, and above which it is refused."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,15 +36,20 @@ class Element:
     touches: tuple[bool, bool]
     origin: NDArray[np.float64]
     distance: Floats
-    """Signed distance to the element's outline in pixels, positive inside, over a box that starts at ``origin``."""
+    """Signed distance to the element's outline in pixels, positive inside, over a box whose corner is ``origin``."""
     depth: float
-    """Depth in pixels at which the hard constraint begins: less in a thin element, so that it has one."""
+    """Depth in pixels where the hard constraint begins.
+
+    It is smaller in a thin element, which would have no constraint otherwise.
+    """
     axes: NDArray[np.float64]
-    """Standard deviation along the longest axis and across it, and the angle of that axis in degrees, as R turns."""
+    """Standard deviations along the longest axis and across it in pixels, and the angle of that axis in degrees,
+    counter-clockwise.
+    """
 
 
 def measure_elements(labels: Labels) -> list[Element]:
-    """Measure the elements: those that the border cuts first, then by descending area."""
+    """Measure the elements, and sort them: first those that the border cuts, then by descending area."""
     from scipy.ndimage import find_objects
 
     height, width = labels.shape
@@ -52,6 +57,7 @@ def measure_elements(labels: Labels) -> list[Element]:
     objects: list[Any] = find_objects(labels)
     boxes = [(label, *box) for label, box in enumerate(objects, start=1) if box is not None]
     sums = sum_up(labels)
+    # Boxes are wider than the elements, so that they include the context bands.
     outlines = measure_outlines(
         labels,
         [
@@ -74,9 +80,9 @@ def measure_elements(labels: Labels) -> list[Element]:
 
 
 def sum_up(labels: Labels) -> list[list[int]]:
-    """Return of each label the sums over its pixels of 1, row, column, row^2, row column and column^2.
+    """Return the sums over the pixels of each label of 1, row, column, row^2, row * column and column^2.
 
-    Exact ones, as whole numbers have, so that no library for matrices has a say in what is alike.
+    The sums are exact integers, so that comparisons of elements do not depend on a linear algebra library.
     """
     flat = labels.ravel().astype(np.intp)
     row, column = (index.ravel() for index in np.indices(labels.shape))
@@ -86,7 +92,7 @@ def sum_up(labels: Labels) -> list[list[int]]:
 
 
 def find_axes(count: int, row: int, column: int, rows: int, both: int, columns: int) -> tuple[float, float, float]:
-    """Return the standard deviations along the longest axis of pixels with these sums and across it, and its angle."""
+    """Return the standard deviations of pixels with these sums along and across the longest axis, and its angle."""
     area = count * count
     down, aslant, across = (count * rows - row * row, count * both - row * column, count * columns - column * column)
     a, b, c = down / area + 1 / 12, aslant / area, across / area + 1 / 12
@@ -95,7 +101,7 @@ def find_axes(count: int, row: int, column: int, rows: int, both: int, columns: 
 
 
 def reach_beyond(rows: slice, columns: slice, pad: int) -> Floats:
-    """Return distances inside of what has no outline, for it covers everything: to a corner beyond its window."""
+    """Return inner distances of an element that covers the whole image, to a corner beyond its window."""
     shape = (rows.stop - rows.start + 2 * pad, columns.stop - columns.start + 2 * pad)
     row, column = np.indices(shape)
     distance: Floats = np.sqrt((row + 1) ** 2 + column**2).astype(np.float32)
@@ -108,20 +114,20 @@ class Placement:
 
     window: tuple[slice, slice]
     coordinates: Floats
-    """Where each pixel of the window comes from, in the (mirrored) exemplar."""
+    """Source position of each window pixel in the (mirrored) exemplar."""
     distance: Floats
     """Signed distance to the outline, in pixels of the exemplar."""
     inside: Bools
-    """Whether the exemplar has that place."""
+    """Pixels whose source position is inside the exemplar."""
     hard: Bools
-    """What is the element for certain: the hard constraint of the cut."""
+    """Pixels that certainly belong to the element: the hard constraint of the cut."""
     frame: NDArray[np.float64]
     kept: float
-    """Share of the element that is on the canvas."""
+    """Share of the element that is on the canvas, 0 to 1."""
 
 
 def place(element: Element, operations: Sequence[Operation], shape: tuple[int, int]) -> Placement | None:
-    """Move an element about its centroid; None when it leaves the canvas."""
+    """Move an element about its centroid; return None if it leaves the canvas."""
     matrix, shift = compose(operations)
     moved = move_shape(
         element.distance, element.origin.tolist(), element.centre.tolist(), matrix, shift, shape, element.depth
@@ -141,10 +147,10 @@ def fit(
     tile: int,
     suits: Callable[[Placement], bool] | None = None,
 ) -> tuple[list[Operation], Placement] | None:
-    """Draw operations until the element keeps out of what others occupy, and ``suits`` where it comes to.
+    """Draw operations until the element does not collide with others and ``suits`` accepts its new place.
 
-    Draws shorter and shorter ways. Takes the first good one, else the best, which may be not to move at all; None when even
-    that collides.
+    Later draws move the element less. The first good placement is taken, else the best one, which may be the original
+    place. The result is None if even the best one collides.
     """
     values = moves.draw_values(seed, tile, element.label)
     best: tuple[float, list[Operation], Placement] | None = None

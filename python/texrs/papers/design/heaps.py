@@ -1,6 +1,6 @@
-"""Heaps: elements that lie so near to each other that they can only take each other's places.
+"""Heaps of elements that are so close to each other that they can only exchange their places.
 
-A departure from section 3.3 of `texrs.papers.design`: if all elements of a heap moved there would be nothing left to lie on.
+A departure from section 3.3 of `texrs.papers.design`: if all elements of a heap moved, no background would remain.
 """
 
 from __future__ import annotations
@@ -19,24 +19,30 @@ from texrs.papers.design.operations import TRIES, Moves, Operation
 __all__ = ["Heap"]
 
 ALIKE, TAKERS = 0.8, 4
-"""Least share of two shapes' union that both cover for one to take the other's place, and how many of the most alike may."""
+"""Least intersection over union of two shapes if one takes the other's place, and number of candidates (the most
+similar ones).
+"""
 LONG, SLANT = 1.25, 15.0
-"""How many times longer than wide an element is whose direction counts, and the largest difference of directions where nothing
-is turned, in degrees."""
+"""Ratio of length to width above which an element's direction counts.
+
+Largest difference of directions in degrees where elements are not turned.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heap:
-    """Elements that lie so near to each other that they can only take each other's places."""
+    """Elements that are so close to each other that they can only exchange their places."""
 
     elements: Sequence[Element]
     labels: Labels
     measures: NDArray[np.float64]
-    """Of each element: logarithms of its side and of its elongation, its angle, and whether the border leaves it whole."""
+    """(n, 4): logarithms of each element's side and elongation, its angle in degrees, and 1 if the border does not cut
+    it.
+    """
 
     @classmethod
     def measure(cls, elements: Sequence[Element], labels: Labels) -> Heap:
-        """Measure elements."""
+        """Measure the elements of a heap."""
         rows = [
             (math.log(e.area) / 2, math.log(e.axes[0] / e.axes[1]), float(e.axes[2]), not any(e.touches))
             for e in elements
@@ -44,7 +50,7 @@ class Heap:
         return cls(elements, labels, np.array(rows, np.float64).reshape(-1, 4))
 
     def rank_takers(self, site: int, moves: Moves) -> list[tuple[Element, float, float, bool]]:
-        """Return the elements most like one, how they are turned and scaled to it, and whether any turn would do."""
+        """Return similar elements, their rotation and scale to fit a place, and whether any rotation fits."""
         side, long, angle, whole = self.measures.T
         angle = (angle[site] - angle + 90) % 180 - 90
         directed = np.minimum(long, long[site]) >= math.log(LONG)
@@ -60,7 +66,7 @@ class Heap:
     def take_place(
         self, site: int, moves: Moves, seed: int, tile: int
     ) -> tuple[Element, list[Operation], Placement] | None:
-        """Find an element that can lie where another one does, turned and scaled to its shape; None if none can."""
+        """Find an element that fits the place of another one when turned and scaled; return None if none fits."""
         place_of = self.elements[site]
         count = moves.count(1)
         if any(place_of.touches) or not (count and moves.options.translate):
@@ -77,7 +83,7 @@ class Heap:
             shift = np.round(place_of.centre - other.centre)
             operations += [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
             for attempt in range(TRIES if count > 1 else 1):
-                # What comes first does not change where it is brought to.
+                # These changes come first and keep the centre, so they do not alter the target place.
                 changed = [*moves.draw_changes(values, count - 1, 1 - attempt / TRIES), *operations]
                 placement = place(other, changed, self.labels.shape)
                 if placement is not None and self.fills(placement, place_of):
@@ -85,7 +91,7 @@ class Heap:
         return None
 
     def fills(self, placement: Placement, element: Element) -> bool:
-        """Whether what is placed has about the shape of an element, and covers it."""
+        """Return whether the placed element covers the element's place and has nearly the same shape."""
         shape, there = placement.distance > 0, self.labels[placement.window] == element.label
         both = np.count_nonzero(shape & there)
         return bool(both >= ALIKE * (np.count_nonzero(shape) + element.area - both))

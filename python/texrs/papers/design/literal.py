@@ -1,16 +1,20 @@
-"""DESIGN as printed: whole colour layers, each moved by the printed generator, once or more often (``method="paper"``).
+"""DESIGN as printed (``method="paper"``): the printed generator moves whole colour layers.
 
-Sections 3.3 and 3.4 of Shen, Jin, Mao and Feng 2006, with their misprints repaired:
+This implements sections 3.3 and 3.4 of Shen, Jin, Mao and Feng 2006, with their misprints repaired:
 
-- h(k), a real number, is floored before ``mod``: the worked example computes with integers;
-- starts that a fixed point absorbs are refused, and the ends of (0, 255), which are reachable, are let be;
-- e = xi n is clipped to the interval that the paper sets: m and n are one number, so with its u, v and xi S sees but n = 3,
-  or e = 0.39, and n = 7, or e = 0.91;
-- the second term of Eq. 3 is ``|C_i(v_t) - C_j(v_t)|``.
+- The real number h(k) is floored before ``mod``, because the worked example computes with integers.
 
-Where the paper is silent: l = n / u of half the shorter side, a = n / u of 90 degrees, everything about the centre of the
-image; sense and axis are the two lowest bits of h(k) div u, up and left where the lowest is 0. (Those of h(k) itself go
-with the operation: it is even for every T and odd for every R.)
+- Starts that end in a fixed point are refused. The ends of (0, 255) are reachable, and are allowed.
+
+- e = xi n is clipped to the interval of the paper. m and n come from one number. With the paper's u, v and xi, S
+  therefore only occurs with n = 3 (e = 0.39) and n = 7 (e = 0.91).
+
+- The second term of Eq. 3 is ``|C_i(v_t) - C_j(v_t)|``.
+
+The paper leaves some choices open. Here l = n / u of half the shorter side, and a = n / u of 90 degrees. Every
+operation is about the centre of the image. Sense and axis are the two lowest bits of h(k) div u; a lowest bit of 0
+means up and left. (The lowest bits of h(k) itself depend on the operation: h(k) is even for every T and odd for every
+R.)
 """
 
 from __future__ import annotations
@@ -34,7 +38,7 @@ __all__ = ["START", "choose_operation", "choose_start", "move_layers", "stitch_l
 START = 0.76234783
 """Start of the logistic map for the first tile (section 3.3)."""
 FARTHEST, WIDEST = 0.5, 90.0
-"""What u would stand for: translation as a share of the shorter side, rotation in degrees."""
+"""Extents for n = u: translation as a share of the shorter side, and rotation in degrees."""
 
 
 def choose_operation(value: float, side: int, options: DeformationOptions = DeformationOptions()) -> Operation:
@@ -43,16 +47,16 @@ def choose_operation(value: float, side: int, options: DeformationOptions = Defo
     Parameters
     ----------
     value : float
-        h(k), 0 to 255.
+        Value h(k), 0 to 255.
     side : int
         Shorter side of the exemplar, in pixels.
     options : DeformationOptions
-        ``u``, ``v``, ``xi`` and ``scale``.
+        Options; ``u``, ``v``, ``xi`` and ``scale`` are used.
 
     Returns
     -------
     Operation
-        Kind, extent and axis.
+        The kind, extent and axis.
 
     Examples
     --------
@@ -82,7 +86,7 @@ def move_layers(plan: Plan, seed: int, which: int, tile: int) -> Draft:
 
 
 def choose_start(start: float | None, growth_rate: float, seed: int, which: int, number: int) -> float:
-    """Return the start of the logistic map for a tile of an exemplar: the paper's for the first one, others by the seed."""
+    """Return the start of the logistic map for a tile: the paper's start for the first tile, a random one for others."""
     if (which, number) == (0, 0):
         return START if start is None else start
     for attempt in range(64):
@@ -98,25 +102,25 @@ def choose_start(start: float | None, growth_rate: float, seed: int, which: int,
 def stitch_layers(
     picture: Floats, layers: Labels, start: float, options: DeformationOptions = DeformationOptions()
 ) -> Draft:
-    """Move each layer by one operation, or several, and cut it into those before it, at the plain cost of Eq. 3.
+    """Move each layer, and cut it into the earlier layers at the plain cost of Eq. 3.
 
-    A layer that lies wholly over others is lost: nothing ties the minimum cut to it.
+    A layer that is wholly over others disappears, because no constraint connects the minimum cut to it.
 
     Parameters
     ----------
     picture : (H, W, C) float32
         The exemplar.
     layers : (H, W) int32
-        The layer of each pixel, from 0.
+        The layer number of each pixel, from 0.
     start : float
-        Of the logistic map (Eq. 2).
+        Start of the logistic map (Eq. 2).
     options : DeformationOptions
-        How many operations, and how they are chosen.
+        Number of operations, and the constants that choose them.
 
     Returns
     -------
     Draft
-        What is covered, and how.
+        The covered pixels, their colours, source positions and labels, and the operations.
 
     """
     shape = layers.shape
@@ -127,6 +131,7 @@ def stitch_layers(
     covered = np.zeros(shape, bool)
     made = Draft(np.zeros_like(picture), whole.coordinates.copy(), whole.label, covered, [], (False, False), [])
     centre, last = (np.array(shape) - 1) / 2, np.array(shape) - 1
+    # Draw each layer where its operations take it, about the centre of the image.
     for layer in range(count):
         chosen = [choose_operation(h, min(shape), options) for h in values[layer * each : (layer + 1) * each]]
         matrix, shift = np.eye(2), np.zeros(2)
@@ -135,12 +140,14 @@ def stitch_layers(
         inverse = np.asarray(np.linalg.inv(matrix), np.float64)
         places: Floats = (centre + (whole.coordinates - centre - shift) @ inverse.T).astype(np.float32)
         inside = np.all((places >= 0) & (places <= last), axis=-1)
+        # The layer covers a pixel if it covers more than half of its source position.
         mask = gather((layers == layer).astype(np.float32), places, interpolation="linear")
         offered: Bools = inside & (mask > 0.5)
         colours = gather(picture, places, interpolation="cubic")
         taken = offered
         if (offered & made.covered).any():
             taken = offered & cut(made.colours, colours, made.covered, offered, cost="paper").mask
+        # Where layers overlap, the cut decided which pixels the new layer takes.
         made.colours[taken] = colours[taken]
         made.coordinates[taken] = places[taken]
         made.label[taken] = layer

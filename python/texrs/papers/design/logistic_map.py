@@ -1,4 +1,4 @@
-"""The logistic map that chooses how elements are deformed: section 3.3, Eq. 2 of `texrs.papers.design`."""
+"""Logistic map that chooses how elements are deformed: section 3.3, Eq. 2 of `texrs.papers.design`."""
 
 from __future__ import annotations
 
@@ -14,33 +14,36 @@ from texrs.errors import InvalidInput
 __all__ = ["follow", "iterate"]
 
 LOOKED_AT, PERIODIC, STEADY = 64, 1.4, 3
-"""Iterates that are looked at; the growth rate up to which the map is periodic anyway; how many equal neighbours tell a fixed
-point."""
+"""Number of iterates that are checked for a fixed point.
+
+Growth rate up to which the map is periodic anyway. Number of equal neighbours that indicate a fixed point.
+"""
 
 
 def iterate(start: float, growth_rate: float = 2.0, count: int = 64, *, burn_in: int = 0) -> NDArray[np.float64]:
-    """Iterate the logistic map x <- 1 - growth_rate x^2 (Eq. 2), and return 255 |x| for ``count`` iterates.
+    """Iterate the logistic map x <- 1 - growth_rate x^2 (Eq. 2), and return 255 |x|.
 
     Parameters
     ----------
     start : float
         The first x, inside (-1, 1).
     growth_rate : float
-        The lambda of Eq. 2, 0 to 2.
+        The lambda of Eq. 2, 0 to 2. Default: 2.
     count : int
-        Number of iterates to return.
+        Number of iterates to return. Default: 64.
     burn_in : int
-        Number of iterates before the first that is returned.
+        Number of iterates before the first returned one. Default: 0.
 
     Returns
     -------
     (count,) float64
-        0 to 255.
+        Values from 0 to 255.
 
     Raises
     ------
     InvalidInput
-        A start outside (-1, 1), a growth rate outside [0, 2], or a start that is absorbed by a fixed point (0, 1/2, -1/2, ...).
+        The start is outside (-1, 1), or the growth rate is outside [0, 2]. Starts such as 0, 1/2 and -1/2, which end
+        in a fixed point, are refused also.
 
     Examples
     --------
@@ -52,7 +55,7 @@ def iterate(start: float, growth_rate: float = 2.0, count: int = 64, *, burn_in:
 
 
 def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Iterator[float]:
-    """Return what `iterate` does one by one, without an end; a bad start is refused at once.
+    """Return the values of `iterate` one by one, without an end. A bad start is refused at once.
 
     Examples
     --------
@@ -62,12 +65,12 @@ def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Itera
     """
     x, rate = as_float(start, "start", -1, 1), as_float(growth_rate, "growth_rate", 0, 2)
     if abs(x) == 1:
-        raise InvalidInput(f"start: needs a number inside (-1, 1), got {start!r}")
+        raise InvalidInput(f"start: must be inside (-1, 1), got {start!r}")
     sizes = (abs(x) for x in walk(x, rate))
     first = list(islice(sizes, LOOKED_AT))
     if rate > PERIODIC and sum(a == b for a, b in pairwise(first)) >= STEADY:
         raise InvalidInput(
-            f"start: the sequence is absorbed by a fixed point when it starts at {start!r}; take another start"
+            f"start: must not end in a fixed point of the logistic map, got {start!r}; take another start"
         )
     return (255 * size for size in islice(chain(first, sizes), burn_in, None))
 

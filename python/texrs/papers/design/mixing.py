@@ -1,9 +1,9 @@
-"""Several exemplars in one texture: territories with organic borders, cut along outlines.
+"""Mix several exemplars in one texture: territories with organic borders, cut along outlines.
 
-Each exemplar is stitched into a texture of the full size by itself, so nothing is left at a border that was made to fit
-something else. Which one shows is asked by a map, or by smooth fields of noise that are bent until every one has its share. A
-cut then moves the borders, by no more than about an element, to where they show least: along the outline of a thing of
-either side, which then lies on what the other side shows; through things nowhere.
+Each exemplar is stitched separately into a texture of the full size, so both sides of a border are complete textures.
+A map chooses which texture is visible, or smooth noise that is adjusted until every exemplar has its share. A cut then
+moves the borders by at most about an element to the least visible place. This is the outline of an element on either
+side, which then overlaps the other side. A border does not cross elements.
 """
 
 from __future__ import annotations
@@ -22,33 +22,47 @@ from texrs.source_map import SourceMap
 __all__ = ["Layer", "mix"]
 
 OUTLINE, DEEP = 0.03, 6.0
-"""What it costs to end a layer along the outline of a thing that stays whole, and in the midst of one; on plain ground, 1."""
+"""Cost of a border along the outline of an element that stays whole, and cost added in the middle of an element.
+
+A border on plain background costs 1.
+"""
 CREASE = 0.15
-"""What it costs along the strongest edges of the colours: where things lie in heaps nobody knows their outlines for sure."""
+"""Cost of a border along the strongest colour edges.
+
+It is low because the outlines of elements in heaps are uncertain, and colour edges often follow them.
+"""
 PULL = 0.5
-"""Cost of a pixel that is as far from where its exemplar is asked as is allowed; the cost grows with the square."""
+"""Cost of a pixel at the largest allowed distance from its requested place.
+
+The cost grows with the square of the distance.
+"""
 FORBIDDEN = 1e3
-"""Cost of a pixel that is farther away."""
+"""Cost of a pixel beyond the largest allowed distance."""
 ROUNDS, FREE, EXACT, STEP = 16, 8, 0.01, 0.05
-"""Times at most that costs of the exemplars are adapted until their shares are right, those after which borders are
-pulled twice as much each time (large pieces may change all at once, and shares with them), what shares may be off, of
-themselves, and by how much costs change at first for what they are off."""
+"""Maximum number of rounds that adapt the costs of the exemplars until their shares are right.
+
+Number of rounds after which the pull of the map doubles in each round, because large regions may change at once and
+shares with them. Allowed relative error of a share. Initial change of the costs for a given error.
+"""
 FINER, FAINTER = 2.5, 0.5
-"""How much finer than a territory the bends of its border are, and how much fainter."""
+"""Second noise of a border: how many times finer than a territory, and its relative amplitude."""
 KNOTS = 6
-"""Points of noise along a territory, of which a third are averaged: so its borders favour no axis."""
+"""Number of noise samples along a territory.
+
+They are smoothed over a third of this number, so that borders do not favour an axis.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """A texture of the full size, made of one exemplar."""
+    """A texture of the full size from one exemplar."""
 
     source: SourceMap
     colours: Floats
     depth: Floats
-    """How deep inside a thing each pixel is, 0 to 1, and 0 on the ground."""
+    """Depth of each pixel inside an element, 0 to 1; 0 on the background."""
     things: Bools
-    """What is no ground."""
+    """Pixels of elements."""
 
 
 def mix(
@@ -60,22 +74,22 @@ def mix(
     wrap: tuple[bool, bool],
     seed: int,
 ) -> SourceMap:
-    """Put layers together.
+    """Combine the textures of several exemplars into one.
 
     Parameters
     ----------
     layers : sequence of Layer
-        One an exemplar, all of one size.
+        One layer per exemplar, all of one size.
     shares : (n,) or (rows, columns, n) float64
-        Share of each, on the whole or place by place; they sum to 1.
+        Share of each exemplar in the whole texture, or in each pixel. Shares sum to 1.
     extent : float
-        Size of an element, in pixels: the farthest that a border may lie from where it is asked.
+        Size of an element, in pixels: the largest distance of a border from its requested place.
     territory : float
-        Size of the territories, in pixels, where the map leaves it open.
+        Size of the territories, in pixels, where the map gives several exemplars a share.
     wrap : (bool, bool)
-        Axes along which the texture is cyclic.
+        Axes along which the texture is periodic.
     seed : int
-        Chooses the territories.
+        Number that selects the territories.
 
     Returns
     -------
@@ -92,10 +106,10 @@ def mix(
 def draw_territories(
     shares: NDArray[np.float64], size: tuple[int, ...], territory: float, seed: int
 ) -> NDArray[np.uint16]:
-    """Return the exemplar that is asked at each pixel.
+    """Return the requested exemplar of each pixel.
 
-    The largest of the logarithms of the shares, each with noise of the distribution of Gumbel, is each with the probability
-    of its share; smooth noise makes territories of it.
+    If Gumbel noise is added to the logarithms of the shares, each exemplar has the largest sum with the probability of
+    its share. Smooth noise turns this choice into territories.
     """
     count = shares.shape[-1]
     if ((shares == 0) | (shares == 1)).all():
@@ -115,7 +129,7 @@ def draw_territories(
 
 
 def draw_noise(size: tuple[int, ...], grain: float, seed: tuple[int, int]) -> Floats:
-    """Return smooth cyclic noise, evenly distributed between 0 and 1 without its ends."""
+    """Return smooth periodic noise, uniformly distributed between 0 and 1, without 0 and 1 themselves."""
     from scipy.ndimage import gaussian_filter, zoom
     from scipy.special import ndtr
 
@@ -132,7 +146,7 @@ def draw_noise(size: tuple[int, ...], grain: float, seed: tuple[int, int]) -> Fl
 
 
 def measure_error(got: NDArray[np.float64], due: NDArray[np.float64]) -> float:
-    """Return by how much of itself the share that is farthest off is off."""
+    """Return the largest relative error of a share."""
     asked = due > 0
     return float((np.abs(got - due)[asked] / due[asked]).max())
 
@@ -140,10 +154,10 @@ def measure_error(got: NDArray[np.float64], due: NDArray[np.float64]) -> float:
 def cut_borders(
     layers: Sequence[Layer], wanted: NDArray[np.uint16], extent: float, wrap: tuple[bool, bool]
 ) -> NDArray[np.uint16]:
-    """Return the layer that shows at each pixel: as was asked, with borders where they show least, and in the shares asked.
+    """Return the visible layer of each pixel: near the requested one, with hidden borders and the requested shares.
 
-    A layer is cut into what shows, one after the other, each time by the minimum cut; what each costs is adapted
-    until the shares are right.
+    Each layer in turn is cut into the visible ones by a minimum cut. The cost of each layer is adapted until the
+    shares are right.
     """
     count, size = len(layers), wanted.size
     ends = [measure_ends(layer) for layer in layers]
@@ -156,9 +170,10 @@ def cut_borders(
         asked = price + step * found
         costs = np.where(far, FORBIDDEN, pull * squares + asked[:, np.newaxis, np.newaxis]).astype(np.float32)
         chosen = np.zeros(wanted.shape, np.uint16)
-        # With two layers the first cut is the best there is; of more, each has to be tried against all others.
+        # With two layers the first cut is optimal. With more layers, each layer is tried against all others.
         for which in range(1, count) if count == 2 else [*range(1, count), *range(count)]:
             chosen = cut_in(which, chosen, ends, costs, wrap)
+        # Keep the best round. If the error grows, try smaller changes of the costs.
         got = np.bincount(chosen.ravel(), minlength=count) / size
         error = measure_error(got, due)
         if error < off:
@@ -173,7 +188,7 @@ def cut_borders(
 
 
 def measure_ends(layer: Layer) -> NDArray[np.float32]:
-    """Return what it costs to end a layer between each pixel and the next, (axis, side that stays, rows, columns)."""
+    """Return the cost of ending a layer between each pixel and the next: (axis, side that stays, rows, columns)."""
     ends = np.empty((2, 2, *layer.depth.shape), np.float32)
     for axis in range(2):
         colours, depth = np.roll(layer.colours, -1, axis), np.roll(layer.depth, -1, axis)
@@ -187,7 +202,7 @@ def measure_ends(layer: Layer) -> NDArray[np.float32]:
 
 
 def measure_distance(asked: Bools, extent: float, wrap: tuple[bool, bool]) -> Floats:
-    """Return how far each pixel is from where something is asked, in extents; anything above 1 is far."""
+    """Return the distance of each pixel from the requested pixels, in extents; values above 1 are not exact."""
     from scipy.ndimage import distance_transform_edt
 
     if not asked.any():
@@ -205,7 +220,10 @@ def cut_in(
     costs: NDArray[np.float32],
     wrap: tuple[bool, bool],
 ) -> NDArray[np.uint16]:
-    """Cut a layer into what shows. A border is as good as the better of its sides: that one lies on the other."""
+    """Cut a layer into the visible ones.
+
+    A border costs the cheaper of its sides, because that side overlaps the other.
+    """
     kept = np.take_along_axis(costs, chosen[np.newaxis].astype(np.intp), axis=0)[0]
     unary = np.stack([np.where(chosen == which, np.float32(np.inf), kept), costs[which]], axis=-1)
     pairs = []

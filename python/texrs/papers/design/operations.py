@@ -1,4 +1,4 @@
-"""The operations on elements and their choice by the logistic map: section 3.3, Eq. 1 and 2 of `texrs.papers.design`."""
+"""Operations on elements, and their choice by the logistic map: section 3.3, Eq. 1 and 2 of `texrs.papers.design`."""
 
 from __future__ import annotations
 
@@ -27,12 +27,15 @@ class Operation:
 
     kind: str
     amount: float
-    """T: pixels. R: degrees, counter-clockwise on screen. S: factor. M: unused."""
+    """Translation in pixels, rotation in degrees (counter-clockwise on screen), or scale factor.
+
+    A mirror does not use it.
+    """
     axis: int
-    """T and M: 0 along rows, 1 along columns."""
+    """Axis of a translation or mirror: 0 along rows, 1 along columns."""
 
     def rows(self) -> Matrix:
-        """Return the linear part by its rows, (row, column) order."""
+        """Return the rows of the linear part, in (row, column) order."""
         match self.kind:
             case "R":
                 c, s = math.cos(math.radians(self.amount)), math.sin(math.radians(self.amount))
@@ -49,18 +52,18 @@ class Operation:
         return np.array(self.rows())
 
     def shift(self) -> NDArray[np.float64]:
-        """Return the translation, (row, column)."""
+        """Return the translation (row, column), in pixels."""
         return np.eye(2)[self.axis] * self.amount if self.kind == "T" else np.zeros(2)
 
     def describe(self) -> list[Any]:
-        """Return kind, extent and axis as the log tells them."""
+        """Return kind, extent and axis for the log."""
         return [self.kind, round(self.amount, 3), self.axis]
 
 
 def compose(operations: Sequence[Operation]) -> tuple[Matrix, tuple[float, float]]:
-    """Return the linear part of operations that are done one after the other, and their shift.
+    """Return the linear part and the shift of operations that are applied in sequence.
 
-    In plain numbers: of so few, arrays take ten times as long.
+    It uses plain numbers, because arrays take ten times as long for a few operations.
     """
     (a, b), (c, d) = (1.0, 0.0), (0.0, 1.0)
     shift = [0.0, 0.0]
@@ -74,39 +77,39 @@ def compose(operations: Sequence[Operation]) -> tuple[Matrix, tuple[float, float
 
 
 TRIES = 12
-"""Draws for an element."""
+"""Maximum number of draws for an element."""
 BURN_IN = 64
-"""Two starts that differ by 1e-8 give different sequences only after about 24 steps."""
+"""Number of iterates that are skipped. Two starts that differ by 1e-8 give different sequences after about 24 steps."""
 USUAL = 2
-"""Operations on an element, unless it is said how many."""
+"""Number of operations on an element if the options do not specify it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moves:
-    """What the elements of an exemplar may do: what is asked for, as far as the exemplar allows it."""
+    """Permitted operations on the elements of an exemplar: the options, limited by the properties of the exemplar."""
 
     options: DeformationOptions
     shifts: tuple[tuple[int, int], ...] = ()
-    """The only translations allowed, (row, column) in pixels, if there are any: those of a lattice."""
+    """Translations of a lattice, (row, column) in pixels. If there are any, other translations are not permitted."""
     axes: Flip = (True, True)
-    """Axes along which elements may be mirrored, if at all."""
+    """Axes along which elements may be mirrored, if mirroring is permitted."""
 
     @property
     def rotate(self) -> float:
-        """Largest rotation in degrees; 0 unless it is settled."""
+        """Largest rotation in degrees; 0 until it is decided."""
         return self.options.rotate or 0.0
 
     def mirror(self, axes: Flip) -> Moves:
-        """Return the moves in a mirror image of the exemplar: the shifts of its lattice are mirrored too."""
+        """Return the operations for a mirror image of the exemplar, where the shifts of its lattice are mirrored also."""
         shifts = tuple((-r if axes[0] else r, -c if axes[1] else c) for r, c in self.shifts)
         return replace(self, shifts=shifts)
 
     def count(self, usual: int = USUAL) -> int:
-        """Return how many operations an element takes."""
+        """Return the number of operations on an element."""
         return usual if self.options.operations is None else self.options.operations
 
     def draw_values(self, seed: int, tile: int, element: int, times: int = 1) -> Iterator[float]:
-        """Return the values of the logistic map for one element of one tile, enough to draw its operations so many times.
+        """Return enough values of the logistic map to draw an element's operations ``times`` times.
 
         Each element has a start of its own.
         """
@@ -116,7 +119,7 @@ class Moves:
         while True:
             start = 2 * uniform(seed, tile, element, attempt, 2) - 1
             if options.start is not None:
-                # The map parts starts that differ by 1e-8 within the burn-in.
+                # The burn-in separates starts that differ by 1e-8.
                 near = options.start * (1 - 1e-6 * (start + 1))
                 start = near if (tile, element) != (0, 1) or attempt else options.start
             try:
@@ -127,10 +130,11 @@ class Moves:
     def draw_operations(
         self, values: Iterator[float], touches: tuple[bool, bool], side: int, reach: float = 1.0
     ) -> list[Operation]:
-        """Choose the operations of one element: three values of the logistic map each, for kind, sense and axis, and extent.
+        """Choose the operations of one element, each by three values of the logistic map.
 
-        ``reach`` is the share of their extents that translations and rotations may have. ``touches`` says on which axes
-        the exemplar's border cuts the element: it then only slides along that border.
+        The values choose the kind, then sense and axis, then the extent. ``reach`` scales the extents of translations
+        and rotations, 0 to 1. ``touches`` is True for axes where the exemplar's border cuts the element. Such an
+        element only slides along that border.
         """
         if self.shifts and self.count():
             _, h2, h3 = next(values), next(values), next(values)
@@ -139,13 +143,13 @@ class Moves:
         return self._draw(["T", *self.changes], self.count(), values, touches, side, reach)
 
     def draw_changes(self, values: Iterator[float], count: int, reach: float) -> list[Operation]:
-        """Choose what else is done to an element that takes another one's place; ``reach`` is the share of its extents."""
+        """Choose further changes of an element that takes another's place, scaled by ``reach``, 0 to 1."""
         drawn = self._draw(self.changes, count, values, (False, False), 0, reach) if self.changes else []
         return [replace(o, amount=1 + reach * (o.amount - 1)) if o.kind == "S" else o for o in drawn]
 
     @property
     def changes(self) -> list[str]:
-        """The kinds of operations that are allowed, but translations."""
+        """The permitted kinds of operations, except translations."""
         options = self.options
         allowed = {
             "R": self.rotate > 0,

@@ -1,4 +1,4 @@
-"""How `texrs.design` deforms elements: what a user may choose."""
+"""Options of `texrs.design` that control how elements are deformed."""
 
 from __future__ import annotations
 
@@ -14,44 +14,49 @@ __all__ = ["DeformationOptions"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeformationOptions:
-    """How the elements of an exemplar are deformed (section 3.3 of the paper).
+    """Options that control how the elements of an exemplar are deformed (section 3.3 of the paper).
 
     Attributes
     ----------
     operations : int, optional
-        Deformations that are combined on each element, one after the other, 0 to 8. By default 2, and 1 in heaps and as
-        printed. In a heap the first one takes another element's place, turned and scaled to its shape, and others turn,
-        mirror and scale it as far as it still fills that. On a lattice and where no separate elements are found there is one,
-        a move from place to place: all else shows. The report says which it is, ``report["arrangement"]``.
+        Number of deformations that are applied in sequence to each element, 0 to 8. By default 2, and 1 in heaps or in
+        the printed algorithm. The first deformation in a heap puts the element into the place of another, turned and
+        scaled to its shape. Further ones turn, mirror and scale the element as long as it fills that place. On a
+        lattice, and without separate elements, the only deformation is a move from place to place, because others
+        would be visible. ``report["arrangement"]`` contains the arrangement that was found.
     translate : float
-        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. In a heap and on a lattice elements go as
-        far as the next place that fits, unless this is 0.
+        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. Elements of heaps and lattices go to
+        the next place that fits, unless this is 0. Default: 0.12.
     rotate : float, optional
-        Largest rotation in degrees, 0 to 180; 0 for textures lit from one side or with letters. By default 60, but 0
-        where the example has directions of its own (bark, brickwork), no separate elements, or a lattice.
+        Largest rotation in degrees, 0 to 180. Use 0 for textures with light from one side or with letters. Default:
+        60, but 0 if the example has directions of its own (bark, brickwork), no separate elements, or a lattice.
     scale : (float, float)
-        Least and largest scaling, within 0.5 to 2.
+        Least and largest scale factor, within 0.5 to 2. Default: 0.8 to 1.2.
     allow_mirror : bool, optional
-        Whether elements, backgrounds and patches may be mirrored; False for lettered textures, True for both axes whatever
-        they show. By default along those axes where nothing tells the example from its mirror image, as light from one side
-        or a slant does; along none where ``rotate=0`` is given, which says that the example has an upper side.
+        If True, elements, backgrounds and patches may be mirrored along both axes. If False, as for letters, they are
+        not mirrored. By default mirroring depends on the example: an axis is excluded if light or a slant shows its
+        direction. With ``rotate=0`` the default is False, because the example then has an upper side.
     start : float, optional
-        Start of the logistic map (Eq. 2), within (-1, 1); the seed draws one for each element by default.
+        Start of the logistic map (Eq. 2), within (-1, 1). Default: drawn from the seed for each element.
     growth_rate : float
-        The lambda of the logistic map (Eq. 2), 0 to 2; below about 1.4 its sequence is periodic.
+        Growth rate of the logistic map (lambda in Eq. 2), 0 to 2. Below about 1.4 the sequence is periodic. Default:
+        2.
     u : int
-        Divisor of a value h of the logistic map, 1 to 256. The operation is mod(mod(h, u), v). As printed the extent is
-        n = mod(h, u) as well, so the larger u the finer are the extents; by default it is another value's.
+        Divisor of a value h of the logistic map, 1 to 256. The operation is mod(mod(h, u), v). The extent of the
+        printed algorithm is n = mod(h, u), so a larger u gives finer extents. Otherwise the extent comes from another
+        value of the map. Default: 10.
     v : int
-        Number of operations to choose from, 1 to 4: translation, rotation, mirror and scale, in this order.
+        Number of operations to choose from, 1 to 4: translation, rotation, mirror and scale, in this order. Default:
+        4.
     xi : float
-        As printed, what n is multiplied by for the scaling extent e, 0.001 to 2; it is brought within ``scale``. By default
-        extents are drawn within ``scale`` evenly.
+        Factor of n that gives the scaling extent e in the printed algorithm, 0.001 to 2. The extent is limited to
+        ``scale``. Otherwise extents are drawn uniformly within ``scale``. Default: 0.13.
 
     Raises
     ------
     InvalidInput
-        A field of another type or out of range, or a start that the logistic map does not leave; the message names it.
+        A field has the wrong type or is out of range, or the logistic map does not leave the start. The message names
+        the field.
 
     Examples
     --------
@@ -73,10 +78,10 @@ class DeformationOptions:
 
     def __post_init__(self) -> None:
         if not isinstance(self.scale, Sequence) or isinstance(self.scale, str) or len(self.scale) != 2:
-            raise InvalidInput(f"scale: needs (least, largest), got {self.scale!r}")
+            raise InvalidInput(f"scale: must be (least, largest), got {self.scale!r}")
         low, high = (as_float(s, "scale", 0.5, 2) for s in self.scale)
         if low > high:
-            raise InvalidInput(f"scale: the least comes first, got {self.scale!r}")
+            raise InvalidInput(f"scale: must have the least factor first, got {self.scale!r}")
         values: dict[str, object] = {
             "operations": None if self.operations is None else as_int(self.operations, "operations", 0, 8),
             "translate": as_float(self.translate, "translate", 0, 0.5),

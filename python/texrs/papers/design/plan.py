@@ -1,4 +1,4 @@
-"""What the options of `texrs.design` decide of an exemplar: its elements, how they may move, and what holes are filled from."""
+"""Decisions of `texrs.design` about an exemplar: its elements, their permitted moves, and the patches that fill holes."""
 
 from __future__ import annotations
 
@@ -20,53 +20,53 @@ from texrs.papers.design.options import DeformationOptions
 __all__ = ["Plan", "make_plan"]
 
 ROTATE, DIRECTED = 60.0, 0.25
-"""Largest rotation by default, in degrees, and the anisotropy from which on nothing is turned."""
+"""Largest rotation by default, in degrees, and anisotropy above which elements are not turned."""
 BACKGROUND_PLACES = 64
-"""Places for a patch of pure background from which on holes are filled with background alone."""
+"""Least number of places for a patch of pure background, if holes are filled with background only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """An exemplar, analysed: made once, and used by all tiles of all textures."""
+    """An analysed exemplar, built once and used by all tiles of all textures."""
 
     guide: Floats
     parts: Segmentation
     index: PatchIndex
-    """What holes are filled from, in each of the mirror images."""
+    """Patches that fill holes, in each of the mirror images."""
     mirrors: tuple[Flip, ...]
-    """The mirror images that may be used."""
+    """Permitted mirror images."""
     moves: Moves
     side: int
-    """Of a patch that fills holes, in pixels."""
+    """Side of a patch that fills holes, in pixels."""
     literal: bool
-    """Whether the paper is followed as printed."""
+    """If True, the paper is followed as printed."""
     pure: bool
-    """Whether holes are filled with background alone."""
+    """If True, holes are filled with background only."""
     still: bool = False
-    """Whether elements stay where they are, so that variety comes from the patches alone."""
+    """If True, elements stay in place, so that only patches give variety."""
     tried: Mapping[str, Mapping[str, float]] | None = None
-    """How each plan was judged that was tried, if any."""
+    """Scores of each plan that was tried, or None."""
     tiles: Sequence[Tile] = ()
-    """The first tiles of the trial's seed, if they were just made."""
+    """First tiles of the trial's seed, if the trial has just computed them."""
 
 
 def make_plan(
     exemplar: Exemplar, parts: Segmentation, options: DeformationOptions, *, side: int | None, literal: bool = False
 ) -> Plan:
-    """Settle what depends on the exemplar: mirrors, rotations, the side of a patch, and what holes are filled from.
+    """Decide mirrors, rotations, patch side and the source of holes for an exemplar.
 
     Parameters
     ----------
     exemplar : Exemplar
-        A picture.
+        The example as an image.
     parts : Segmentation
         Its elements.
     options : DeformationOptions
-        What is asked for.
+        Options of the deformation.
     side : int, optional
-        Of a patch, in pixels; by default about the size of an element.
+        Side of a patch, in pixels. By default a sixth of the exemplar's shorter side, 12 to 32.
     literal : bool
-        Whether the paper is followed as printed.
+        If True, the paper is followed as printed. Default: False.
 
     """
     if literal:
@@ -80,9 +80,9 @@ def make_plan(
 
 
 def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Flip, ...]:
-    """Return the mirror images that may be used: those asked for, else those that nothing tells from the exemplar."""
+    """Return the permitted mirror images: the requested ones, else those that look like the exemplar."""
     if options.allow_mirror is None:
-        # Who forbids turning knows of an upper side, light or letters, that the statistics may not show.
+        # A user who forbids rotation knows of an upper side, light or letters, which the statistics may miss.
         return (NONE,) if options.rotate == 0 else exemplar.mirror_symmetries
     return ALL if options.allow_mirror else (NONE,)
 
@@ -90,14 +90,14 @@ def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Fli
 def settle_moves(
     exemplar: Exemplar, parts: Segmentation, options: DeformationOptions, mirrors: Sequence[Flip]
 ) -> Moves:
-    """Return what elements may do: on a lattice nothing but move along it, and with directions of their own not turn."""
+    """Return the permitted operations: only lattice moves on a lattice, and no rotation of examples with directions."""
     axes = ((True, False) in mirrors, (False, True) in mirrors)
     if parts.lattice:
         shifts = parts.lattice.shifts(options.translate * min(exemplar.shape)) if options.translate else []
         return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), allow_mirror=False), tuple(shifts), axes)
     if parts.kind == "grid":
-        # Cells are no elements: turned or scaled they would show their outline, and mirrored they would meet the mirror
-        # image of what they show.
+        # Cells are not elements. A turned or scaled cell would show its outline, and a mirrored cell would meet the
+        # mirror image of its content.
         return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), allow_mirror=False), (), axes)
     if options.rotate is None:
         options = replace(options, rotate=ROTATE if exemplar.anisotropy < DIRECTED else 0.0)
@@ -105,7 +105,7 @@ def settle_moves(
 
 
 def mark_background(parts: Segmentation, side: int) -> Bools | None:
-    """Mark the background, if there is enough of it to fill holes with it alone."""
+    """Return the background, if it is large enough to fill holes with background only."""
     free = parts.elements == 0
     found = parts.kind in ("components", "labels") and np.count_nonzero(mark_corners(free, side)) >= BACKGROUND_PLACES
     return free if found else None

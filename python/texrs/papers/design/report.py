@@ -1,4 +1,4 @@
-"""What is shown and said of a texture: pictures of the stages, and the report."""
+"""Images of the stages, and the report of a texture."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ __all__ = ["describe", "draw_stages"]
 
 
 def draw_stages(plan: Plan, tile: Tile, picture: Array) -> dict[str, Array]:
-    """Return pictures of the stages, in their order."""
+    """Return images of the stages, in their order."""
     return {"segmentation": draw_elements(plan), **tile.stages, "before_blending": picture}
 
 
 TINT = 0.55
-"""Share of an element's own colour where the exemplar is seen through it."""
+"""Share of an element's colour where it covers the exemplar in the image of the segmentation."""
 
 
 def draw_elements(plan: Plan) -> Array:
-    """Return the exemplar with its elements in a colour each, between white lines."""
+    """Return the exemplar with each element in a colour, between white lines."""
     seen, elements = as_rgb(plan.guide), plan.parts.elements
     tinted = (1 - TINT) * seen + TINT / 255 * label_to_color(elements)
     picture = np.where(elements[..., np.newaxis] > 0, tinted, seen)
@@ -49,7 +49,7 @@ def describe(
     arguments: Arguments,
     seed: int,
 ) -> dict[str, Any]:
-    """Return the report of a texture: JSON types only."""
+    """Return the report of a texture, with JSON types only."""
     first = plans[0]
     return {
         "method": "paper" if arguments.literal else "default",
@@ -75,7 +75,7 @@ def describe(
 
 
 def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | None:
-    """Return by what linear map of (row, column) an exemplar is stretched for its lattice to close, if it is."""
+    """Return the matrix, (row, column), that stretches an exemplar so that its lattice closes, or None."""
     closing = None
     if plan.parts.lattice is not None and any(arguments.wrap):
         closing = plan.parts.lattice.close(arguments.size, arguments.wrap)
@@ -83,13 +83,13 @@ def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | No
 
 
 def describe_courses(plan: Plan) -> dict[str, Any] | None:
-    """Return the courses that an exemplar is laid in, if it is."""
+    """Return the courses of an exemplar that is laid in courses, or None."""
     courses = plan.parts.courses if plan.still else None
     return None if courses is None else asdict(courses)
 
 
 def describe_density(plans: Sequence[Plan], composite: SourceMap, density: NDArray[np.float64]) -> list[dict[str, Any]]:
-    """Return of each exemplar that was scattered what was asked and reached, what it has itself, and the number of things."""
+    """Return the requested, reached and own density of each scattered exemplar, and its number of elements."""
     asked = density.reshape(-1, len(plans) - 1).mean(axis=0)
     return [
         {

@@ -1,9 +1,10 @@
-"""Things of some exemplars scattered over another one, as sparse or dense as asked: flowers over leaves over moss.
+"""Scatter elements of some exemplars over another one at a requested density: flowers over leaves over moss.
 
-A departure from Figure 7 of the paper, which deals the whole of the exemplars out. Each thing is shown whole, turned, mirrored
-and scaled as the elements of its exemplar may be, and of its surroundings nothing comes along. Layers lie upon each other in
-the order of the exemplars. They are laid from the top: what is there already lies above, and is never cut. Things of one layer
-keep apart; only where those of its exemplar lie in a heap, and no more find room, they cover each other in part.
+A departure from Figure 7 of the paper, which distributes whole exemplars. Each element is visible whole, and is
+turned, mirrored and scaled like the elements of its exemplar, without its surroundings. Layers overlap in the order of
+the exemplars. They are laid from the top, so an element that was laid earlier is above later ones and is never cut.
+Elements of one layer do not touch. They overlap in part only if they form a heap in their exemplar, and when free
+places run out.
 """
 
 from __future__ import annotations
@@ -27,35 +28,50 @@ from texrs.source_map import SourceMap
 __all__ = ["find_things", "scatter"]
 
 SMALL, LARGE = 0.3, 4.0
-"""Least and largest area of a thing, in usual ones: splinters, and clumps of which none was parted."""
+"""Least and largest area of an element, relative to the median.
+
+Smaller ones are splinters, larger ones are clumps of elements that were not separated.
+"""
 EDGE = 0.75
-"""Depth in pixels from which on a pixel is of the thing alone: on its outline it is mixed with what lies behind."""
+"""Depth in pixels beyond which a pixel belongs only to the element.
+
+Closer to the outline its colour is mixed with the background.
+"""
 GAP = 1.5
-"""Pixels by which things keep apart."""
+"""Least gap between elements, in pixels."""
 SEEN, SEEN_BELOW = 0.65, 0.45
-"""Share of a thing that others of its heap must leave uncovered, and that all that lies above it must."""
+"""Least visible share of an element below others of its own heap, and below all elements above it."""
 CRUMB = 0.08
-"""Share of a thing below which a piece that others leave of it is not shown."""
+"""Least share of an element for a visible piece. Smaller pieces are not shown."""
 TRIES, PATIENCE = 24, 80
-"""Places that are tried for a thing, and things that are drawn in vain before a layer counts as full; in a heap they lie upon
-each other after half as many."""
+"""Number of places that are tried for an element, and number of failed elements in a row after which a layer is full.
+
+Elements of a heap may overlap after half of these failures.
+"""
 CLUSTER, UNEVEN = 4.0, 0.5
-"""Size of clusters in things, and by how much their density differs from the mean, where no map is given."""
+"""Size of clusters in element sizes, and relative variation of the density between them. Both are used without a map.
+"""
 CELLS, AROUND, ROUNDS = 0.5, 2.5, 64
-"""Size in things of the cells in which density is measured, how far around each (where few lie, there is always room between
-two), and how often it is at least."""
+"""Size of the cells that measure density, and averaging distance of the lack, both in element sizes.
+
+The averages include gaps, because there is always room between two elements of a sparse layer.
+
+Least number of measurements.
+"""
 EXACT, LAST, FITTED = 0.01, 2.0, 12
-"""What a density may be off, of itself; what is left, in things, from which on the next is chosen by its size, and from how
-many."""
+"""Allowed relative error of a density.
+
+Remaining area, in element areas, below which the next element is chosen by its size. Number of candidates for it.
+"""
 
 
 def find_things(plan: Plan, number: int) -> list[Element]:
-    """Return the elements of an exemplar that can be scattered: whole ones, neither splinters nor clumps.
+    """Return the elements that can be scattered: whole ones, neither splinters nor clumps.
 
     Raises
     ------
     InvalidInput
-        There are none.
+        The exemplar does not have such elements.
 
     """
     found: list[Element] = []
@@ -65,39 +81,39 @@ def find_things(plan: Plan, number: int) -> list[Element]:
         found = [e for e in whole if SMALL * usual <= e.area <= LARGE * usual and e.distance.max() > 2 * EDGE]
     if not found:
         raise InvalidInput(
-            f"density: of exemplar {number} no separate things are found ({plan.parts.reason}); mix it by weights, "
-            "or say by elements where its things are"
+            f"density: must have separate elements in exemplar {number}, but none are found ({plan.parts.reason}); "
+            "mix it by weights, or mark its elements with the argument elements"
         )
     return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stamp:
-    """A thing as it is to be shown, around its centre."""
+    """A turned, mirrored and scaled element, with pixels around its centre."""
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
-    """Pixels, from the centre."""
+    """Pixel positions, relative to the centre."""
     coordinates: Floats
-    """Where they come from."""
+    """Source positions of the pixels."""
     inner: Bools
-    """Which of them are the thing, the others being the gap around it."""
+    """Pixels of the element; the others are the gap around it."""
     frame: NDArray[np.float64]
 
     @property
     def area(self) -> int:
-        """Pixels of the thing."""
+        """Number of pixels of the element."""
         return int(np.count_nonzero(self.inner))
 
 
 def cut_out(element: Element, moves: Moves, shape: tuple[int, int], seed: int, which: int, number: int) -> Stamp:
-    """Turn, mirror and scale a thing as the logistic map chooses."""
+    """Turn, mirror and scale an element as the logistic map chooses."""
     values = moves.draw_values(seed, which, number)
     matrix = np.eye(2)
     for operation in moves.draw_changes(values, moves.count(), 1.0):
         matrix = operation.matrix() @ matrix
     inverse = np.asarray(np.linalg.inv(matrix), np.float64)
-    # A whole centre: what is not changed copies samples.
+    # The centre is rounded, so that an unchanged element copies pixels exactly.
     centre = np.round(element.centre)
     low, high = element.origin - centre, element.origin + np.array(element.distance.shape) - 1 - centre
     corners = np.array([[low[0], low[1]], [low[0], high[1]], [high[0], low[1]], [high[0], high[1]]]) @ matrix.T
@@ -114,18 +130,18 @@ def cut_out(element: Element, moves: Moves, shape: tuple[int, int], seed: int, w
 
 @dataclass(slots=True, eq=False)
 class Sheet:
-    """The texture in the making."""
+    """The texture in progress."""
 
     coordinates: Floats
     exemplar: NDArray[np.uint16]
     label: NDArray[np.uint32]
     layer: NDArray[np.int32]
-    """The exemplar of the thing that lies at each pixel, 0 where none does."""
+    """Exemplar number of the element at each pixel, 0 without an element."""
     frames: list[NDArray[np.float64]]
     wrap: tuple[bool, bool]
 
     def look(self, stamp: Stamp, row: int, column: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Bools]:
-        """Return the pixels that a stamp comes to lie on, and which of them the texture has."""
+        """Return the pixels below a stamp, and which of them are inside the texture."""
         height, width = self.layer.shape
         rows, columns = stamp.rows + row, stamp.columns + column
         there = np.ones(len(rows), bool)
@@ -135,7 +151,7 @@ class Sheet:
         return rows % height, columns % width, there
 
     def fit(self, stamp: Stamp, row: int, column: int, which: int, *, apart: bool) -> NDArray[np.intp] | None:
-        """Return the pixels of a stamp that are seen there, or None where it does not fit."""
+        """Return the visible pixels of a stamp at a place, or None if it does not fit there."""
         if np.ptp(stamp.rows) >= self.layer.shape[0] or np.ptp(stamp.columns) >= self.layer.shape[1]:
             return None
         rows, columns, there = self.look(stamp, row, column)
@@ -155,7 +171,7 @@ class Sheet:
     def lay(
         self, stamp: Stamp, row: int, column: int, which: int, seen: NDArray[np.intp]
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Lay a stamp below what is there, and return the pixels that it is seen on."""
+        """Lay a stamp below the elements that are there, and return its visible pixels."""
         rows, columns, _ = self.look(stamp, row, column)
         at = rows[seen], columns[seen]
         self.coordinates[at] = stamp.coordinates[seen]
@@ -166,7 +182,7 @@ class Sheet:
 
 
 def drop_crumbs(stamp: Stamp, seen: Bools, least: float) -> NDArray[np.intp]:
-    """Return what is seen of a stamp without small pieces."""
+    """Return the visible pixels of a stamp without small pieces."""
     from scipy.ndimage import label
 
     rows, columns = stamp.rows - stamp.rows.min(), stamp.columns - stamp.columns.min()
@@ -181,20 +197,20 @@ def drop_crumbs(stamp: Stamp, seen: Bools, least: float) -> NDArray[np.intp]:
 def scatter(
     ground: SourceMap, plans: Sequence[Plan], density: NDArray[np.float64], *, wrap: tuple[bool, bool], seed: int
 ) -> SourceMap:
-    """Scatter the things of all exemplars but the first over a texture of the first.
+    """Scatter the elements of all exemplars after the first over a texture of the first.
 
     Parameters
     ----------
     ground : SourceMap
         A texture of the first exemplar.
     plans : sequence of Plan
-        The exemplars, their things, and how these may be changed.
+        The exemplars, their elements, and the permitted changes of these.
     density : (n - 1,) or (rows, columns, n - 1) float64
-        Share of the area that things of each are to be seen on, on the whole or place by place.
+        Share of the area that the visible elements of each exemplar cover in the whole texture, or around each pixel.
     wrap : (bool, bool)
-        Axes along which the texture is cyclic.
+        Axes along which the texture is periodic.
     seed : int
-        Chooses the things and their places.
+        Number that selects the elements and their places.
 
     Returns
     -------
@@ -213,7 +229,7 @@ def scatter(
 
 
 def scatter_layer(sheet: Sheet, plan: Plan, which: int, density: NDArray[np.float64], seed: int) -> None:
-    """Scatter the things of one exemplar below those that lie there, until they are seen on as much of the area as asked."""
+    """Scatter the elements of one exemplar below those that are there, until they reach their density."""
     shape = plan.guide.shape[0], plan.guide.shape[1]
     due = float(np.mean(density)) * sheet.layer.size
     things = find_things(plan, which)
@@ -226,9 +242,10 @@ def scatter_layer(sheet: Sheet, plan: Plan, which: int, density: NDArray[np.floa
     usual = float(np.mean([e.area for e in things]))
     every = max(1, int(due / usual / ROUNDS))
     covered, number, vain = 0, 0, 0
+    # Lay one element per round, until the area is covered or too many elements in a row found no place.
     while covered < (1 - EXACT) * due and vain < PATIENCE:
         left = due - covered
-        # The last one is as large as what is left.
+        # The last element is chosen by size, so that it covers the remaining area.
         drawn = [cut_out(things[int(rng.integers(len(things)))], plan.moves, shape, seed, which, number)]
         if left < LAST * usual:
             for thing in rng.permutation(len(things))[:FITTED]:
@@ -238,6 +255,7 @@ def scatter_layer(sheet: Sheet, plan: Plan, which: int, density: NDArray[np.floa
         stamp = drawn[0] if len(drawn) == 1 else min(drawn, key=lambda s: abs(s.area - left))
         if number % every == 0:
             room.measure_lack()
+        # Try places where the density is still too low.
         for row, column in room.draw(rng, TRIES):
             seen = sheet.fit(stamp, row, column, which, apart=not heap or vain < PATIENCE // 2)
             if seen is not None and len(seen) <= left + EXACT * due:
@@ -251,21 +269,21 @@ def scatter_layer(sheet: Sheet, plan: Plan, which: int, density: NDArray[np.floa
 
 @dataclass(slots=True, eq=False)
 class Room:
-    """Where more things are wanted, in cells."""
+    """Places where more elements are needed, in cells."""
 
     side: int
     size: tuple[int, ...]
     mode: list[str]
     wanted: NDArray[np.float64]
-    """Pixels of things that each cell still lacks."""
+    """Number of element pixels that each cell still lacks."""
     free: NDArray[np.float64]
-    """Pixels that nothing lies on."""
+    """Number of free pixels of each cell."""
     lack: NDArray[np.float64]
-    """What is wanted around each cell, summed up over the cells in their order."""
+    """Cumulative sum, over the cells in order, of the lack around each cell."""
 
     @classmethod
     def measure(cls, density: NDArray[np.float64], sheet: Sheet, extent: float, seed: tuple[int, int]) -> Room:
-        """Measure where things are wanted; without a map in loose clusters, as they grow."""
+        """Measure where elements are needed; without a map they form loose clusters, as plants do."""
         side, size = max(2, round(CELLS * extent)), sheet.layer.shape
         if density.ndim == 0:
             noise = draw_noise(size, min(CLUSTER * extent, min(size) / 2), seed).astype(np.float64)
@@ -275,23 +293,23 @@ class Room:
         return cls(side, size, mode, np.where(wanted > 0, wanted, -np.inf), free, np.cumsum(wanted))
 
     def fill(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> None:
-        """Note the pixels that a thing has come to lie on."""
+        """Subtract the pixels that a new element covers."""
         for cells in (self.wanted, self.free):
             np.subtract.at(cells, (rows // self.side, columns // self.side), 1)
 
     def measure_lack(self) -> None:
-        """Measure how many are wanted around each cell."""
+        """Measure how many element pixels are lacking around each cell."""
         from scipy.ndimage import gaussian_filter
 
-        # Not where none were asked at all, nor where others hide what lies there.
+        # Exclude cells where elements were not requested, and cells that elements above cover.
         open_ = np.isfinite(self.wanted) & (self.free > 0)
         lack = gaussian_filter(np.where(np.isfinite(self.wanted), self.wanted, 0), AROUND / CELLS, mode=self.mode)
-        # Where too few find room, what others still lack must not come to lie where nothing is wanted any more.
+        # If other cells are too full to be completed, their elements must not go to cells that lack none.
         wanting = np.where(open_, np.maximum(lack, 0), 0)
         self.lack = np.cumsum(wanting if wanting.any() else open_.astype(np.float64))
 
     def draw(self, rng: np.random.Generator, count: int) -> list[tuple[int, int]]:
-        """Draw pixels, each with the probability of what is wanted around it."""
+        """Draw pixels with a probability proportional to the lack around them."""
         at = np.searchsorted(self.lack, rng.random(count) * self.lack[-1], side="right")
         cells = np.stack(np.unravel_index(np.minimum(at, self.lack.size - 1), self.wanted.shape), axis=-1)
         places = ((cells + rng.random((count, 2))) * self.side).astype(np.intp)
@@ -300,6 +318,6 @@ class Room:
 
 
 def sum_cells(values: NDArray[np.float64], side: int) -> NDArray[np.float64]:
-    """Return the sums over cells of so many pixels a side; those at the ends may be smaller."""
+    """Return sums over cells of ``side`` pixels; the last cells may be smaller."""
     rows = np.add.reduceat(values, np.arange(0, values.shape[0], side), axis=0)
     return np.asarray(np.add.reduceat(rows, np.arange(0, values.shape[1], side), axis=1), np.float64)

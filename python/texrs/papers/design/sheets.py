@@ -1,7 +1,7 @@
-"""Sheets: an exemplar that lies in courses, laid anew as tall as the texture, course by course.
+"""Lay an exemplar in courses again, course by course, as tall as the texture. The results are called sheets.
 
-A departure from the paper, which knows no walls. The sheets of a texture have their joints at the same places, so that its
-patches, which keep their places across the courses and are free along them, meet joint to joint wherever they come from.
+A departure from the paper, which does not treat walls. All sheets of a texture have their joints at the same places.
+Patches keep their places across the courses and are free along them, so their joints always meet.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from texrs.source_map import SourceMap
 __all__ = ["lay_sheets", "measure_stones"]
 
 TRIES = 64
-"""Orders of courses that are drawn for a cyclic texture; the one is taken that must be stretched the least."""
+"""Number of orders of courses that are drawn for a periodic texture. The order that must be stretched least is taken.
+"""
 ALIKE = 0.16
-"""Courses stand for each other whose heights differ by no more, as a share."""
+"""Largest relative difference in height of two courses that may replace each other."""
 
 
 def lay_sheets(
@@ -41,33 +42,34 @@ def lay_sheets(
     Parameters
     ----------
     courses : Courses
-        Of the exemplar.
+        Courses of the exemplar.
     shape : (rows, columns)
-        Of the exemplar, once it is level.
+        Shape of the levelled exemplar.
     size : int
-        Of the texture across the courses, in pixels.
+        Size of the texture across the courses, in pixels.
     beyond : int
-        Pixels by which sheets go on beyond that; where it wraps, as they begin.
+        Additional pixels of sheets beyond ``size``. If the texture wraps, they repeat the beginning there.
     count : int
         Number of sheets.
     wrap : bool
-        Whether the texture goes around across the courses.
+        If True, the texture wraps across the courses.
     mirror : bool
-        Whether every other sheet is mirrored along the courses.
+        If True, every other sheet is mirrored along the courses.
     seed : int
-        Chooses the courses.
+        Number that selects the courses.
 
     Returns
     -------
     list of SourceMap
-        Into the exemplar, once it is level; as long as that along the courses.
+        Source maps into the levelled exemplar, as long as it along the courses.
 
     """
     axis = courses.axis
     order = order_courses(courses.heights, size, wrap, seed)
     heights = courses.heights[order]
-    # What does not go around begins anywhere in its first course.
+    # A texture that does not wrap begins at a random height of its first course.
     ends = np.concatenate([[0.0], np.cumsum(heights * (size / heights.sum() if wrap else 1.0))])
+    # Find for each row of the texture its course, and its relative height within this course.
     rows = np.arange(size + beyond) + 0.5
     rows = rows % size if wrap else rows + uniform(seed, 0, 0, 1, 7) * heights[0]
     laid = np.minimum(np.searchsorted(ends, rows, side="right") - 1, len(order) - 1)
@@ -75,6 +77,7 @@ def lay_sheets(
     length = shape[1 - axis]
     sheets = []
     for sheet in range(count):
+        # Each sheet shows other courses at the same heights.
         taken = exchange_courses(courses.heights, order, sheet, seed)
         across = np.array(courses.joints)[taken[laid]] + share * courses.heights[taken[laid]]
         along = np.arange(length, dtype=np.float64)
@@ -91,10 +94,10 @@ def lay_sheets(
 
 
 def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int) -> NDArray[np.intp]:
-    """Return which courses lie on top of each other: as in the exemplar, and on from anywhere where that ends."""
+    """Return the order of courses: as in the exemplar, and from its end on at a random course."""
     found: list[tuple[float, list[int]]] = []
     for attempt in range(TRIES if wrap else 1):
-        # What begins within a course needs one more.
+        # A texture that begins within a course needs one more.
         order: list[int] = []
         missing = size if wrap else size + heights.max() + 1
         at = int(uniform(seed, attempt, 0, 0, 7) * len(heights))
@@ -111,7 +114,7 @@ def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int
 def exchange_courses(
     heights: NDArray[np.float64], order: Sequence[int] | NDArray[np.intp], sheet: int, seed: int
 ) -> NDArray[np.intp]:
-    """Return the courses that stand for others in a sheet: of those as tall another one in each sheet, none next to itself."""
+    """Return the courses of a sheet: each is replaced by one of equal height, and equal ones are not adjacent."""
     taken: list[int] = []
     for place, own in enumerate(order):
         alike = np.flatnonzero(np.abs(np.log(heights / heights[own])) <= ALIKE).tolist()
@@ -123,9 +126,9 @@ def exchange_courses(
 
 
 def measure_stones(courses: Courses, level: Floats, reach: float) -> Floats:
-    """Return how deep inside a stone each pixel of a level exemplar is: 0 at joints, 1 from ``reach`` pixels on.
+    """Return the depth of each pixel of a level exemplar inside a stone: 0 at joints, 1 from ``reach`` pixels on.
 
-    Joints along a course are told by the colour of those between courses.
+    Joints along a course are found by the colour of the joints between courses.
     """
     from scipy.ndimage import distance_transform_edt
 

@@ -1,4 +1,4 @@
-"""The large texture: tiles stitched, and its colours corrected; sections 3.1, 3.5 and 3.6 of `texrs.papers.design`."""
+"""Stitch tiles into the large texture, and correct its colours: sections 3.1, 3.5 and 3.6 of `texrs.papers.design`."""
 
 from __future__ import annotations
 
@@ -26,18 +26,19 @@ from texrs.source_map import SourceMap
 __all__ = ["correct_colours", "look_up", "say_finish", "stitch_tiles"]
 
 PATCH, OVERLAP = 0.6, 0.25
-"""Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
+"""Side of a patch and overlap of two patches, as shares of the exemplar's shorter side."""
 DEEP = 6.0
-"""Depth in pixels from which on all of an element is as deep."""
+"""Depth in pixels beyond which all pixels of an element count as equally deep."""
 LEAST, TERRITORY = 6.0, 0.75
-"""Least distance in pixels that borders between exemplars may be moved by, and the size of territories as a share of the
-shorter side."""
+"""Least distance in pixels that a border between exemplars may move, and size of territories as a share of the shorter
+side.
+"""
 CLOSE = 0.5
-"""Share of the exemplar that elements cover from which on they lie close."""
+"""Share of the exemplar above which its elements are close to each other."""
 
 
 def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:
-    """Stitch patches of the tiles into a texture of any size, on the torus where it wraps (section 3.1, step 4)."""
+    """Stitch patches of the tiles into a texture of any size, on the torus if it wraps (section 3.1, step 4)."""
     if arguments.density is not None:
         ground = stitch_alone(0, plans[:1], tiles, arguments, seed)
         return scatter(ground, plans, arguments.density, wrap=arguments.wrap, seed=seed)
@@ -52,7 +53,7 @@ def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Argume
         [measure_layer(source, plan) for source, plan in zip(each, plans, strict=True)],
         arguments.shares,
         extent=min(max(LEAST, float(np.mean([measure_extent(plan) for plan in plans]))), min(arguments.size) / 4),
-        # Smaller ones keep a map of shares place by place.
+        # Smaller territories follow a map of shares more closely.
         territory=min(TERRITORY * side / (2 if arguments.shares.ndim > 1 else 1), min(arguments.size) / 2),
         wrap=arguments.wrap,
         seed=seed,
@@ -82,7 +83,7 @@ def stitch_alone(
 
 
 def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> list[Picture]:
-    """Return tiles as what patches are taken from, those of a lattice stretched so that it closes on the torus."""
+    """Return tiles as sources of patches; a lattice is stretched so that it closes on the torus."""
     depth, lattice = measure_depth(plan), plan.parts.lattice
     closing = None if lattice is None else lattice.close(arguments.size, arguments.wrap)
     pictures = []
@@ -100,7 +101,7 @@ def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> li
 
 
 def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list[Picture]:
-    """Return an exemplar that lies in courses as what patches are taken from: its courses laid as tall as the texture."""
+    """Return sources of patches for an exemplar in courses: its courses, laid as tall as the texture."""
     courses = plan.parts.courses
     assert courses is not None
     axis = courses.axis
@@ -125,12 +126,12 @@ def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list
 
 
 def report_share(watch: Progress, number: int, count: int, share: float) -> None:
-    """Report the share of one of several alike."""
+    """Report the progress of one of several equal parts."""
     watch("stitch", (number + share) / count)
 
 
 def measure_layer(source: SourceMap, plan: Plan) -> Layer:
-    """Return what a texture of one exemplar shows: its colours, and where things are."""
+    """Return the colours of a texture of one exemplar, and the places of its elements."""
     parts, where = plan.parts, source.coordinates
     depth, things = np.zeros((2, *plan.guide.shape[:2]), np.float32)
     if parts.kind in ("components", "labels"):
@@ -141,7 +142,7 @@ def measure_layer(source: SourceMap, plan: Plan) -> Layer:
 
 
 def measure_extent(plan: Plan) -> float:
-    """Return the usual size of an element, in pixels."""
+    """Return the median size of an element, in pixels."""
     areas = np.bincount(plan.parts.elements.ravel())[1:]
     if plan.parts.kind not in ("components", "labels") or not areas.any():
         return float(plan.side)
@@ -149,10 +150,10 @@ def measure_extent(plan: Plan) -> float:
 
 
 def measure_depth(plan: Plan) -> Floats:
-    """Return how deep inside an element each pixel of an exemplar is, so that seams run between them.
+    """Return the depth of each pixel of an exemplar inside an element, so that seams run between elements.
 
-    Not where elements of a lattice lie close, as bricks do: the joints between them go on across every seam, and one that
-    kept to them would show.
+    The depth is 0 for a dense lattice, such as bricks. The joints between its elements continue across every seam, and
+    a seam that follows them would be visible.
     """
     parts = plan.parts
     jointed = parts.lattice is not None and (parts.elements > 0).mean() > CLOSE
@@ -162,7 +163,7 @@ def measure_depth(plan: Plan) -> Floats:
 
 
 def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
-    """Say how the colours of a texture are corrected so that its seams disappear (section 3.6)."""
+    """Set how the colours of a texture are corrected to hide its seams (section 3.6)."""
     wrap, literal = arguments.wrap, arguments.literal
     if arguments.exemplars[0].labels:
         return composite.with_finish(wrap, interpolation="nearest")
@@ -174,13 +175,13 @@ def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
 
 
 def look_up(composite: SourceMap, arguments: Arguments) -> Array:
-    """Return the picture of a texture before its colours are corrected; between labels there is nothing."""
+    """Return the image of a texture before its colours are corrected; labels are not interpolated."""
     labels = arguments.exemplars[0].labels
     return composite.render(arguments.images, interpolation="nearest" if labels else "cubic")
 
 
 def correct_colours(composite: SourceMap, picture: Array, arguments: Arguments) -> tuple[Array, dict[str, Any]]:
-    """Correct the colours of a picture as its map says, and measure the seams before and after."""
+    """Correct the colours of an image as its source map specifies, and measure the seams before and after."""
     images, wrap = arguments.images, arguments.wrap
     before = after = measure_visibility(composite, images, picture, wrap=wrap)
     image = picture

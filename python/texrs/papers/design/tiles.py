@@ -1,4 +1,4 @@
-"""Tiles: deformed exemplars whose holes are filled by example, section 3.4 of `texrs.papers.design`."""
+"""Tiles: deformed exemplars whose holes are filled by example (section 3.4 of `texrs.papers.design`)."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from texrs.source_map import SourceMap
 __all__ = ["fill_holes"]
 
 CANDIDATES = 5
-"""Matches of a hole that are cut in; the cheapest is kept."""
+"""Number of matches that are cut into a hole; the cheapest is kept."""
 KEPT = 2.0
-"""Depth in pixels from which on elements are not cut when holes are filled: seams may follow their outlines."""
+"""Depth in pixels beyond which elements are not cut when holes are filled. Seams may follow their outlines."""
 
 
 def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], which: int, seed: int) -> Tile:
-    """Fill what a draft leaves open with patches of the exemplar, each cut into what is known around it.
+    """Fill the open pixels of a draft with patches of the exemplar, each cut into the known pixels around it.
 
     Parameters
     ----------
     draft : Draft
         Deformed elements or layers.
     plan : Plan
-        The exemplar, and what holes are filled from.
+        The exemplar, and the patches that fill holes.
     shapes : tuple of (h, w)
-        Of all exemplars.
+        Height and width of all exemplars.
     which : int
-        The one of the draft.
+        Number of the draft's exemplar.
     seed : int
-        Chooses patches where nothing is known.
+        Number that selects patches where all surroundings are open.
 
     Returns
     -------
     Tile
-        Its source map looks into the exemplars.
+        The filled tile; its source map refers to the exemplars.
 
     """
     shape = (plan.guide.shape[0], plan.guide.shape[1])
@@ -72,7 +72,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
 
 
 def mark_elements(draft: Draft, plan: Plan) -> Bools:
-    """Mark what a draft shows of the inside of elements: patches that fill holes would tear them."""
+    """Return the pixels that show the inside of elements, because patches that fill holes would tear them."""
     if plan.parts.kind not in ("components", "labels"):
         return np.zeros(draft.covered.shape, bool)
     inside = flip((plan.parts.measure_depth(KEPT) >= 1).astype(np.float32), draft.mirror)

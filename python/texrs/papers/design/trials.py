@@ -1,7 +1,7 @@
-"""What is done with the elements of an exemplar, tried at a small size and judged.
+"""Choose whether elements move, by a trial at a small size.
 
-A departure from the paper, which always deforms: where elements lie close, or were not found as they are, to move them tears
-them, and patches of the exemplar that are joined between its elements give the better texture.
+A departure from the paper, which always deforms. Elements that are close, or were not segmented correctly, are torn if
+they move. Patches of the exemplar that are joined between its elements then give the better texture.
 """
 
 from __future__ import annotations
@@ -26,17 +26,20 @@ from texrs.source_map import SourceMap
 __all__ = ["choose_plan", "make_composite"]
 
 CLEARLY = 0.85
-"""Share of the score of moved elements below which still ones are taken: deformation gives more different textures."""
+"""Ratio of scores below which elements stay in place instead of moving.
+
+It is below 1 because deformation gives more variety.
+"""
 LEAST, SHARE = 192, 0.75
-"""Least side of a trial in pixels, and its side as a share of the exemplar's shorter one."""
+"""Least side of a trial in pixels, and its side as a share of the exemplar's shorter side."""
 TILES = 2
-"""Deformed copies of the exemplar that a trial is stitched from, at most."""
+"""Maximum number of deformed copies of the exemplar that a trial is stitched from."""
 TRIAL = 0
-"""The seed of all trials, whose copies serve the texture of that seed too."""
+"""Seed of all trials. Their copies are used again by the texture with this seed."""
 
 
 def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tuple[list[Tile], SourceMap]:
-    """Deform the elements of each tile, fill its holes, and stitch the tiles: steps 2 to 5; say how it is finished."""
+    """Deform elements, fill holes, stitch the tiles, and set the colour correction (steps 2 to 5)."""
     tiles = []
     count = arguments.copies * len(plans)
     for number in range(count):
@@ -54,18 +57,19 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
 
 
 def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Plan:
-    """Settle whether elements move: as was said, or as is judged the better.
+    """Decide whether elements move: as requested, or by the better score.
 
     Parameters
     ----------
     plan : Plan
-        By which they move.
+        Plan whose elements move.
     exemplar : Exemplar
-        The example, on the scale that decisions are made on.
+        The example, on the scale of values that decisions are based on.
     elements : ElementOptions
-        How its elements were found.
+        Options that its elements were found with.
     arguments : Arguments
-        What is asked for. Neither the seed nor the size plays a part, so that all textures of an exemplar are made alike.
+        Arguments of the request. The seed and the size are not used, so that all textures of an exemplar are treated
+        the same way.
 
     """
     still = replace(plan, still=True)
@@ -91,7 +95,7 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
 def try_plan(
     plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments
 ) -> tuple[list[Tile], Mapping[str, float]]:
-    """Make a small texture by a plan, and judge it; return its tiles, too."""
+    """Synthesise a small texture with a plan, and return its tiles and its scores."""
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
     small = replace(
         arguments,
