@@ -339,13 +339,13 @@ def test_regular_layouts() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"points": np.zeros((0, 2))}, "three or more"),
-        ({"points": np.array([[5.0, 5], [9, 9]])}, "2 elements are too few"),
+        ({"points": np.zeros((0, 2))}, "at least three"),
+        ({"points": np.array([[5.0, 5], [9, 9]])}, "at least three elements for a layout, got 2"),
         ({"points": np.array([[5.0, 5], [5, 5], [9, 9], [7, 20]])}, "is there twice"),
         ({"points": np.array([[5.0, 5], [np.nan, 5], [9, 9]])}, "must be finite"),
         ({"points": np.array([[5.0, 5], [500, 5], [9, 9]])}, "lies outside of the image"),
-        ({"mask": np.zeros((5, 5), bool)}, "mask: needs bool of shape"),
-        ({"mask": np.ones(SIZE, bool)}, "all foreground"),
+        ({"mask": np.zeros((5, 5), bool)}, "mask: must be bool of shape"),
+        ({"mask": np.ones(SIZE, bool)}, "only foreground"),
         ({"mask": np.zeros(SIZE, bool)}, "no foreground"),
         ({"layout": "F=e"}, "layout: must be one of disjoint"),
         ({"image": np.zeros((8, 8))}, "at least 16"),
@@ -359,12 +359,12 @@ def test_bad_entries(change: dict[str, Any], words: str) -> None:
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        ("melt", "needs an 'op'"),
-        (3, "needs a name, a step or a list"),
+        ("melt", "must have an 'op'"),
+        (3, "must be a name, a step or a list"),
         ({"op": "move", "element": 900, "by": 1}, "element of move"),
-        ({"op": "move", "element": 1}, "one of 'by' and 'to'"),
+        ({"op": "move", "element": 1}, "either 'by' or 'to'"),
         ({"op": "scale", "factor": 0}, "factor of scale"),
-        ({"op": "scale", "factor": "big"}, "needs factor"),
+        ({"op": "scale", "factor": "big"}, "factor of scale must be a number"),
         ({"op": "shift", "by": [1e9, 0]}, "further than|four times"),
         ({"op": "shift", "up": 3}, "has no option up"),
         ({"op": "points", "points": [[1, 2], [1, 2]]}, "twice"),
@@ -422,7 +422,7 @@ def test_layouts_that_shrink_leave_no_bare_margin(name: str, factor: float) -> N
 
 @pytest.mark.parametrize("name", ["net", "bricks"])
 def test_what_is_connected_cannot_be_removed(name: str) -> None:
-    with pytest.raises(InvalidInput, match="remove needs separate elements"):
+    with pytest.raises(InvalidInput, match="remove must be used with separate elements"):
         texrs.self_splice(ENTRIES[name], [{"op": "shift", "by": 2}, {"op": "remove", "element": 3}])
 
 

@@ -1,54 +1,77 @@
-"""SPLICE: the elements of one texture in the arrangement of another.
+"""Arrange the elements of one texture in the layout of another (SPLICE).
 
-Y. Liu, J. Wang, S. Xue, X. Tong, S. B. Kang and B. Guo, "Texture splicing", Computer Graphics Forum 28(7), 2009. Its texton
-is our element. The flow, in the paper's order, and where each stage is:
+Y. Liu, J. Wang, S. Xue, X. Tong, S. B. Kang and B. Guo, "Texture splicing", Computer Graphics Forum 28(7), 2009. The
+paper's texton is called element here. The steps, in the paper's order, and the module of each step:
 
-1. bring B's layout to the spacing and the orientation of A's and match the points one to one (section 4.1, Eq. 4: `matching`,
-   on A as it goes on beyond its borders, `extension`); adjust the targets to what goes there (`adjustment`);
-2. deform A so that its elements go there, and what is rigid keeps its shape (section 4.2, `deformation`: `interpolation`
-   between disjoint elements, the `energy` of Eq. 5, Table 1 and Figure 5 for connected figures);
-3. draw the deformed mesh backwards: where each pixel of the output comes from (Figure 6, `backward_warp`);
-4. fill the holes and refine what is not rigid by texture synthesis (section 4.3: `draft`, `refine`).
+1. Bring B's layout to the spacing and the orientation of A's, and match the points one to one (section 4.1, Eq. 4:
+   `matching`). A is extended beyond its borders (`extension`), and the targets are adjusted to the elements (`adjustment`).
 
-Elements are analysed beforehand (section 3; `texrs.elements`). An edit of a texture's own layout takes the place of the first
-stage (Figure 9, `edit`); where it is asked for in another size the texture is brought to that first (`resizing`).
+2. Deform A so that its elements move to their targets and rigid pixels keep their shape (section 4.2: `deformation`).
+   Displacements are interpolated between disjoint elements (`interpolation`). For connected figures they minimise the
+   energy of Eq. 5, Table 1 and Figure 5 (`energy`).
 
-Departures, with their reasons:
+3. Draw the deformed mesh backwards, to find the source of each output pixel (Figure 6: `backward_warp`).
 
-- Both point sets go on beyond their pictures, by reflection at the lines where the layout goes on as it is: otherwise
-  a third of the output is empty, and elements at its border are missing.
-- There are more elements than targets; those that go nowhere are erased. As printed, point sets must have equal size. What is
-  erased shrinks, and the ground around it closes in: else a fifth of the output is a hole.
-- Connected figures take the layout where their elements go least far, and neighbours differ in how far they go by no more
-  than a share of an element: else courses are torn where a layout has none.
-- Layouts grow until disjoint elements have room, and those that still collide are pushed apart: spacing alone makes chains.
-- Distances are squared in Eq. 4: the best matching then has no crossings.
-- Connected textures whose cells are found are put together from these, each in a cell of B's layout (`cells`): bending a
-  figure goes half of the way. Those without, as chainmail, are put together from their knots and what hangs on these (`nets`).
-  What follows of connected figures is for those that show too few knots, for `use_cells=False` and for `use_nets=False`.
-- Disjoint elements move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
-  hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its elements, and
-  so smooth that it is solved for at every other pixel.
-- Eq. 5 sums over rigid pixels only, so the others have no equation and the system is singular, or, for brick walls,
-  moves nothing but its pins: here they count a hundredth. Long joints, which the decoupling of Table 1 leaves free to slide,
-  are tied to their neighbours by a weak spring.
-- Elements that reflection mirrors are turned back, and those that the border cuts are left out; with no or little strength they
-  stay where they are.
-- In splices the ground between separate elements is neither warped nor refined, which averages it: it is completed where the
-  elements were, grown by patches where more is needed, and each element is cut into it with what lies around all of them
-  alike, its shadow say; colours are corrected where they meet (`ground`).
-- Light that differs across a picture of separate elements is taken off before they are moved, and put back after, in the
-  measure in which it falls on elements (`light`): else each brings that of its old place.
-- Edits of separate elements put these into their new places on the texture's own ground, completed where one was
-  (`rearrangement`): what does not move keeps its bytes. Where an element that the border cuts would come in, a whole one takes
-  its place. What follows of separate elements is for textures that show too little of their ground.
-- Wide holes are filled with patches of the ground, as rough as it is: random pixels come out as noise there, and of patches the
-  smoothest fit best, which looks blurred.
-- Refinement leaves what is rigid as it is, and so whatever the warp copied whole: there is nothing to mend. In its
-  place nothing comes that is not ground itself.
-- Triangles between elements carry previews, and edits that list moved points: what moves then changes its neighbours alone.
+4. Fill the holes, and refine pixels that are not rigid by texture synthesis (section 4.3: `draft`, `refine`).
 
-``method="paper"`` leaves out what can be left out (`texrs.papers.splice.literal`).
+Elements are analysed before (section 3: `texrs.elements`). An edit of a texture's own layout replaces the first step
+(Figure 9: `edit`). If another size is requested, the texture is brought to that size before its edit (`resizing`).
+
+Departures from the paper, with their reasons:
+
+- Both point sets continue beyond their images. They are reflected at lines where the layout continues regularly.
+  Otherwise a third of the output is empty, and elements at its border are missing.
+
+- There are more elements than targets; elements without a target are erased. The printed algorithm needs point sets of
+  equal size. Erased elements shrink and the background around them closes, because a fifth of the output would be a
+  hole otherwise.
+
+- Connected figures take the offset of the layout where their elements move least. Displacements of neighbours differ
+  by at most a share of an element, because courses are torn otherwise if the layout has none.
+
+- Layouts grow until disjoint elements have room, and elements that still collide are pushed apart. The spacing alone
+  makes elements touch and form chains.
+
+- Distances are squared in Eq. 4, because the best matching then has no crossings.
+
+- If cells are found in a connected texture, it is composed of these cells, each in a cell of B's layout (`cells`).
+  Bending a figure reaches only half of the displacement. A connected texture without cells, such as chainmail, is
+  composed of its knots and the lines between them (`nets`). The departures below for connected figures apply if there
+  are too few knots, or with ``use_cells=False`` and ``use_nets=False``.
+
+- Disjoint elements move whole, by whole pixels, which is the limit of Eq. 5 for large weights. The soft energy
+  stretches components with two pins by dozens of pixels. Displacements of the background are harmonic, so no part of
+  it moves further than its elements. They are smooth enough to be solved at every other pixel.
+
+- Eq. 5 sums over rigid pixels only. Other pixels have no equation and the system is singular, or only the pins of a
+  brick wall move. Here other pixels count with weight 0.01. Table 1 lets long joints slide freely; a weak spring ties
+  them to their neighbours.
+
+- Reflected elements are turned back, and elements that the border cuts are left out. With a strength of 0 or nearly 0
+  they stay in place.
+
+- The background between separate elements is neither warped nor refined in a splice, because refinement averages it.
+  It is completed where the elements were, and grown by patches if more is needed. Each element is cut into it together
+  with the surroundings that all elements share, such as a shadow. Colours are corrected along the cuts (`ground`).
+
+- If the light varies across an image of separate elements, it is removed before they move. Afterwards it is restored
+  as far as it falls on elements (`light`). Otherwise each element keeps the light of its old place.
+
+- Edits of separate elements put them into their new places on the texture's own background, which is completed where
+  an element was (`rearrangement`). Pixels that do not move keep their bytes. If an element that the border cuts would
+  move inwards, a whole element takes its place. The departures below for separate elements apply to textures that show
+  too little of their background.
+
+- Wide holes are filled with patches that are as rough as the background. Random pixels give noise there, and of all
+  patches the smoothest fit best and look blurred.
+
+- Refinement keeps rigid pixels, and therefore all elements that the warp copied whole. Other pixels are only replaced
+  by background pixels.
+
+- Previews, and edits that list moved points, use triangles between elements, so that a moved element changes only its
+  surroundings.
+
+``method="paper"`` leaves out departures where possible (`texrs.papers.splice.literal`).
 """
 
 from __future__ import annotations
@@ -92,10 +115,10 @@ from texrs.synthesis import Synthesis
 __all__ = ["self_splice", "splice"]
 
 Method: TypeAlias = Literal["paper", "preview"] | None
-NO_NET = "elements has fewer than six knots, or they lie closer than 8 pixels; take a larger picture, or another box"
-NO_CELLS = "none were found that are sure enough; give texrs.elements.analyse a box around one, or a mask of the joints"
+NO_NET = "elements must have six knots or more, at least 8 pixels apart; take a larger image, or another box"
+NO_CELLS = "no reliable cells were found; give texrs.elements.analyse a box around one, or a mask of the joints"
 SCREENING = 0.01
-"""Weight of the values when colours are corrected, by default: light that changes slowly is evened out."""
+"""Default weight of the values when colours are corrected. It evens out light that changes slowly."""
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
@@ -118,61 +141,64 @@ def splice(
     screening: float | None = SCREENING,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Arrange the elements of one texture as those of another are.
+    """Arrange the elements of one texture like those of another.
 
     Parameters
     ----------
     elements : ElementAnalysis, or (H, W) or (H, W, C) array
-        The texture whose elements are shown; a picture is analysed by `texrs.elements.analyse`.
+        The texture whose elements are used. An image is analysed by `texrs.elements.analyse`.
     layout : ElementAnalysis, or array
-        The texture whose layout they take, or a layout that was drawn (`texrs.layouts`).
+        The texture whose layout the elements take, or a drawn layout (`texrs.layouts`).
     size : int or (rows, columns), optional
-        Size of the result, in pixels; that of ``elements`` by default.
+        Size of the result, in pixels. Default: the size of ``elements``.
     seed : int
-        Chooses what fills holes, and the noise of the refinement.
+        Number that selects the pixels that fill holes, and the noise of the refinement. Default: 0.
     method : {None, "paper", "preview"}
-        "paper": the algorithm as printed, with only its misprints repaired. "preview": triangles between the elements,
-        drawn where these go; nothing is kept rigid or filled.
+        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
+        triangles between the moved elements; elements are not kept rigid and holes are not filled. Default: the
+        algorithm with the departures above.
     strength : float
-        How much of the way elements go, from the texture's own layout, 0, to the other's, 1. With 0, separate elements at the
-        texture's own size make the texture itself.
+        Share of the way that elements move from their own layout, 0, to the other layout, 1. Separate elements at the
+        texture's own size give the texture itself with 0. Default: 1.
     layout_scale : float, optional
-        What the layout is enlarged by, 0.01 to 100: its pixels are those of the result at 1, the middle of the one on that of
-        the other. Twice as large, separate elements lie half as dense along each axis; where too dense they are pushed
-        apart. By default it is brought to the spacing, or the size, of the elements of ``elements``.
+        Scale of the layout, 0.01 to 100. With 1 a pixel of the layout is a pixel of the result, and the centres of
+        both coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense are
+        pushed apart. By default the layout is scaled to the spacing or the size of the elements of ``elements``.
     align : bool, optional
-        Whether to turn the layout so that lines of its points agree with those of ``elements``; by default where no
-        ``layout_scale`` is given. Cells and nets take it as it lies.
+        If True, the layout is turned so that lines of its points agree with those of ``elements``. Cells and nets
+        ignore this. By default True without ``layout_scale``.
     snap_rows : bool
-        Whether to bring targets of about one row to one row: for walls that are bent, whose long joints then stay straight.
+        If True, targets near one row are moved to one row. Use it for walls that are bent, whose long joints then stay
+        straight. Default: False.
     use_cells : bool, optional
-        Whether a connected texture is put together from its cells; False bends its figure. By default where cells are found.
+        If True, a connected texture is composed of its cells; if False, its figure is bent. By default True if cells
+        are found.
     use_nets : bool, optional
-        Whether a connected texture is put together from its knots and the lines that hang on them; False bends its figure.
-        By default where no cells are found, unless ``use_cells`` is given, and there are six knots or more in a layout that is
-        sure enough. True goes before cells.
+        If True, a connected texture is composed of its knots and the lines between them, also if it has cells. If
+        False, its figure is bent. By default True without cells, if ``use_cells`` is not given and a reliable layout
+        has six knots or more.
     allow_rotation : bool, optional
-        Whether cells may be turned; by default where nothing tells ``elements`` from itself upside down, as light and
-        letters do.
+        If True, cells may be turned. By default True, unless light or letters show which side of ``elements`` is up.
     refine : bool
-        Whether to refine what is not rigid; by cells, what is stretched. Nets, and ground between separate elements, need none.
+        If True, pixels that are not rigid are refined, or stretched pixels of cells. Nets, and backgrounds between
+        separate elements, do not need it. Default: True.
     screening : float, optional
-        Of separate elements on their ground: weight of the values, 0 to 1e6, when colours are corrected so that the light
-        does not change where they meet, see `texrs.blend`; where the texture has a lit side the result has it too, and things
-        do not bring the light of their old places. None or 0: no correction, and the picture is the texture looked up through
-        the source map. All else is not corrected.
+        Weight that keeps the values when colours are corrected where elements and background meet, 0 to 1e6, see
+        `texrs.blend`. It applies to separate elements on their background; other results are not corrected. If one
+        side of the texture is lit, so is the result, and elements do not keep the light of their old places. None or
+        0: colours are not corrected, and the image is the texture at the coordinates of the source map. Default: 0.01.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
+        the work stops. True shows a progress bar. Default: none.
 
     Returns
     -------
     Synthesis
-        The picture; a source map of whole pixels of ``elements``, whose label is the target (counted from 1, as in the report)
-        that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report, whose
-        "matches" say of each element where it was wanted, where it is, and how much of its way was realised. By cells
-        (``report["method"]`` is "cells") the map lies between pixels, and each has its target; by knots ("nets") each has
-        that whose knot it hangs on.
+        The ``image``, the ``source_map``, the ``stages`` and the ``report``. The source map contains whole pixels of
+        ``elements``. Its label is the target of a rigid pixel, counted from 1 as in the report, or 0. Stages are drawn
+        on access. The report's "matches" contain each element's requested position, its position in the result and the
+        share of its displacement that was reached. If ``report["method"]`` is "cells", coordinates are fractional and
+        each pixel has a target. If it is "nets", each pixel has the target of its knot.
 
         Stages:
 
@@ -225,7 +251,7 @@ def splice(
     Raises
     ------
     InvalidInput
-        Entries or options that cannot be spliced; the message says why.
+        The textures or options cannot be spliced; the message gives the reason.
 
     References
     ----------
@@ -249,7 +275,9 @@ def splice(
     enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
     turned = enlarged is None if align is None else as_bool(align, "align")
     if enlarged is not None and method == "paper":
-        raise InvalidInput('layout_scale: method="paper" brings the layout to the spacing of the elements')
+        raise InvalidInput(
+            'layout_scale: cannot be combined with method="paper", which scales the layout to the spacing of the elements'
+        )
     given = {"use_cells": use_cells, "use_nets": use_nets, "allow_rotation": allow_rotation}
     wanted, net, may_turn = (None if v is None else as_bool(v, n) for n, v in given.items())
     for name, either in (("refine", refine), ("snap_rows", snap_rows)):
@@ -257,21 +285,25 @@ def splice(
             as_bool(either, name)
     for name, asked in (("use_cells", wanted), ("use_nets", net)):
         if asked and method is not None:
-            raise InvalidInput(f'{name}: method="{method}" bends figures')
+            raise InvalidInput(f'{name}: cannot be combined with method="{method}", which bends figures')
     if wanted and net:
         raise InvalidInput(
-            "use_nets: a texture is put together either from its cells or from its knots; give one of the two"
+            "use_nets: cannot be combined with use_cells, because a texture is composed of cells or of knots"
         )
+    # Analyse images, after all cheap checks of the arguments.
     watch, shape = progress or (lambda stage, share: None), None if size is None else as_size(size, minimum=16)
     mine, theirs = as_elements(elements, "elements", watch), as_elements(layout, "layout", watch)
     rows, columns = shape or as_size(mine.mask.shape, minimum=16)
     check_work("splice", [mine.image, theirs.image], (rows, columns))
     if net and not has_knots(mine):
-        raise InvalidInput(f"use_nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
+        raise InvalidInput(
+            f"use_nets: {'elements must be a net, got separate elements' if mine.layout == Layout.DISJOINT else NO_NET}"
+        )
+    # Compose connected textures of cells or knots, if there are any.
     found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
     if wanted and found is None:
         raise InvalidInput(
-            f"use_cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}"
+            f"use_cells: {'elements must have cells, got separate elements' if mine.layout == Layout.DISJOINT else NO_CELLS}"
         )
     if found is not None:
         return splice_cells(
@@ -291,6 +323,7 @@ def splice(
         return splice_nets(
             mine, theirs, theirs_cells, (rows, columns), strength=part, scale=enlarged, seed=number, watch=watch
         )
+    # Match elements with targets, and adjust the targets.
     watch("match", 0.0)
     if method == "paper":
         match = match_literally(mine, theirs, (rows, columns), align=turned)
@@ -337,41 +370,46 @@ def self_splice(
     Parameters
     ----------
     elements : ElementAnalysis, or (H, W) or (H, W, C) array
-        The texture; a picture is analysed by `texrs.elements.analyse`.
+        The texture. An image is analysed by `texrs.elements.analyse`.
     edit : str, mapping, or sequence of mappings, optional
-        What is done, step by step: scale, shift, rows, randomise, regularise, move, remove or points. In plain JSON
-        types: ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` (the layout, not
-        the elements), ``{"op": "shift", "by": [4, 0]}``, ``{"op": "rows", "by": 6}`` (every other row to the right, those
-        between to the left), ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` (Gaussian, in spacings; the share of the
-        least usual distance that is kept), ``{"op": "regularise", "amount": 1}`` (to the lattice that fits best),
-        ``{"op": "move", "element": 3, "by": [0, 8]}`` or ``"to"``, ``{"op": "remove", "element": 3}``,
-        ``{"op": "points", "points": [[row, column], ...]}``. A name alone is a step with its
-        defaults; no step, the default, leaves the layout as it is. The report's "edit" replays.
+        Steps of the edit in order: scale, shift, rows, randomise, regularise, move, remove or points. They are plain
+        JSON types. ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` scales the layout, not the elements. ``{"op":
+        "shift", "by": [4, 0]}`` moves all elements. ``{"op": "rows", "by": 6}`` moves every other row to the right,
+        and the rows between to the left. ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` adds Gaussian
+        displacements. Their amount is in spacings, and the least distance is a share of the usual least distance.
+        ``{"op": "regularise", "amount": 1}`` moves elements to the best lattice. ``{"op": "move", "element": 3, "by":
+        [0, 8]}`` moves one element; ``"to"`` gives its new place instead. ``{"op": "remove", "element": 3}`` removes
+        one element. ``{"op": "points", "points": [[row, column], ...]}`` lists new places. A name without options is a
+        step with its defaults. The report's "edit" repeats the edit. Default: the layout is not changed.
     size : int or (rows, columns), optional
-        Size of the result, in pixels, sides of at least 16; that of ``elements`` by default. In a larger one the texture's own
-        layout goes on, as in a splice with itself, before the steps are done; a smaller one is the middle of the texture. Steps
-        then count the elements as the report's "elements" lists them, whose places they have before the steps.
+        Size of the result, in pixels, at least 16 a side. The texture's own layout continues in a larger result before
+        the steps, as in a splice with itself. A smaller result is the middle of the texture. Steps then number the
+        elements as the report's "elements" lists them, with their places before the steps. Default: the size of
+        ``elements``.
     seed : int
-        Chooses random steps, the elements that come in over a border, what fills holes, and the noise of the refinement.
+        Number that selects random steps, elements that enter over a border, pixels that fill holes, and the noise of
+        the refinement. Default: 0.
     method : {None, "paper", "preview"}
-        "paper": the algorithm as printed, with only its misprints repaired. "preview": triangles between the elements, drawn
-        where these go; nothing is kept rigid or filled.
+        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
+        triangles between the moved elements; elements are not kept rigid and holes are not filled. Default: the
+        algorithm with the departures above.
     refine : bool
-        Whether to refine what is deformed: connected figures, and separate elements that show too little of their ground.
+        If True, deformed pixels are refined: those of connected figures, and of separate elements that show too little
+        of their background. Default: True.
     screening : float, optional
-        Of separate elements on their ground: weight of the values, 0 to 1e6, when the colours of what changed are corrected
-        so that the light does not change where things meet, as in `splice`. All else keeps its values. None or 0: no
-        correction.
+        Weight that keeps the values when changed colours are corrected where elements and background meet, 0 to 1e6,
+        as in `splice`. It applies to separate elements on their background; other results keep their values. None or
+        0: colours are not corrected. Default: 0.01.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
+        the work stops. True shows a progress bar. Default: none.
 
     Returns
     -------
     Synthesis
-        The picture; a source map of whole pixels of ``elements``, whose label is the target (counted from 1, as in the report)
-        that a rigid pixel belongs to, or 0; pictures of the stages; and a report. Where nothing is moved the picture is the
-        texture, exactly; of separate elements, all that does not move is.
+        The ``image``, the ``source_map``, the ``stages`` and the ``report``. The source map contains whole pixels of
+        ``elements``. Its label is the target of a rigid pixel, counted from 1 as in the report, or 0. Without a
+        movement the image equals the texture. If elements are separate, all pixels that do not move are equal.
 
         Stages:
 
@@ -413,11 +451,11 @@ def self_splice(
     Raises
     ------
     InvalidInput
-        A step that is not known, lacks something, or names an element that is not there, or one to be removed from a
-        connected figure, which has no ground to close over it; a size that is no size, or that shows fewer than three
-        elements, of which no step can make a layout.
+        A step is unknown, lacks an option, or names an element that does not exist. Elements of a connected figure
+        cannot be removed, because it has no background that could close the gap. The size is not a size, or the result
+        shows fewer than three elements, which are too few for a layout.
     LimitExceeded
-        A size that is too large.
+        The size is too large.
 
     Examples
     --------
@@ -440,6 +478,7 @@ def self_splice(
     watch = progress or (lambda stage, share: None)
     mine = as_elements(elements, "elements", watch)
     check_work("self_splice", [mine.image], asked or mine.mask.shape, "elements" if asked is None else "size")
+    # Bring the texture to another size first, and edit the result.
     if asked is not None and asked != mine.mask.shape:
         rest: dict[str, Any] = {
             "seed": number,
@@ -453,6 +492,7 @@ def self_splice(
         entry = read_elements(mine, resized)
         edited = self_splice(check_resized(entry), steps, **rest) if steps else resized
         return report_resized(mine, entry, resized, edited, steps)
+    # Rearrange separate elements on their background; warp all other textures.
     laid = rearrange(mine, steps, number, watch) if method is None and mine.layout == Layout.DISJOINT else None
     if laid is not None:
         result = compose_edit(mine, laid, seed=number, screening=screening)
@@ -490,7 +530,7 @@ def _synthesize(
     screening: float = 0.0,
     listed: bool = False,
 ) -> Synthesis:
-    """Deform the texture, draw it backwards, fill and refine: sections 4.2 and 4.3, which splices and edits share."""
+    """Deform the texture, draw it backwards, fill and refine it (sections 4.2 and 4.3), for splices and edits."""
     warp = warp_backwards(a, match, size, method=method, listed=listed, progress=watch)
     draft, label = draft_pixels(a, match, warp, whole=method is None)
     scene = survey(a) if b and method is None and a.layout == Layout.DISJOINT else None

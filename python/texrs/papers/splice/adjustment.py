@@ -1,7 +1,7 @@
-"""Targets adjusted to the elements that go there, in `texrs.papers.splice`.
+"""Adjust targets to the elements that move there.
 
-Of this the paper says nothing: disjoint elements need room, neighbours in a connected figure cannot go much farther than each
-other, and long joints want rows that are straight.
+The paper does not describe this. Disjoint elements need room, and neighbours in a connected figure need similar
+displacements. Long joints need straight rows.
 """
 
 from __future__ import annotations
@@ -23,16 +23,18 @@ __all__ = ["adjust_targets", "crop_extension", "limit_strain", "separate_targets
 Points = NDArray[np.float64]
 
 ROW = 0.25
-"""Spacings by which rows differ at most that are brought to one."""
+"""Largest distance between rows that are merged into one, in spacings."""
 STRAIN = {Layout.CONNECTED: 0.45, Layout.JOINTED: 0.3}
-"""How much farther than its neighbour an element of a connected figure goes at most, in sides of its box: nets give more than
-walls."""
+"""Largest difference of displacement between neighbours in a connected figure, in sides of an element's box.
+
+Nets are more flexible than walls.
+"""
 
 
 def adjust_targets(a: ElementAnalysis, match: Match, *, snap: bool, part: bool = False) -> Match:
-    """Give disjoint elements room; bring those of a connected figure to rows, if asked to, and limit how it is strained.
+    """Give disjoint elements room; snap elements of connected figures to rows on request, and limit their strain.
 
-    Where they go but a ``part`` of their way, or to their own layout, disjoint elements that touch may go on doing so.
+    If elements go only a ``part`` of their way, or to their own layout, touching disjoint elements may still touch.
     """
     if a.layout == Layout.DISJOINT:
         return separate_targets(a, match, starts=match.starts if part else None)
@@ -40,7 +42,7 @@ def adjust_targets(a: ElementAnalysis, match: Match, *, snap: bool, part: bool =
 
 
 def straighten_rows(match: Match) -> Match:
-    """Bring targets to common rows: those whose rows follow each other closely."""
+    """Move targets to common rows if their rows are close to each other."""
     points = match.targets
     order = np.argsort(points[:, 0], kind="stable")
     rows = points[order, 0]
@@ -54,10 +56,10 @@ def straighten_rows(match: Match) -> Match:
 def separate_targets(
     a: ElementAnalysis, match: Match, *, rounds: int = 12, room: float = 1.0, starts: Points | None = None
 ) -> Match:
-    """Push targets apart where the disjoint elements that go there would lie over each other.
+    """Push targets apart if their disjoint elements would overlap.
 
-    Elements are seen as convex: each pair is pushed along the line between its targets, but no farther than it was at its
-    ``starts``, where some are given; NaN for those that were nowhere.
+    Elements are treated as convex. Each pair is pushed along the line between its targets, up to its distance at its
+    ``starts``, if these are given. ``starts`` is NaN for elements without a start.
     """
     from scipy.spatial import cKDTree
 
@@ -89,7 +91,7 @@ def separate_targets(
 
 @remember(16)
 def _measure_reach(a: ElementAnalysis, count: int = 32) -> Points:
-    """Return how far each element reaches from its centre in so many directions, (n, count)."""
+    """Return how far each element extends from its centre in ``count`` directions, (n, count), in pixels."""
     parts = split_foreground(a)
     angles = 2 * math.pi * np.arange(count) / count
     rays = np.stack([np.sin(angles), np.cos(angles)])
@@ -105,9 +107,10 @@ def _measure_reach(a: ElementAnalysis, count: int = 32) -> Points:
 
 
 def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Match:
-    """Let neighbours in a connected figure differ in how far they go by no more than a share of an element.
+    """Limit the difference in displacement between neighbours of a connected figure to a share of an element.
 
-    Each pair of neighbours that does is brought together, half by half, until none is left or the rounds are over.
+    Each pair of neighbours above the limit is brought together, each by half of the excess. This is repeated until all
+    pairs are within the limit, or the rounds are over.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -116,7 +119,7 @@ def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Matc
         return match
     try:
         corners = Delaunay(start).simplices
-    except QhullError:  # all on a line
+    except QhullError:  # all points are on a line
         return match
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
     first, second = np.unique(edges, axis=0).T
@@ -136,9 +139,9 @@ def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Matc
 
 
 def crop_extension(a: ElementAnalysis, match: Match, size: tuple[int, int]) -> Match:
-    """Leave out of the texture's surroundings what cannot come into the output.
+    """Remove the parts of the extended texture that cannot enter the output.
 
-    What is kept has one of few widths, so that the next layout may find the factor of its system.
+    The remaining width is one of a few, so that the next layout can reuse the factors of its system.
     """
     extension = match.extension
     unit = max(2.0, spacing(a.points) / 2)

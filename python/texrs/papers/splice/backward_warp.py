@@ -1,7 +1,7 @@
-"""The backward warp of `texrs.papers.splice` (Figure 6): which pixel of the extended texture is behind each of the output.
+"""Backward warp of `texrs.papers.splice` (Figure 6): find the extended texture's pixel for each output pixel.
 
-The dense mesh of the deformed texture is drawn, or, for previews and for edits that list moved points, triangles between the
-elements.
+The dense mesh of the deformed texture is drawn. For previews, and for edits that list moved points, triangles between
+the elements are drawn instead.
 """
 
 from __future__ import annotations
@@ -24,18 +24,19 @@ __all__ = ["BackwardWarp", "warp_backwards"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BackwardWarp:
-    """W_BA: what of the extended texture each pixel of an output shows.
+    """Result of the backward warp (W_BA): the source of each output pixel in the extended texture.
 
     Attributes
     ----------
     place : (h, w, 2) intp
-        The pixel of the extension.
+        Row and column of the source pixel in the extension.
     known : (h, w) bool
-        Where there is one.
+        Output pixels that have a source.
     target : (H, W, 2) float64
-        Where each pixel of the extension goes.
+        Position in the output of each pixel of the extension.
     triangles, flipped, flipped_rigid : int
-        Of the dense mesh: all, those turned over, and those of them that are rigid. 0 where none was drawn.
+        Number of triangles of the dense mesh, number of flipped triangles, and number of flipped rigid triangles. All
+        are 0 without a mesh.
 
     """
 
@@ -50,22 +51,23 @@ class BackwardWarp:
 def warp_backwards(
     a: ElementAnalysis, match: Match, size: tuple[int, int], *, method: str | None, listed: bool, progress: Progress
 ) -> BackwardWarp:
-    """Deform the texture and draw it into an output of that size.
+    """Deform the texture and draw it into an output of the given size.
 
     Parameters
     ----------
     a : ElementAnalysis
         The texture.
     match : Match
-        Which of its elements goes where.
+        Targets of its elements.
     size : (int, int)
         Rows and columns of the output.
     method : {None, "paper", "preview"}
-        As for `texrs.splice`.
+        Algorithm, as for `texrs.splice`.
     listed : bool
-        Whether the match is an edit that only lists moved points: then what moves changes its neighbourhood alone.
+        If True, the match is an edit that only lists moved points. Each moved element then changes only its
+        surroundings.
     progress : callable
-        Called as ``progress(stage, share)``.
+        Function called as ``progress(stage, share)``.
 
     """
     if method == "preview":
@@ -83,7 +85,7 @@ def warp_backwards(
 def _draw_mesh(
     deformation: Deformation, size: tuple[int, int], progress: Callable[[float], object] | None
 ) -> BackwardWarp:
-    """Draw the dense mesh: the rows and columns of it that come into the output."""
+    """Draw the rows and columns of the dense mesh that enter the output."""
     target, rigid = deformation.target, deformation.rigid
     seen = np.ones(rigid.shape, bool)
     for axis in range(2):
@@ -108,7 +110,7 @@ def _draw_preview(match: Match, size: tuple[int, int]) -> BackwardWarp:
 
 
 def _draw_elements(match: Match, size: tuple[int, int]) -> BackwardWarp:
-    """Draw the ground as triangles between the elements, and these whole above it."""
+    """Draw the background as triangles between the elements, and whole elements above it."""
     extension = match.extension
     shape, origin = np.array(extension.mask.shape), np.array(extension.origin)
     shift = find_rigid_shifts(match)
@@ -133,6 +135,6 @@ def _draw_elements(match: Match, size: tuple[int, int]) -> BackwardWarp:
 
 
 def _find_nearest_pixels(coordinates: Floats, shape: tuple[int, ...]) -> NDArray[np.intp]:
-    """Return the nearest pixels, which lie inside."""
+    """Return the nearest pixels inside the texture."""
     places = np.floor(coordinates + np.float32(0.5)).astype(np.intp)
     return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)

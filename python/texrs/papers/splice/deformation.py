@@ -1,7 +1,7 @@
-"""The texture deformed so that its elements go where they are matched, in `texrs.papers.splice`: section 4.2.
+"""Deform the texture so that its elements move to their targets, in `texrs.papers.splice`: section 4.2.
 
-Disjoint elements move whole, by whole pixels, and what lies between is interpolated. A connected figure takes the shape
-of least energy.
+Disjoint elements move whole, by whole pixels, and the pixels between them are interpolated. A connected figure takes
+the shape of least energy.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from texrs.papers.splice.matching import Match
 __all__ = ["Deformation", "deform", "deform_by_energy", "find_rigid_shifts", "mark_removed"]
 
 SHRINKAGE = 0.9
-"""How far what is erased moves towards its middle."""
+"""Share of the way that erased pixels move towards the middle of their element."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,11 +31,11 @@ class Deformation:
     Attributes
     ----------
     target : (H, W, 2) float64
-        Where each of its pixels goes, in the output.
+        Position in the output of each pixel.
     rigid : (H, W) bool
-        What keeps its shape.
+        Pixels that keep their shape.
     removed : (H, W) bool
-        What is not drawn.
+        Pixels that are not drawn.
 
     """
 
@@ -45,18 +45,19 @@ class Deformation:
 
 
 def deform(a: ElementAnalysis, match: Match) -> Deformation:
-    """Move every pixel of the texture, as its layout says."""
+    """Move every pixel of the texture as its layout requires."""
     if a.layout != Layout.DISJOINT:
         return deform_by_energy(a, match)
     extension = match.extension
     shift = interpolate(*_list_constraints(match))
-    # Ground beside what shrinks is drawn out over the place of that: a pixel of it less is a hole of many.
+    # Background next to a shrinking element is stretched over its place. A missing pixel of background would leave a
+    # hole of many pixels.
     removed = mark_removed(extension, match.assigned, grown=int(extension.originals > 0))
     return Deformation(_add_places(shift, extension.origin), extension.instance > 0, removed)
 
 
 def deform_by_energy(a: ElementAnalysis, match: Match) -> Deformation:
-    """Move every pixel as Eq. 5 says: of a net the foreground is rigid, of elements that are jointed the joints."""
+    """Move every pixel by Eq. 5. The foreground of a net is rigid, and so are the joints between jointed elements."""
     extension, jointed = match.extension, a.layout == Layout.JOINTED
     rigid = ~extension.mask if jointed else extension.mask
     pins = np.rint(match.starts).astype(np.intp) - np.array(extension.origin)
@@ -66,7 +67,7 @@ def deform_by_energy(a: ElementAnalysis, match: Match) -> Deformation:
 
 
 def _add_places(shift: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[np.float64]:
-    """Turn displacements, in place, into where pixels go: the first one lies at the origin."""
+    """Add pixel positions to displacements, in place; the first pixel is at the origin."""
     shift[..., 0] += np.arange(origin[0], origin[0] + shift.shape[0])[:, None]
     shift[..., 1] += np.arange(origin[1], origin[1] + shift.shape[1])
     return shift
@@ -76,10 +77,10 @@ def _add_places(shift: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[
 
 
 def _list_constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
-    """Return what does not go along with the ground, and how far its pixels move, (2, H, W).
+    """Return the pixels that do not follow the background, and their displacements, (2, H, W).
 
-    Elements move whole. What is erased shrinks besides towards its middle: it then leaves a smaller hole. But where a picture
-    stays itself, nothing moves that is not asked to.
+    Elements move whole. Erased elements also shrink towards their middle, so that they leave a smaller hole. If an
+    image mainly stays as it is, only requested pixels move.
     """
     extension = match.extension
     still = extension.originals > 0
@@ -87,7 +88,7 @@ def _list_constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
     middle = extension.points if still else np.concatenate([extension.points, extension.stray_points])
     shift = np.zeros((2, len(middle) + 1), np.float32)
     shift[:, 1:] = find_rigid_shifts(match, middle).T
-    # Where it is to be at once: copies of whole pictures cost more than what is computed here.
+    # Write into the final array at once, because copies of whole images take longer than the computation here.
     given = np.empty((2, *number.shape), np.float32)
     for along, place in zip(shift, given, strict=True):
         along.take(number, out=place, mode="clip")
@@ -103,9 +104,9 @@ def _list_constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
 
 
 def find_rigid_shifts(match: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-    """Return the whole pixels that every element moves by; those that go nowhere go along with the ones around them.
+    """Return the whole-pixel displacement of every element; elements without a target follow their neighbours.
 
-    So do further ``points`` that follow those of the extension, where some are given.
+    Further ``points``, which come after those of the extension, also follow their neighbours.
     """
     from scipy.spatial import cKDTree
 
@@ -124,14 +125,14 @@ def find_rigid_shifts(match: Match, points: NDArray[np.float64] | None = None) -
 
 
 def mark_removed(extension: Extension, assigned: NDArray[np.intp], grown: int = 1) -> Bools:
-    """Mark what is erased: elements that go nowhere, and strays, with the pixels around them."""
+    """Return erased pixels: elements without a target, and stray pixels, with the pixels around them."""
     from scipy.ndimage import maximum_filter
 
     used = np.zeros(len(extension.points) + 1, bool)
     used[assigned + 1] = True
     moved = used.take(extension.instance)
     idle = (extension.instance > 0) & ~moved
-    # Of a picture that stays itself only what is taken out leaves an outline.
+    # If an image mainly stays as it is, only removed elements leave an outline.
     gone = idle if extension.originals else idle | extension.stray
     wide = maximum_filter(gone.view(np.uint8), 2 * grown + 1).view(bool) if grown else gone
     return np.asarray((wide | extension.stray) & ~moved)

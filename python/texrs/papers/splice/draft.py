@@ -1,4 +1,4 @@
-"""What of a warp stays as it is, in `texrs.papers.splice`: T_AB0 of section 4.3."""
+"""Find the pixels of a warp that stay unchanged: T_AB0 of section 4.3."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Labels = NDArray[np.uint32]
 
 
 def draft_pixels(a: ElementAnalysis, match: Match, warp: BackwardWarp, *, whole: bool) -> tuple[Draft, Labels]:
-    """Read a warp as pixels of the texture: what of it stays, and the target of each pixel that moved ``whole``, or 0."""
+    """Convert a warp to texture pixels: those that stay, and the target of each pixel that moved ``whole``, or 0."""
     extension, known = match.extension, warp.known
     at = warp.place[..., 0] * extension.mask.shape[1] + warp.place[..., 1]
     places, mirrored = (v.reshape(-1, 2).take(at, axis=0) for v in (extension.pixel, extension.mirrored))
     stays = _mark_copied(places, mirrored, known)
     step = match.shift[0]
     if extension.originals and (match.shift == step).all():
-        # The picture is moved as a whole: its own pixels stay, whatever comes beside them.
+        # The image moves as a whole. Its own pixels stay, whichever pixels come next to them.
         rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
         stays |= known & (places[..., 0] == rows - step[0]) & (places[..., 1] == columns - step[1])
     if whole and a.layout == Layout.DISJOINT:
@@ -43,9 +43,9 @@ def draft_pixels(a: ElementAnalysis, match: Match, warp: BackwardWarp, *, whole:
 
 
 def _label_elements(match: Match, warp: BackwardWarp, at: NDArray[np.intp]) -> tuple[Labels, Bools]:
-    """Return the target of each pixel of an element, counted from 1, and what the mesh draws out of elements.
+    """Return the target of each element pixel, counted from 1, and pixels that the mesh stretches.
 
-    Outlines that it draws out are no elements: what is rigid lies exactly where its element goes.
+    Stretched outlines are not elements. Rigid pixels are exactly at the target of their element.
     """
     extension, known = match.extension, warp.known
     goal = np.zeros(len(extension.points) + 1, np.uint32)
@@ -65,7 +65,7 @@ def _label_elements(match: Match, warp: BackwardWarp, at: NDArray[np.intp]) -> t
 def _add_cut(
     match: Match, parts: Foreground, places: NDArray[np.int32], label: Labels, known: Bools, mirrored: Bools
 ) -> None:
-    """Add elements that the border cuts, which stay where they are: the mesh knows none of them."""
+    """Add elements that the border cuts. They stay in place and are not part of the mesh."""
     element = match.extension.element[match.assigned]
     number = np.zeros(len(parts.points) + 1, np.uint32)
     for k in np.flatnonzero(~parts.whole[element]).tolist():
@@ -78,7 +78,7 @@ def _add_cut(
 
 
 def _mark_copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
-    """Mark what the warp copies whole: there is nothing to refine."""
+    """Return the pixels that the warp copies whole, which need no refinement."""
     from scipy.ndimage import maximum_filter
 
     broken = np.zeros(known.shape, bool)

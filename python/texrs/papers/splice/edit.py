@@ -1,4 +1,4 @@
-"""Edits of a texture's own layout, for `texrs.self_splice` (Figure 9 of the paper): lists of steps in plain JSON types."""
+"""Edit a texture's own layout for `texrs.self_splice` (Figure 9 of the paper), by lists of steps in plain JSON types."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Points = NDArray[np.float64]
 Step = Mapping[str, Any]
 
 DRAWS = 24
-"""Places that an element may try when it is moved at random."""
+"""Maximum number of places that are tried for an element that moves at random."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +29,11 @@ class EditedLayout:
     Attributes
     ----------
     points : (n, 2) float64
-        Where each point goes.
+        New place of each point.
     kept : (n) bool
-        False where it goes nowhere.
+        False for points that are removed.
     listed : bool
-        Whether the edit is a list of moved points, and nothing else.
+        True if the edit is a list of moved points, and nothing else.
 
     """
 
@@ -43,15 +43,15 @@ class EditedLayout:
 
 
 def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
-    """Read an edit: a name, a step, or a list of steps; random ones get their seed, so that the list can be replayed."""
+    """Convert an edit to a list of steps; random steps get their seed, so that the list can be repeated."""
     steps: Any = [edit] if isinstance(edit, str | Mapping) else edit
     if not isinstance(steps, Sequence):
-        raise InvalidInput(f"edit: needs a name, a step or a list of steps, got {type(edit).__name__}")
+        raise InvalidInput(f"edit: must be a name, a step or a list of steps, got {type(edit).__name__}")
     found = []
     for number, step in enumerate(steps):
         given = {"op": step} if isinstance(step, str) else step
         if not isinstance(given, Mapping) or given.get("op") not in STEPS:
-            raise InvalidInput(f"edit: step {number} needs an 'op' among {', '.join(STEPS)}; got {step!r}")
+            raise InvalidInput(f"edit: step {number} must have an 'op', one of {', '.join(STEPS)}; got {step!r}")
         allowed = STEPS[given["op"]][1]
         unknown = sorted(map(str, set(given) - {"op", *allowed}))
         if unknown:
@@ -71,13 +71,13 @@ def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable:
     Parameters
     ----------
     points : (n, 2) array
-        The elements of the picture, and after them their copies beyond its borders.
+        Elements of the image, followed by their copies beyond its borders.
     originals : int
-        How many are of the picture. Copies follow where a step is a rule of places, and stay where it names elements.
+        Number of elements in the image. Copies follow rules of places, and stay in place if a step names elements.
     steps : sequence
-        As `as_steps` returns them.
+        Steps as returned by `as_steps`.
     nameable : int, optional
-        How many of those of the picture a step may name; all by default.
+        Number of elements that a step may name. Default: all in the image.
 
     """
     at, kept = points.copy(), np.ones(len(points), bool)
@@ -85,7 +85,7 @@ def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable:
         by_name = step["op"] in ("move", "remove", "points")
         at = STEPS[step["op"]][0](step, at, nameable if by_name and nameable is not None else originals, kept)
     if not np.isfinite(at).all() or np.abs(at).max() > 1e6:
-        raise InvalidInput("edit: moves elements further than 10^6 pixels")
+        raise InvalidInput("edit: must not move elements further than 10^6 pixels")
     return EditedLayout(at, kept, all(step["op"] in ("move", "points") for step in steps))
 
 
@@ -93,7 +93,7 @@ def _read_pair(step: Step, name: str, default: object = None) -> NDArray[np.floa
     value = step.get(name, default)
     array = try_array(value, np.float64)
     if array.shape not in ((), (2,)) or not np.isfinite(array).all():
-        raise InvalidInput(f"edit: {step['op']} needs {name} as a number or [rows, columns], got {value!r}")
+        raise InvalidInput(f"edit: {name} of {step['op']} must be a number or [rows, columns], got {value!r}")
     return np.array(np.broadcast_to(array, 2), np.float64)
 
 
@@ -104,7 +104,7 @@ def _read_element(step: Step, originals: int) -> int:
 def _scale_layout(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     factor = _read_pair(step, "factor", 1.0)
     if (factor < 0.1).any() or (factor > 10).any():
-        raise InvalidInput(f"edit: factor of scale must lie within 0.1 and 10, got {factor.tolist()}")
+        raise InvalidInput(f"edit: factor of scale must be from 0.1 to 10, got {factor.tolist()}")
     centre = at[:originals].mean(axis=0)
     return np.asarray((at - centre) * factor + centre, np.float64)
 
@@ -114,7 +114,7 @@ def _shift_layout(step: Step, at: Points, originals: int, kept: NDArray[np.bool_
 
 
 def _shift_rows(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Slide every other row one way, and those between the other way."""
+    """Move every other row one way, and the rows between the other way."""
     by = as_float(step.get("by", 0.0), "edit: by of rows", -1e4, 1e4)
     order = np.argsort(at[:, 0], kind="stable")
     gap = 0.5 * float(np.median(nearest_distances(at[:originals], 1)))
@@ -126,7 +126,7 @@ def _shift_rows(step: Step, at: Points, originals: int, kept: NDArray[np.bool_])
 
 
 def _randomise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Displace points by Gaussian noise in spacings, none nearer to another than a share of the least usual distance."""
+    """Displace points by Gaussian noise in spacings, and keep a share of the usual least distance."""
     amount = as_float(step.get("amount", 0.25), "edit: amount of randomise", 0, 10)
     least = as_float(step.get("least", 0.7), "edit: least of randomise", 0, 1)
     noise = np.random.default_rng(step["seed"])
@@ -145,14 +145,14 @@ def _randomise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) 
 
 
 def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Bring points to the lattice that fits them best, each to a place of its own."""
+    """Move points to the lattice that fits them best, each to a place of its own."""
     amount = as_float(step.get("amount", 1.0), "edit: amount of regularise", 0, 1)
     origin, basis = fit_lattice(at[:originals])
     span = np.linalg.inv(basis)
     index = np.rint((at - origin) @ span)
     low, high = index.min(axis=0).astype(int) - 1, index.max(axis=0).astype(int) + 1
     sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
-    # A lattice is full of ties, and the last bits of its fit hang on the processor.
+    # Round the lattice: it has many ties, and the last bits of its fit depend on the processor.
     places = np.round(sites.reshape(-1, 2) @ basis + origin, 6)
     of, _ = match_points(places, at)
     return at + amount * (places[of] - at)
@@ -160,7 +160,7 @@ def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_])
 
 def _move_element(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     if ("by" in step) == ("to" in step):
-        raise InvalidInput("edit: move needs one of 'by' and 'to'")
+        raise InvalidInput("edit: move must have either 'by' or 'to'")
     out, i = at.copy(), _read_element(step, originals)
     out[i] = at[i] + _read_pair(step, "by") if "by" in step else _read_pair(step, "to")
     return out
@@ -172,14 +172,14 @@ def _remove_element(step: Step, at: Points, originals: int, kept: NDArray[np.boo
 
 
 def _take_points(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Take a list of points: by index where there are as many as elements, else each the element that costs least."""
+    """Use a list of points: in order if there is one per element, else by the least cost."""
     listed = try_array(step.get("points"), np.float64)
     if listed.ndim != 2 or listed.shape[1] != 2 or not np.isfinite(listed).all():
-        raise InvalidInput("edit: points needs a list of finite [row, column]")
+        raise InvalidInput("edit: points must be a list of finite [row, column]")
     if len(np.unique(listed, axis=0)) < len(listed):
-        raise InvalidInput("edit: points holds one place twice")
+        raise InvalidInput("edit: points must not contain one place twice")
     if len(listed) > originals:
-        raise InvalidInput(f"edit: points has {len(listed)} places for {originals} elements; give as many or fewer")
+        raise InvalidInput(f"edit: points must have at most {originals} places, one per element; got {len(listed)}")
     out = at.copy()
     of = np.arange(originals) if len(listed) == originals else match_points(at[:originals], listed)[0]
     kept[:originals] = False
@@ -198,4 +198,4 @@ STEPS: dict[str, tuple[Callable[[Step, Points, int, NDArray[np.bool_]], Points],
     "remove": (_remove_element, ("element",)),
     "points": (_take_points, ("points",)),
 }
-"""What steps there are: what each does to a layout, and what it may say."""
+"""Steps by name: the function that changes a layout, and the options of the step."""

@@ -1,6 +1,6 @@
-"""The energy of a connected figure's deformation in `texrs.papers.splice`: section 4.2, Eq. 5, Table 1 and Figure 5.
+"""Energy of a connected figure's deformation in `texrs.papers.splice`: section 4.2, Eq. 5, Table 1 and Figure 5.
 
-Displacements are those of least energy, the one along an axis apart from the other.
+The displacements have the least energy, separately for each axis.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ __all__ = ["choose_coarseness", "make_energy_matrix", "minimise_energy"]
 Points = NDArray[np.float64]
 
 GOAL, RIGID = 1e4, 1e2
-"""lambda_G and lambda_R (section 4.2)."""
+"""Weights lambda_G and lambda_R (section 4.2)."""
 LOOSE = 1e-2
-"""Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
+"""Weight of the equations of pixels that are not rigid. Without it they would have no equation and would not move."""
 TIE = 1e-5
-"""Weight of equal displacements of neighbours: long joints that nothing else holds do not slide freely."""
+"""Weight of equal displacements of neighbours. It keeps long joints without pins from sliding freely."""
 STEPS = ((0, 0), (0, 1), (0, 2), (1, -1), (1, 0), (1, 1), (2, 0))
-"""How far down and to the right of a pixel others lie that equations speak of together with it."""
+"""Row and column steps from a pixel to the pixels that share an equation with it."""
 MOST = 1 << 19
-"""Pixels of a connected figure beyond which those are solved for that are as many as can be, two, four, ... apart."""
+"""Maximum number of solved pixels of a connected figure. Above it, only pixels two, four, ... apart are solved."""
 
 
 def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool) -> NDArray[np.float64]:
@@ -40,14 +40,14 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     Parameters
     ----------
     rigid : (H, W) bool
-        M of Table 1: the foreground, or the background where elements are jointed.
+        The mask M of Table 1: the foreground, or the background if elements are jointed.
     pins : (n, 2) int
-        The pixels of C_A.
+        Pinned pixels (C_A).
     shift : (n, 2) float64
-        How far each goes.
+        Displacement of each pin, in pixels.
     upright : bool
-        Table 1's last row, lambda_P = 0 and epsilon = 1: upright and level parts are decoupled, so that joints neither lean
-        nor change their width. Else lambda_P = 1 and epsilon = 1e-3.
+        If True, use Table 1's last row, lambda_P = 0 and epsilon = 1. Upright and level parts are then decoupled, so
+        that joints neither lean nor change their width. If False, lambda_P = 1 and epsilon = 1e-3.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
 
     """
     if not len(pins):
-        raise InvalidInput("elements: has no element in the picture to move")
+        raise InvalidInput("elements: must have an element inside the image that can move")
     whole, step = rigid.shape, choose_coarseness(rigid.shape)
     if step > 1:
         rigid, pins = _downsample_mask(rigid, step), pins // step
@@ -63,7 +63,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     at = pins[:, 0] * shape[1] + pins[:, 1]
     out = np.empty((*shape, 2))
     keys = [content_hash("energy", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
-    # Without the decoupling both axes have one matrix, and are solved for together.
+    # Without the decoupling both axes have one matrix, so they are solved together.
     factors = factorise(
         {keys[axis]: partial(make_energy_triangle, rigid, at, axis, upright=upright) for axis in (0, 1)}
     )
@@ -75,7 +75,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
 
 
 def choose_coarseness(shape: Sequence[int]) -> int:
-    """Return how many pixels apart those are that a connected figure is solved for."""
+    """Return the distance in pixels between solved pixels of a connected figure."""
     step = 1
     while math.prod(-(-n // step) for n in shape) > MOST:
         step *= 2
@@ -83,13 +83,13 @@ def choose_coarseness(shape: Sequence[int]) -> int:
 
 
 def _downsample_mask(rigid: Bools, step: int) -> Bools:
-    """Return the cells of so many pixels that hold a rigid one: thin joints stay whole."""
+    """Return the cells of ``coarse`` pixels with a rigid pixel, so that thin joints stay whole."""
     wide = np.pad(rigid, [(0, -n % step) for n in rigid.shape])
     return np.asarray(wide.reshape(wide.shape[0] // step, step, -1, step).any(axis=(1, 3)))
 
 
 def _upsample(coarse: NDArray[np.float64], shape: Sequence[int], step: int) -> NDArray[np.float64]:
-    """Return the displacement of every pixel from those in the middle of cells."""
+    """Return the displacement of every pixel from the displacements at the centres of cells."""
     for axis, count in enumerate(shape):
         at = np.clip((np.arange(count) - (step - 1) / 2) / step, 0, coarse.shape[axis] - 1)
         low = np.minimum(at.astype(np.intp), max(coarse.shape[axis] - 2, 0))
@@ -100,7 +100,7 @@ def _upsample(coarse: NDArray[np.float64], shape: Sequence[int], step: int) -> N
 
 
 def make_energy_matrix(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE) -> Any:
-    """Return the matrix of Eq. 5 for the displacement along an axis: lambda_G P + lambda_R (1 - U)^T w (1 - U)."""
+    """Return the matrix of Eq. 5 for displacements along an axis: lambda_G P + lambda_R (1 - U)^T w (1 - U)."""
     from scipy.sparse import tril
 
     lower = make_energy_triangle(rigid, pins, axis, upright=upright, loose=loose)
@@ -110,19 +110,19 @@ def make_energy_matrix(rigid: Bools, pins: NDArray[np.intp], axis: int, *, uprig
 def make_energy_triangle(
     rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE
 ) -> Any:
-    """Return the lower triangle of that matrix, of which `texrs.kernels.sparse` reads no more."""
+    """Return the lower triangle of that matrix, because `texrs.kernels.sparse` does not read the rest."""
     coupling, small = (0.0, 1.0) if upright else (1.0, 1e-3)
     u = weigh_neighbours(rigid, axis, coupling, small)
     u /= u.sum(axis=0)
     root = np.sqrt(RIGID * np.where(rigid, 1.0, loose))
-    # The equation of each pixel, by the pixels that it speaks of: those above, below, to the left, to the right, and its own.
+    # Coefficients of each pixel's equation: for the pixels above, below, left and right, and for itself.
     terms = {step: -(root * b) for step, b in zip(((-1, 0), (1, 0), (0, -1), (0, 1)), u, strict=True)}
     terms[0, 0] = root
     goal = np.asarray(np.bincount(pins, minlength=rigid.size) * GOAL, np.float64).reshape(rigid.shape)
     ties = tie_neighbours(rigid.shape, goal)
     bands = []
     for down, right in STEPS:
-        # Summed over the equations that speak of both pixels, in the order of their own.
+        # Sum the equations that contain both pixels, in a fixed order.
         band = np.zeros(rigid.shape)
         for one in ((1, 0), (0, 1), (0, 0), (0, -1), (-1, 0)):
             other = (one[0] + down, one[1] + right)
@@ -133,7 +133,7 @@ def make_energy_triangle(
 
 
 def _add_shifted(band: Points, product: Points, step: tuple[int, int]) -> None:
-    """Add what equations give to the pixel that lies a step from their own."""
+    """Add contributions of equations to the pixels that are a step away from their own."""
     to, of = (
         tuple(slice(max(0, sign * s), n - max(0, -sign * s)) for s, n in zip(step, band.shape, strict=True))
         for sign in (1, -1)
@@ -142,7 +142,7 @@ def _add_shifted(band: Points, product: Points, step: tuple[int, int]) -> None:
 
 
 def tie_neighbours(shape: tuple[int, ...], goal: Points) -> dict[tuple[int, int], Points]:
-    """Return lambda_G P, with the weak ties between all neighbours, by how far apart pixels lie."""
+    """Return lambda_G P, with the weak ties between all neighbours, by the offset between pixels."""
     diagonal = goal.copy()
     for axis in range(2):
         d = np.moveaxis(diagonal, axis, 0)
@@ -153,13 +153,13 @@ def tie_neighbours(shape: tuple[int, ...], goal: Points) -> dict[tuple[int, int]
 
 
 def weigh_neighbours(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:
-    """Return u_pq of each pixel p and its neighbours q above, below, left and right; 0 where there is none.
+    """Return u_pq of each pixel p and its neighbours q above, below, left and right; 0 outside the image.
 
-    Table 1 and Figure 5 are worded for the displacement along columns; along rows the axes change places.
+    Table 1 and Figure 5 describe the displacement along columns. For rows, the axes change places.
     """
     m = rigid if axis == 1 else rigid.T
     h, w = m.shape
-    # Outside counts as rigid for Figure 5.
+    # Pixels outside count as rigid for Figure 5.
     left = np.pad(m, ((0, 0), (1, 0)), constant_values=True)[:, :-1]
     right = np.pad(m, ((0, 0), (0, 1)), constant_values=True)[:, 1:]
     value = m + small

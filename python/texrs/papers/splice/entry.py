@@ -1,4 +1,4 @@
-"""What `texrs.papers.splice` takes: entries, checked, or pictures, analysed."""
+"""Check the input of `texrs.papers.splice`: analysed textures are checked, images are analysed."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ Making: TypeAlias = Callable[Concatenate[ElementAnalysis, P], T]
 FEWEST = 3
 SHORTEST = 16
 CACHES: list[Cache[bytes, Any]] = []
-"""All that is remembered of entries."""
+"""All caches of results for analysed textures."""
 
 
 def as_elements(value: object, name: str, progress: Progress) -> ElementAnalysis:
-    """Check an entry, or analyse a picture."""
+    """Check an analysed texture, or analyse an image."""
     if not isinstance(value, ElementAnalysis):
         given = as_ndarray(value, name)
         as_image(given, name, minimum=SHORTEST)
         try:
             found = analyse(given, progress=progress)
-            # In the shape that it came in.
+            # Keep the original shape of the image.
             return check_entry(replace(found, image=given), name)
         except LimitExceeded:
             raise
@@ -45,42 +45,44 @@ def as_elements(value: object, name: str, progress: Progress) -> ElementAnalysis
 
 
 def check_entry(entry: ElementAnalysis, name: str) -> ElementAnalysis:
-    """Check that the parts of an entry belong together; return it with its points as floats of 64 bit."""
+    """Check that the parts of an analysed texture match; return it with its points as 64-bit floats."""
     image = as_image(entry.image, f"{name}.image", minimum=SHORTEST)
     shape = image.shape[:2]
     mask = np.asarray(entry.mask)
     if mask.shape != shape or mask.dtype != np.bool_:
-        raise InvalidInput(f"{name}.mask: needs bool of shape {shape}, got {mask.dtype} {mask.shape}")
+        raise InvalidInput(f"{name}.mask: must be bool of shape {shape}, got {mask.dtype} {mask.shape}")
     if mask.all() or not mask.any():
         raise InvalidInput(
-            f"{name}.mask: is {'all' if mask.any() else 'no'} foreground; splicing needs elements and a ground between them"
+            f"{name}.mask: must contain elements and background, got {'only' if mask.any() else 'no'} foreground"
         )
     points = as_points(entry.points, (shape[0], shape[1]), f"{name}.points")
     if len(points) < FEWEST:
         raise InvalidInput(
-            f"{name}.points: {len(points)} elements are too few for a layout, three or more are needed; "
-            "give a larger picture, another box, or the points"
+            f"{name}.points: must have at least three elements for a layout, got {len(points)}; "
+            "give a larger image, another box, or the points"
         )
     as_wrap(entry.wrap, f"{name}.wrap")
     known = entry.known
     if known is not None and (known.shape != shape or known.min() < 0 or not len(points) <= known.max() <= known.size):
-        raise InvalidInput(f"{name}.known: needs labels of shape {shape} from 1 to {len(points)} or more, one a point")
+        raise InvalidInput(
+            f"{name}.known: must be labels of shape {shape} from 1 to at least {len(points)}, one per point"
+        )
     return replace(entry, points=points)
 
 
 def remember(
     count: int, *, seen: bool = False, size: Callable[[Any], int] | None = None
 ) -> Callable[[Making[P, T]], Making[P, T]]:
-    """Let a function keep what it last made of the mask, points, layout, wrap and labels of so many entries, and the rest.
+    """Cache the last results of a function, by the analysed textures and its other arguments.
 
     Parameters
     ----------
     count : int
-        How many results are kept, or how large they are together.
+        Maximum number, or total size, of cached results.
     seen : bool
-        Whether it also looks at the picture, and at the box of an element.
+        If True, the key also contains the image, and the box of an element. Default: False.
     size : callable, optional
-        How large a result is; each counts 1 by default.
+        Function that returns the size of a result. Default: each result counts 1.
 
     """
 

@@ -1,9 +1,9 @@
-"""The texture that gives the elements, extended beyond its borders, for `texrs.papers.splice`.
+"""Extend the texture whose elements are used beyond its borders.
 
-Whatever is spliced must bring elements from outside of the picture: the layout that it takes may be denser, and its own border
-is moved into the output. The picture goes on around its ends where it wraps, and is reflected where it does not. Then
-elements of disjoint foregrounds are turned back, so that none is mirrored, and those that the border cuts are left out. On
-their own layout they are sown, not reflected, as far as the output goes: a mirror would be seen in which of them lies where.
+A splice needs elements from outside the image. The new layout may be denser, and the image's own border moves into the
+output. The image repeats if it wraps, and is reflected otherwise. Disjoint elements are then turned back, so that they
+are not mirrored, and elements that the border cuts are left out. If elements keep their own layout, they are sown over
+the whole output instead. A reflection would be visible in their arrangement.
 """
 
 from __future__ import annotations
@@ -28,42 +28,46 @@ __all__ = ["Extension", "count_elements", "extend", "sow"]
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 Copies = tuple[Points, NDArray[np.intp], Bools]
-"""Elements of a texture that goes on: where they lie, which of its elements they are, along which axes they are mirrored."""
+"""Elements of an extended texture: their places, their numbers in the texture, and the axes along which they are
+mirrored.
+"""
 Placed = tuple[Copies, Labels, list[int], list[tuple[NDArray[np.intp], NDArray[np.intp]]]]
-"""Copies, the number of each pixel's element among those that are kept, which these are, and what `_place_elements` turns."""
+"""The copies, the element number of each pixel, the numbers of the kept elements, and the turned pixels of
+`_place_elements`.
+"""
 
 FREE, SOWN_FREE = 0.9, 0.75
-"""Share of an element, with what lies around it, that must be free where it is put; and where it was sown, so that it fits."""
+"""Share of an element and its surroundings that must be free at its place, and the share if elements were sown."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Extension:
-    """A texture that goes on beyond its borders.
+    """A texture that is extended beyond its borders.
 
     Attributes
     ----------
     origin : (int, int)
-        Row and column of its first pixel in the output.
+        Row and column of the first pixel in the output.
     pixel : (H, W, 2) int32
-        The pixel of the texture that each one shows.
+        Source pixel in the texture of each pixel.
     mask : (H, W) bool
         The foreground.
     points : (n, 2) float64
-        Elements that may be moved, in the output.
+        Elements that may be moved, in output coordinates.
     element : (n) int
-        Which element of the texture each one is.
+        Number of the texture's element that each point is a copy of.
     instance : (H, W) int32
-        Of a disjoint foreground: the one of ``points`` that a pixel moves with, counted from 1; 0 elsewhere.
+        Element of each pixel in a disjoint foreground, as an index of ``points`` counted from 1; 0 elsewhere.
     stray : (H, W) bool
-        Foreground that moves with none: cut by the border, or left over where an element was turned back.
+        Foreground without an element: cut by the border, or left over where an element was turned back.
     mirrored : (H, W, 2) bool
-        Along which axes what a pixel shows is mirrored.
+        Axes along which each pixel is mirrored.
     piece : (H, W) int32
-        As ``instance``, and after those numbers the strays, piece by piece.
+        Numbers as in ``instance``, followed by numbers of the stray pieces.
     stray_points : (m, 2) float64
-        The middle of each stray piece, in the output.
+        Centre of each stray piece, in output coordinates.
     originals : int
-        How many of the points are of the picture itself, in its order; they come first. 0 where that was not asked for.
+        Number of points in the image itself. They come first, in its order. 0 if they were not requested.
 
     """
 
@@ -84,10 +88,10 @@ class Extension:
 def extend(
     entry: ElementAnalysis, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False
 ) -> Extension:
-    """Let a texture go on so far beyond an output that is centred on it.
+    """Extend a texture beyond an output that has the same centre.
 
-    With ``whole=False`` every element of the picture itself is kept, also those that the border cuts; with ``exact`` every
-    pixel is.
+    With ``whole=False`` all elements of the image itself are kept, also elements that the border cuts. With ``exact``
+    all its pixels are kept.
     """
     layout, low, high = _find_bounds(entry, size, margin, exact=exact)
     shape = np.array(entry.mask.shape)
@@ -100,7 +104,7 @@ def extend(
     places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
-        # Those of the picture, in its order.
+        # Elements of the image come first, in its order.
         order = np.lexsort((np.arange(len(of)), np.where(inside, of, 0), ~inside))
         places, of, flips, inside = places[order], of[order], flips[order], inside[order]
     originals = 0 if whole else int(np.count_nonzero(inside))
@@ -120,7 +124,7 @@ def extend(
 
 @remember(4)
 def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension | None:
-    """Let separate elements go on as they lie, that far beyond an output; None where they go on by a rule, or need not."""
+    """Sow separate elements in their own arrangement beyond an output, or return None if this is not needed."""
     layout, low, high = _find_bounds(entry, size, margin, exact=False)
     parts, shape = split_foreground(entry), entry.mask.shape
     radius = np.sqrt(np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:] / np.pi)
@@ -133,13 +137,13 @@ def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension
     beyond = (found.points != parts.points[found.of]).any(axis=1)
     flips = np.repeat(beyond[:, np.newaxis], 2, axis=1)
     mask: Bools = entry.mask[pixel[..., 0], pixel[..., 1]]
-    # They have room for themselves, if not for what lies around them.
+    # Sown elements have room for themselves, but not always for their surroundings.
     placed = _place_elements(entry, mask.shape, (found.points - low, found.of, flips), least=SOWN_FREE)
     return _stamp(entry, pixel, mask, mirrored, placed, low + offset)
 
 
 def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) -> tuple[Places, Bools]:
-    """Return the pixel of the picture that each one of a box shows, and along which axes it is mirrored."""
+    """Return the source pixel of each pixel in a box, and the axes along which it is mirrored."""
     check_memory(int(np.prod(high - low)) * BEYOND)
     along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
     rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
@@ -149,7 +153,7 @@ def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) 
 
 @remember(256)
 def count_elements(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> int:
-    """Count the elements that `extend` finds, without what it makes of them."""
+    """Return the number of elements that `extend` finds, without building the extension."""
     layout, low, high = _find_bounds(entry, size, margin, exact=False)
     if entry.layout == Layout.DISJOINT:
         return len(_place_copies(entry, _as_pair(low), _as_pair(high))[2])
@@ -158,7 +162,7 @@ def count_elements(entry: ElementAnalysis, size: tuple[int, int], margin: int) -
 
 @remember(2)
 def _place_copies(entry: ElementAnalysis, low: tuple[int, int], high: tuple[int, int]) -> Placed:
-    """Put every whole element where the picture goes on with it, in a box of its own pixels."""
+    """Put every whole element at each of its places in the extended image, in a box of its own pixels."""
     check_memory((high[0] - low[0]) * (high[1] - low[1]) * BEYOND)
     places, of, flips = _reflect_all(entry).within(np.array(low, np.float64), np.array(high, np.float64) - 1)
     return _place_elements(entry, (high[0] - low[0], high[1] - low[1]), (places - low, of, flips))
@@ -170,25 +174,25 @@ def _as_pair(place: NDArray[np.intp]) -> tuple[int, int]:
 
 @remember(64)
 def lay_out(entry: ElementAnalysis, *, beyond: bool) -> PointLayout:
-    """Return how the layout of a texture goes on; ``beyond`` lets it be reflected outside of the picture."""
+    """Return how the layout of a texture continues; ``beyond`` permits reflections outside the image."""
     return PointLayout.of(entry.points, entry.mask.shape, entry.wrap, beyond=beyond)
 
 
 def _find_bounds(
     entry: ElementAnalysis, size: tuple[int, int], margin: int, *, exact: bool
 ) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
-    """Return the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
+    """Return the layout of a texture as its pixels continue, and the bounds of the extension in its coordinates."""
     shape = np.array(entry.mask.shape)
-    offset = (np.array(size) - shape) // 2  # Of the picture in the output.
+    offset = (np.array(size) - shape) // 2  # Offset of the image in the output.
     disjoint = entry.layout == Layout.DISJOINT
     layout = _reflect_all(entry) if disjoint or exact else lay_out(entry, beyond=False)
     return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
 
 
 def _reflect_all(entry: ElementAnalysis) -> PointLayout:
-    """Return the layout of a texture that is reflected at its very ends, or goes around.
+    """Return the layout of a texture that is reflected at its very ends, or wraps.
 
-    The elements that the border cuts are left out, or wanted: no pixel is in the way.
+    Elements that the border cuts are left out or requested here, so no pixel limits the reflection.
     """
     shape = entry.mask.shape
     points = split_foreground(entry).points if entry.layout == Layout.DISJOINT else entry.points
@@ -207,16 +211,16 @@ def _stamp(
     originals: int = 0,
     inside: Bools | None = None,
 ) -> Extension:
-    """Return a texture that goes on with its elements where they were put, the right way round.
+    """Return an extended texture with its elements at their places, not mirrored.
 
-    What no element claims of the picture itself, ``inside``, belongs to it as it is.
+    Pixels of the image itself, ``inside``, stay unless an element covers them.
     """
     from scipy.ndimage import label
 
     (places, of, _), instance, kept, turns = placed
     parts = split_foreground(entry)
     known = parts.region[pixel[..., 0], pixel[..., 1]] > 0
-    # Mirrored elements make room for those that are turned back.
+    # Erase mirrored elements, to make room for the turned ones.
     turned = mirrored.any(axis=-1) & known
     for at, pixels in turns:
         pixel.reshape(-1, 2)[at] = pixels
@@ -225,7 +229,7 @@ def _stamp(
     if inside is not None:
         stray &= ~inside
     if not kept:
-        raise InvalidInput("elements: the border cuts every element; splicing needs some that are whole")
+        raise InvalidInput("elements: must have whole elements, but the border cuts every one")
     chosen = np.array(kept)
     pieces, count = label(stray)
     where = np.nonzero(pieces)
@@ -255,10 +259,12 @@ def _place_elements(
     *,
     least: float = FREE,
 ) -> Placed:
-    """Give the pixels of each element its number, if it has room: the originals always, others not ``inside``.
+    """Return the number of each pixel's element.
 
-    Of those that are turned back, where they lie and the pixels that they show come last. Places of those that are kept are
-    then where their centres are in whole pixels from the texture's own.
+    Originals are always placed, others outside ``inside`` if they have room.
+
+    The pixels of turned elements, and their source pixels, come last. The places of kept elements are rounded, so that
+    their centres are whole pixels away from those in the texture.
     """
     places, of, flips = copies
     parts = split_foreground(entry)
@@ -268,13 +274,14 @@ def _place_elements(
     wanted = parts.whole[of]
     wanted[:originals] = True
     shown, away, reach = _list_shapes(entry)
-    # All copies of an element share how far its pixels lie from its centre, in an array of that width.
+    # All copies of an element share the offsets of its pixels from its centre.
     steps = {i: away[i] @ (width, 1) for i in np.unique(of[wanted]).tolist()}
     beyond = ((spots + reach[0, of] < 0) | (spots + reach[1, of] >= limits)).any(axis=1)
     beyond[:originals] = False
     number = instance.reshape(-1)
     kept: list[int] = []
     turns: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = []
+    # Place the copies in order; skip copies that would overlap others.
     for k in np.flatnonzero(wanted & ~beyond).tolist():
         i = int(of[k])
         at = steps[i] + (int(spots[k, 0]) * width + int(spots[k, 1]))
@@ -292,7 +299,7 @@ def _place_elements(
 
 @remember(4)
 def _list_shapes(entry: ElementAnalysis) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], NDArray[np.intp]]:
-    """Return of each element its pixels, how far they lie from its centre, and the first and the last of that, (2, n, 2)."""
+    """Return each element's pixels, their offsets from its centre, and the first and last offset, (2, n, 2)."""
     parts, shape = split_foreground(entry), np.array(entry.mask.shape)
     centres, count = _round_half_up(parts.points), len(parts.points)
     at = np.flatnonzero(parts.region)
@@ -311,5 +318,5 @@ def _list_shapes(entry: ElementAnalysis) -> tuple[list[NDArray[np.intp]], list[N
 
 
 def _round_half_up(place: Points) -> NDArray[np.intp]:
-    """Return the nearest pixel; half-way the higher one, so that whole steps stay whole."""
+    """Return the nearest pixel, and the higher one of two, so that whole steps stay whole."""
     return np.asarray(np.floor(place + 0.5), np.intp)

@@ -1,6 +1,6 @@
-"""Factors of the matrices that `texrs.papers.splice` solves with, kept for the next splice.
+"""Factors of the matrices that `texrs.papers.splice` solves with, cached for the next splice.
 
-The matrix of a deformation depends on what is rigid and on which points are pinned, not on where they go.
+The matrix of a deformation depends on the rigid pixels and the pinned points, not on the displacements.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from texrs.kernels.sparse import Cholesky
 __all__ = ["factorise", "make_triangle"]
 
 KEPT = 1 << 30
-"""Bytes of factors that are kept."""
+"""Maximum size of all cached factors, in bytes."""
 
 _FACTORS: Cache[bytes, Cholesky] = Cache(KEPT, lambda factor: min(factor.nbytes, KEPT))
 
 
 def factorise(matrices: Mapping[bytes, Callable[[], Any]]) -> dict[bytes, Cholesky]:
-    """Return the factors of matrices, kept by what these are made from; those that lack are made side by side."""
+    """Return the factors of matrices from the cache; missing factors are computed in parallel."""
     found = {key: factor for key in matrices if (factor := _FACTORS.get(key)) is not None}
     lacking = [key for key in matrices if key not in found]
     made = Cholesky.several([matrices[key]() for key in lacking]) if lacking else []
@@ -36,17 +36,17 @@ def factorise(matrices: Mapping[bytes, Callable[[], Any]]) -> dict[bytes, Choles
 def make_triangle(
     shape: tuple[int, int], steps: Sequence[tuple[int, int]], bands: Sequence[NDArray[np.float64]]
 ) -> Any:
-    """Return the lower triangle of a symmetric matrix that couples pixels with others so many rows and columns away.
+    """Return the lower triangle of a symmetric matrix that couples pixels at given offsets.
 
     Parameters
     ----------
     shape : (int, int)
-        Of the picture, whose pixels are the unknowns, row by row.
+        Shape of the image, whose pixels are the unknowns, row by row.
     steps : sequence of (int, int)
-        Rows down and columns to the right, of which the first are (0, 0): each one's pixel comes after that of the one before.
+        Offsets (rows down, columns to the right); the first one is (0, 0). They are sorted by the order of the pixels.
     bands : sequence of (H, W) float64
-        The entries of each pixel and of the one that lies that step away; what lies outside of the picture is not read, and no
-        0 but on the diagonal is an entry.
+        Matrix entry for each pixel and the pixel at the offset. Entries outside the image are not read. Zeros are
+        stored only on the diagonal.
 
     """
     from scipy.sparse import csc_array
@@ -60,7 +60,7 @@ def make_triangle(
     there = flat != 0
     there[:, 0] = True
     starts = np.zeros(size + 1, np.int32)
-    # By bands: along so short an axis NumPy counts more slowly.
+    # Count band by band, because NumPy is slow along so short an axis.
     count = np.zeros(size, np.uint8)
     for band in there.T:
         count += band

@@ -1,6 +1,6 @@
-"""The foreground of a disjoint texture, element by element, for `texrs.papers.splice`.
+"""Split the foreground of a disjoint texture into its elements.
 
-A pixel belongs to the element whose component it lies in, and within a component of several elements to the nearest one.
+A pixel belongs to the element of its component. If a component has several elements, it belongs to the nearest one.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ __all__ = ["Foreground", "split_foreground"]
 Points = NDArray[np.float64]
 
 FRINGE = 2
-"""Pixels around an element that move with it: its antialiased outline and shadow."""
+"""Width in pixels of the border that moves with an element: its antialiased outline and shadow."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Foreground:
-    """The foreground of a texture, element by element.
+    """The foreground of a texture, split into elements.
 
     Attributes
     ----------
     points : (n, 2) float64
-        Centres; of foreground that no element claims too, after those of the entry.
+        Centres of the elements. Centres of foreground without an element come after those of the analysed texture.
     region : (H, W) int32
         The element of each foreground pixel, counted from 1; 0 elsewhere.
     core : (H, W) int32
         The same without the fringe.
     cut : (n, 2, 2) bool
-        Whether the border cuts an element at the first or the last end of an axis.
+        True if the border cuts an element at the first or the last end of an axis.
     present : (n) bool
-        Whether an element has any foreground.
+        True if an element has any foreground.
 
     """
 
@@ -51,14 +51,14 @@ class Foreground:
 
     @property
     def whole(self) -> Bools:
-        """Whether the border leaves an element whole."""
+        """True for each element that the border does not cut."""
         whole: Bools = self.present & ~self.cut.any(axis=(1, 2))
         return whole
 
 
 @remember(16)
 def split_foreground(entry: ElementAnalysis) -> Foreground:
-    """Split a disjoint foreground into its elements: by component, and within one by the nearest element; or as is known."""
+    """Split a disjoint foreground into elements: by known labels, or by component and nearest element."""
     from skimage.segmentation import expand_labels
 
     if entry.known is None:
@@ -77,7 +77,7 @@ def split_foreground(entry: ElementAnalysis) -> Foreground:
 
 
 def _open_gaps(region: Labels) -> Labels:
-    """Open a gap of a pixel between regions that touch."""
+    """Open a gap of one pixel between touching regions."""
     gap = np.zeros(region.shape, bool)
     for axis in range(2):
         a, b = (np.moveaxis(x, axis, 0) for x in (region, gap))

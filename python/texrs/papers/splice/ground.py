@@ -1,8 +1,8 @@
-"""The ground between separate elements, made anew for a splice: neither warped nor averaged.
+"""Build the background between separate elements for a splice, without warping or averaging.
 
-The texture's ground is completed where its elements lie, and grown by the stitcher where the result is larger. Each element
-is then cut into it with its matte: what around an element looks as around the others, its shadow and its highlights. All of
-it in even light (`light`).
+The texture's background is completed where its elements are, and grown by the stitcher if the result is larger. Each
+element is then cut into it with its matte: the surroundings that all elements share, such as shadows and highlights.
+All steps use even light (`light`).
 """
 
 from __future__ import annotations
@@ -33,45 +33,50 @@ from texrs.point_sets import spacing
 __all__ = ["ENOUGH", "Scene", "cut_in", "lay_ground", "survey"]
 
 BESIDE = 3
-"""Pixels around an element in which it is cut into the ground in any case."""
+"""Width in pixels of the surroundings that are always cut in with an element."""
 LOCAL = 12.0
-"""Standard deviation, in pixels, of what the ground around a pixel is."""
+"""Standard deviation in pixels of the filter for the local mean of the background."""
 UNLIKE = 1.1
-"""Standard deviations of the ground by which a matte differs from it, on average over all elements."""
+"""Least difference of a matte from the background, averaged over all elements, in standard deviations of the
+background.
+"""
 SEEN = 0.3
-"""Share of the elements that must show a pixel of the matte."""
+"""Least share of the elements that must show a pixel of the matte."""
 GROWN = 3
-"""Pixels around a matte in which it is cut into the ground."""
+"""Width in pixels of the surroundings of a matte that are cut in with it."""
 ROOM = 0.35
-"""Of the spacing: how far from an element's box its matte is looked for."""
+"""Distance from an element's box up to which its matte is searched, as a share of the spacing."""
 LEAST = 0.02
-"""Share of the texture that must be ground, for what is unlike it to be known."""
+"""Least share of background in the texture, for mattes to be found."""
 ENOUGH = 0.15
-"""Share of the texture that is neither element nor matte from which on ground can be made of it: of less, it shows what lies
-in it again and again."""
+"""Least share of the texture without elements and mattes. Otherwise a background is not built.
+
+With less, the background's features repeat visibly.
+"""
 KEPT, PIXEL, GROUNDS = 1 << 27, 64, 2
-"""Bytes of what is known of textures that are kept, and what a pixel of one takes; completed grounds that are kept of each."""
+"""Maximum bytes of cached textures, bytes for each pixel of one, and maximum number of completed backgrounds of each.
+"""
 CANDIDATES = 4
-"""Places that are tried for each patch of the ground."""
+"""Number of places that are tried for each patch of the background."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A texture of separate elements, and what of it is whose.
+    """A texture of separate elements, with the owner of each pixel.
 
     Attributes
     ----------
     a : ElementAnalysis
         The texture, in even light.
     light : Light or None
-        What was taken off; None where its light was even.
+        The removed light; None if the light was even.
     own : (h, w) int32
-        The element that a pixel belongs to, counted from 1, as its own or in its matte or beside that; 0 for ground, -1 for
-        scraps of foreground that are of none.
+        Number of the element that a pixel belongs to, counted from 1. The pixel is in the element, in its matte or
+        next to it. 0 is background, and -1 is foreground without an element (scraps).
     certain : (h, w) bool
-        Where a matte is beyond doubt.
+        Pixels that are certainly in a matte.
     grounds : Cache
-        The texture's ground, completed, by the seed of that.
+        Completed backgrounds of the texture, by seed.
 
     """
 
@@ -84,9 +89,9 @@ class Scene:
 
 @remember(KEPT, seen=True, size=lambda scene: min(scene.own.size * PIXEL, KEPT))
 def survey(a: ElementAnalysis, *, narrow: bool = False) -> Scene:
-    """Tell elements with their mattes from ground, and take off what light there is on them.
+    """Separate elements with their mattes from the background, and remove the light.
 
-    With ``narrow`` they have no mattes where these would leave too little ground.
+    With ``narrow``, elements have no mattes if these would leave too little background.
     """
     parts = split_foreground(a)
     own, certain = find_owners(guidance(as_image(a.image)), a, parts)
@@ -100,27 +105,27 @@ def survey(a: ElementAnalysis, *, narrow: bool = False) -> Scene:
 def lay_ground(
     scene: Scene, match: Match, draft: Draft, label: NDArray[np.uint32], seed: int, watch: Progress
 ) -> Draft | None:
-    """Return the places of a splice whose elements lie where a draft has them, on a ground of its own.
+    """Return the source pixels of a splice with its elements placed as in a draft, on a background of their own.
 
     Parameters
     ----------
     scene : Scene
-        The texture: its elements are separate.
+        The texture of separate elements.
     match : Match
-        Which element is where.
+        Places of the elements.
     draft : Draft
-        Where elements go.
+        Pixels of the placed elements.
     label : (H, W) uint32
         The target of each pixel of an element, counted from 1; 0 elsewhere.
     seed : int
-        Chooses the patches of the ground.
+        Number that selects the patches of the background.
     watch : callable
-        Called as ``watch(stage, share)``.
+        Function called as ``watch(stage, share)``.
 
     Returns
     -------
     Draft or None
-        None where the texture shows too little of its ground, and where it is moved as a whole.
+        None if the texture shows too little of its background, or moves as a whole.
 
     """
     sized = label.shape == scene.own.shape
@@ -143,13 +148,13 @@ def lay_ground(
 
 
 def keep_still(scene: Scene, places: NDArray[np.int32], label: NDArray[np.uint32], element: NDArray[np.intp]) -> None:
-    """Leave elements that do not move as they are, with all around them; scraps, where none does."""
+    """Keep elements that do not move with all their surroundings; if none moves, keep scraps as well."""
     here = np.moveaxis(np.indices(label.shape, np.int32), 0, -1)
     moved = np.zeros(int(label.max()) + 1, bool)
     moved[label[(places != here).any(axis=-1) & (label > 0)]] = True
     stays = np.zeros(int(scene.own.max()) + 2, bool)
     stays[element[(label > 0) & ~moved[label]] + 1] = True
-    # The last stands for scraps.
+    # The last entry is for scraps.
     stays[-1] = not moved.any()
     still = stays[scene.own] & (scene.own != 0) & ~moved[label]
     places[still] = here[still]
@@ -165,24 +170,24 @@ def cut_in(
     mirrored: Bools | None = None,
     room: Bools | None = None,
 ) -> NDArray[np.int32]:
-    """Cut elements into a ground, each with its matte; a shadow stays whole.
+    """Cut elements into a background, each with its matte; a shadow stays whole.
 
     Parameters
     ----------
     scene : Scene
         The texture.
     ground : (H, W, 2) int32
-        Where the pixels of the ground come from.
+        Source pixels of the background.
     places : (H, W, 2) int32
-        Where those of elements do.
+        Source pixels of the elements.
     label : (H, W) uint32
-        Which pixels are of an element that is to be cut in: not 0.
+        Pixels of an element that will be cut in; 0 elsewhere.
     element : (H, W) int
-        Which of the texture's elements that is.
+        Number of the texture's element at each pixel.
     mirrored : (H, W, 2) bool, optional
-        Along which axes it is mirrored.
+        Axes along which the pixel is mirrored. Default: none.
     room : (H, W) bool, optional
-        Where a matte may be; everywhere by default.
+        Pixels where a matte may be. Default: everywhere.
 
     """
     carried, offered = carry_mattes(places, label, element, scene.own, mirrored)
@@ -192,16 +197,16 @@ def cut_in(
     here, there = (guide[p[..., 0], p[..., 1]] for p in (ground, carried))
     elements = label > 0
     everywhere = np.ones(label.shape, bool)
-    # Cuts run around a shadow.
+    # Cuts run around a shadow, because its matte is a hard constraint.
     core = elements | (offered & scene.certain[carried[..., 0], carried[..., 1]])
     taken = cut(here, there, everywhere, offered | elements, core_b=core, cost="paper").mask | elements
     return np.where(taken[..., np.newaxis], carried, ground).astype(np.int32)
 
 
 def find_owners(guide: Floats, a: ElementAnalysis, parts: Foreground) -> tuple[NDArray[np.int32], Bools]:
-    """Return the element, counted from 1, that each pixel of the texture belongs to, and where that is certain.
+    """Return the element of each texture pixel, counted from 1, and the pixels that are certain.
 
-    A pixel may be the element's own, or in its matte or beside that; all else is ground, 0, but for scraps, -1.
+    A pixel belongs to an element if it is inside, in its matte, or next to these. Background is 0, and scraps are -1.
     """
     from scipy.ndimage import binary_dilation, distance_transform_edt
 
@@ -219,7 +224,7 @@ def find_owners(guide: Floats, a: ElementAnalysis, parts: Foreground) -> tuple[N
 
 
 def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Floats) -> Bools:
-    """Return what looks alike around elements, and unlike the ground, in a square around their middles."""
+    """Return a square mask of surroundings that all elements share and that differ from the background."""
     from scipy.ndimage import label
 
     sure = away > BESIDE
@@ -234,8 +239,9 @@ def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Fl
     apart = guide - usual
     deviation = float(np.sqrt((apart[sure] ** 2).mean())) + 1 / 255
     padded = np.pad(apart, ((reach, reach), (reach, reach), (0, 0)))
-    # What is another element's is not seen.
+    # Ignore pixels of other elements.
     owner = np.pad(parts.region, reach, constant_values=-1)
+    # Average the difference from the local background over all whole elements.
     total, count = np.zeros((*none.shape, guide.shape[-1])), np.zeros(none.shape)
     for number, (row, column) in zip(np.flatnonzero(parts.whole) + 1, middles.tolist(), strict=True):
         window = (slice(row, row + len(none)), slice(column, column + len(none)))
@@ -251,7 +257,7 @@ def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Fl
 
 
 def complete_ground(a: ElementAnalysis, own: NDArray[np.int32], seed: int, watch: Progress) -> NDArray[np.int32] | None:
-    """Return where each pixel of the texture's ground comes from, elements and mattes filled with what is neither."""
+    """Return the source pixels of the completed background, where patches of background fill elements and mattes."""
     hole = own != 0
     if (~hole).mean() < ENOUGH:
         return None
@@ -265,9 +271,10 @@ def complete_ground(a: ElementAnalysis, own: NDArray[np.int32], seed: int, watch
 def grow_ground(
     a: ElementAnalysis, bare: NDArray[np.int32], size: tuple[int, ...], seed: int, watch: Progress
 ) -> NDArray[np.int32]:
-    """Return where each pixel of a ground of some size comes from: the completed one, or patches of it, cut together.
+    """Return the source pixels of a background of any size, from the completed background or patches of it.
 
-    Where the completed one is large enough it is taken as it lies: of several patches the smoothest fits best.
+    If the completed background is large enough, its middle is used. Patches are avoided then, because the smoothest
+    would fit best.
     """
     if all(n <= m for n, m in zip(size, bare.shape, strict=False)):
         first = [(m - n) // 2 for n, m in zip(size, bare.shape, strict=False)]
@@ -297,7 +304,7 @@ def carry_mattes(
     own: NDArray[np.int32],
     mirrored: Bools | None,
 ) -> tuple[NDArray[np.int32], Bools]:
-    """Return where pixels would come from that are of an element or beside one, and which of those are of its matte."""
+    """Return the source pixels of elements and their surroundings, and the pixels that belong to a matte."""
     from scipy.ndimage import distance_transform_edt
 
     near = distance_transform_edt(label == 0, return_distances=False, return_indices=True)

@@ -1,8 +1,8 @@
-"""Harmonic interpolation of displacements: the ground between disjoint elements in `texrs.papers.splice`.
+"""Interpolate displacements of the background between disjoint elements by harmonic functions.
 
-The limit of Eq. 5 for lambda_G and lambda_R without bound and epsilon = 0: each element moves by its own pin alone. What
-is left is the ground, whose displacement is harmonic: no pixel moves further than the elements around it. It is so
-smooth that it is solved for at every other pixel; the rest are made even with the ones beside them.
+This is the limit of Eq. 5 for large lambda_G and lambda_R and epsilon = 0, where each element moves by its own pin
+only. The displacement of the background is harmonic, so no pixel moves further than the elements around it. It is
+smooth enough to be solved at every other pixel. The pixels between are interpolated and smoothed.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from texrs.papers.splice.factors import factorise, make_triangle
 __all__ = ["STEP", "interpolate"]
 
 STEP = 2
-"""Of the pixels between disjoint elements those are solved for whose row and column are multiples of this."""
+"""Distance between solved pixels: those whose row and column are multiples of this."""
 ROUNDS = 2
-"""Rounds in which the ground between the pixels that it is solved for is smoothed."""
+"""Number of smoothing rounds for the background between solved pixels."""
 
 
 def interpolate(constrained: Bools, displacement: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the displacement of every pixel where some are constrained, and the rest goes along smoothly.
+    """Return a smooth displacement field from the displacements of some pixels.
 
     Parameters
     ----------
     constrained : (H, W) bool
-        Pixels whose displacement is given: elements; elsewhere is ground.
+        True for pixels with a given displacement (elements), False for background.
     displacement : (2, H, W) float32
-        How far they move along rows and columns.
+        Displacement along rows and columns, in pixels.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def interpolate(constrained: Bools, displacement: NDArray[np.float32]) -> NDArra
 
     """
     out = np.empty((*constrained.shape, 2))
-    # One for all: to fetch new memory takes longer than to compute what is in it.
+    # Reuse one buffer, because allocating memory takes longer than the computation in it.
     wide = np.empty((constrained.shape[0] + 2, constrained.shape[1] + 2), np.float32)
     for axis, coarse in enumerate(_solve_laplace(constrained[::STEP, ::STEP], displacement[:, ::STEP, ::STEP])):
         field = _upsample(coarse, constrained.shape)
@@ -53,7 +53,7 @@ def interpolate(constrained: Bools, displacement: NDArray[np.float32]) -> NDArra
 
 
 def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the displacement that is at each pixel of the ground the mean of those beside it."""
+    """Return the displacement that equals the mean of its neighbours at each background pixel."""
     shape, free = constrained.shape, ~constrained
     out = np.where(constrained, displacement, 0.0).astype(np.float64)
     if not free.any():
@@ -61,7 +61,7 @@ def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDA
     key = content_hash("interpolate", np.packbits(free), shape)
     solver = factorise({key: lambda: _make_laplacian(free)})[key]
     flow = np.zeros((2, *shape))
-    # What an element's pixel hands to the ground beside it; the ground itself has nothing yet.
+    # Sum the given displacements of neighbouring element pixels; background pixels contribute nothing yet.
     flow[:, :-1] += out[:, 1:]
     flow[:, 1:] += out[:, :-1]
     flow[:, :, :-1] += out[:, :, 1:]
@@ -71,7 +71,7 @@ def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDA
 
 
 def _upsample(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the pixels between those that are known at every other one."""
+    """Interpolate the pixels between those that are known at every other one."""
     out = coarse.astype(np.float32)
     for axis in range(2):
         sides = (shape[0], shape[1] if axis else out.shape[1])
@@ -87,7 +87,7 @@ def _upsample(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np
 
 
 def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
-    """Set each pixel to the mean of the four beside it; beyond the border, in ``wide``, the field goes on as it is."""
+    """Set each pixel to the mean of its four neighbours; ``wide`` continues the field beyond the border."""
     wide[1:-1, 1:-1] = field
     wide[0, 1:-1], wide[-1, 1:-1] = field[0], field[-1]
     wide[1:-1, 0], wide[1:-1, -1] = field[:, 0], field[:, -1]
@@ -98,7 +98,7 @@ def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
 
 
 def _make_laplacian(free: Bools) -> Any:
-    """Return the lower triangle of the Laplace equation at the free pixels, the others being given: each stands for itself."""
+    """Return the lower triangle of the Laplace equation at free pixels; given pixels have the identity."""
     degree = np.zeros(free.shape)
     bands = []
     for axis in range(2):

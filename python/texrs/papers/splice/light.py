@@ -1,10 +1,10 @@
-"""Light that differs across a picture of separate elements: taken off before they are moved, and put back after.
+"""Remove light that varies across an image of separate elements before they move, and restore it afterwards.
 
-What is looked up far from where it is shown brings the light of its own place along: a dark patch of ground into the bright
-corner, a bright element among dark ones. Where the ground's low frequencies vary more than all the rest of it, that is light,
-and no texture. It is taken for an addition, as a haze or a glare is: the contrast of elements stays as it was, and the noise
-of dark corners is not multiplied. How much of it falls on the elements themselves is measured: coins under a haze on the glass
-behind them are as bright as the others.
+A moved pixel keeps the light of its old place: a dark patch of background in a bright corner, a bright element among
+dark ones. If the background's low frequencies vary more than the rest of it, they count as light and not as texture.
+The light is modelled as a sum, such as haze or glare. The contrast of elements therefore stays, and the noise of dark
+corners is not amplified. The share of light on the elements is measured: coins under a haze on the glass behind them
+are as bright as the others.
 """
 
 from __future__ import annotations
@@ -23,28 +23,30 @@ from texrs.point_sets import spacing
 __all__ = ["Light", "measure_light"]
 
 WIDE = 0.75
-"""Spacings: the standard deviation of the filter that leaves nothing but light."""
+"""Standard deviation of the filter that leaves only light, in spacings."""
 UNEVEN = 1.2
-"""How much more the low frequencies of a ground vary than the rest of it, for them to be light: rust and stains reach .8, woven
-cloth .3; pictures with a lit side 1.6 and more."""
+"""Ratio of variation, low frequencies to the rest, above which a background counts as unevenly lit.
+
+Rust and stains reach 0.8 and woven cloth 0.3; photographs with a lit side have 1.6 and more.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
-    """A texture in even light, and what was taken off.
+    """A texture in even light, and the removed light.
 
     Attributes
     ----------
     even : (h, w, C) float32
-        The texture in even light, in units of its dtype's range; transparency as it was.
+        The texture in even light, in units of its dtype's range. Transparency is unchanged.
     field : (h, w, c) float32
-        What was taken off the ground's channels of colour.
+        Light that was removed from the colour channels of the background.
     elements : (h, w) bool
-        Where elements are.
+        Pixels of elements.
     share : float
-        How much of it was taken off them, 0 to 1.
+        Share of the light that was removed from elements, 0 to 1.
     low, span : float
-        What 0 and the unit are in the texture's own values.
+        Value of the texture that 0 stands for, and the number of its values in one unit.
 
     """
 
@@ -56,23 +58,23 @@ class Light:
     span: float
 
     def spread(self, size: tuple[int, ...]) -> Floats:
-        """Return the light of an output of some size: the whole of the picture's falls on the whole of it."""
+        """Return the light for an output of any size, stretched from the whole image to the whole output."""
         from skimage.transform import resize
 
         shape = (*size, self.field.shape[-1])
         return np.asarray(resize(self.field, shape, order=1, mode="edge", anti_aliasing=False), np.float32)
 
     def put_back(self, even: Array, field: Floats, places: NDArray[np.int32], image: Array) -> Array:
-        """Return a picture in even light with light put on it, in the dtype and the range of the texture.
+        """Return an evenly lit image with light added, in the dtype and the range of the texture.
 
         Parameters
         ----------
         even : (H, W, C) float32
-            The picture.
+            The image in even light.
         field : (H, W, c) float32
             The light.
         places : (H, W, 2) int32
-            The pixels of the texture that it shows.
+            The texture pixel that each pixel shows.
         image : (h, w) or (h, w, C) array
             The texture.
 
@@ -87,16 +89,16 @@ class Light:
 
 
 def measure_light(a: ElementAnalysis, ground: Bools, elements: Labels) -> Light | None:
-    """Return the light on a texture as its ground shows it; None where that is even, or its values are no colours.
+    """Return the light on a texture, measured on its background; None if it is even, or if the values are not colours.
 
     Parameters
     ----------
     a : ElementAnalysis
         The texture.
     ground : (h, w) bool
-        What is neither element nor near one.
+        Pixels that are neither in an element nor near one.
     elements : (h, w) int32
-        The element of each pixel, counted from 1; 0 elsewhere.
+        Number of the element of each pixel, counted from 1; 0 elsewhere.
 
     """
     image = as_image(a.image)
@@ -125,12 +127,12 @@ def measure_light(a: ElementAnalysis, ground: Bools, elements: Labels) -> Light 
 
 
 def dim(elements: Bools, share: float) -> Floats:
-    """Return how much of a light falls where, (H, W, 1)."""
+    """Return the share of the light that falls on each pixel, (H, W, 1)."""
     return np.where(elements, np.float32(share), np.float32(1))[..., np.newaxis]
 
 
 def measure_share(colours: Floats, field: Floats, elements: Labels) -> float:
-    """Return how much of a light falls on elements: the slope of their brightness against it, by least squares."""
+    """Return the share of a light that falls on elements: the least-squares slope of their brightness against it."""
     count = np.bincount(elements.ravel())[1:]
     bright, lit = (
         np.bincount(elements.ravel(), values.mean(axis=-1).ravel())[1:][count > 0] / count[count > 0]
@@ -142,7 +144,7 @@ def measure_share(colours: Floats, field: Floats, elements: Labels) -> float:
 
 
 def _find_unit(image: Array) -> tuple[float, float]:
-    """Return what becomes 0 and 1 in `to_unit`."""
+    """Return the values that `to_unit` maps to 0 and 1."""
     if image.dtype.kind == "u":
         return 0.0, float(np.iinfo(image.dtype).max)
     low, high = float(image.min()), float(image.max())

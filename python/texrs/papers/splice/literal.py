@@ -1,12 +1,13 @@
 """SPLICE as printed (``method="paper"``): sections 4.1 to 4.3 of Liu et al., with only their misprints repaired.
 
-- Eq. 5 sums over rigid pixels only, which leaves the others without an equation and the system singular: here they have
-  one of little weight;
-- N_A and N_B differ: as many points are matched as the smaller set has.
+- Eq. 5 sums over rigid pixels only. Other pixels have no equation, and the system is singular. Here they have an
+  equation of little weight.
 
-Neither picture goes on beyond its borders, so what the layouts do not cover stays a hole; distances in Eq. 4 are plain;
-all three layouts minimise Eq. 5, under which two pins in one component stretch it; holes take any pixel that is not
-rigid; and the refinement may change all that it likes.
+- N_A and N_B differ. The number of matched points is the smaller one.
+
+No image is extended beyond its borders, so pixels that the layouts do not cover stay holes. Distances in Eq. 4 are
+plain. All three layouts minimise Eq. 5, where two pins in one component stretch it. Holes take any pixel that is not
+rigid, and the refinement may change all pixels.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ NEIGHBOURS = 5
 
 
 def match_literally(a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int], *, align: bool) -> Match:
-    """Match as section 4.1 says: mean distances to the nearest points become one, centroids meet, lines are turned together."""
+    """Match as in section 4.1: scale mean nearest distances to 1, align centroids, and turn by pairs of lines."""
     from scipy.optimize import linear_sum_assignment
 
     extension = extend(a, size, 0, whole=False, exact=True)
@@ -57,12 +58,12 @@ def match_literally(a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int
 def _measure_mean_distance(points: Points) -> float:
     count = min(NEIGHBOURS, len(points) - 1)
     if count < 1:
-        raise InvalidInput("elements: has too few elements for a layout")
+        raise InvalidInput("elements: must have more elements for a layout")
     return float(nearest_distances(points, count).mean())
 
 
 def fill_literally(draft: Draft, seed: int) -> Draft:
-    """Fill as section 4.3 says: holes take a pixel at random that is not rigid; then everything may change."""
+    """Fill as in section 4.3: holes take random pixels that are not rigid; afterwards all pixels may change."""
     places, holes = draft.places.copy(), ~draft.known
     ground = np.argwhere(draft.kinds == 0)
     places[holes] = ground[np.random.default_rng(seed).integers(len(ground), size=np.count_nonzero(holes))]
@@ -72,7 +73,7 @@ def fill_literally(draft: Draft, seed: int) -> Draft:
         places=places,
         known=np.ones_like(holes),
         fixed=np.zeros_like(holes),
-        # Wanted by none: a kind only says what is jittered.
+        # All pixels want kind 0, because the kind only selects pixels to jitter.
         wanted=np.where(rigid == 1, 1, 255).astype(np.uint8),
         kinds=np.zeros_like(draft.kinds) + np.uint8(1),
     )

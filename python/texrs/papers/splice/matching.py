@@ -1,7 +1,7 @@
-"""Which element goes where in `texrs.papers.splice`: section 4.1.
+"""Find which element moves where in `texrs.papers.splice`: section 4.1.
 
-The layout of B is brought to the spacing of A, turned so that lines of points agree, let go on to cover the output, and
-matched with elements of A.
+The layout of B is scaled to the spacing of A and turned so that lines of points agree. It is extended to cover the
+output, and matched with elements of A.
 """
 
 from __future__ import annotations
@@ -39,41 +39,45 @@ __all__ = [
 Points = NDArray[np.float64]
 
 BEYOND = 0.6
-"""Targets lie up to so many spacings outside of the output."""
+"""Distance beyond the output up to which targets are used, in spacings."""
 MARGIN = 1.4
-"""The texture goes on for so many of its spacings beyond the output, or for more."""
+"""Least extension of the texture beyond the output, in its spacings."""
 WIDEST = 8.0
-"""Spacings beyond which no element is fetched."""
+"""Largest extension that provides elements, in spacings."""
 SPARE = 1.2
-"""Elements there should be for each target."""
+"""Wanted number of elements per target."""
 TURN = 0.75
-"""A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
+"""Largest cost of a turn, relative to a smaller turn, to be preferred.
+
+Lattices have several turns of nearly equal cost.
+"""
 OFFSETS, NEARER = 6, 0.9
-"""Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
+"""Number of offsets of a connected figure's layout along each axis, and largest relative cost of one to be preferred.
+"""
 ALONE = 0.5
-"""Spacings that a site must be away from all elements for one to be sent there."""
+"""Least distance of an empty place from all elements, in spacings, before an element is moved there."""
 CLEARANCE = 1.08
-"""Least distance of elements in their diameters."""
+"""Least distance of elements, in their diameters."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
-    """Which element goes where.
+    """Assignment of elements to targets.
 
     Attributes
     ----------
     targets : (n, 2) float64
-        Where elements are to be, in the output, and around it.
+        Targets of the elements, in the output and around it.
     extension : Extension
-        The texture beyond its borders.
+        The texture, extended beyond its borders.
     assigned : (n) int
-        Which of the extension's points goes to each target.
+        Index of the extension's point for each target.
     scale, angle, gain : float
-        What B's layout was scaled and turned (degrees) by; the part of the scale that gives elements room.
+        Scale and turn (degrees) of B's layout, and the part of the scale that gives elements room.
     cost : float
-        Mean squared distance of an element from its target.
+        Mean squared distance of elements from their targets, in squared pixels.
     wanted : (n, 2) float64, optional
-        Where elements were to be before the targets were adjusted to them; the targets themselves by default.
+        Targets before they were adjusted to the elements. Default: the targets.
 
     """
 
@@ -88,16 +92,16 @@ class Match:
 
     @property
     def starts(self) -> Points:
-        """Where each matched element comes from, in the output."""
+        """Return the origin of each matched element, in the output."""
         return self.extension.points[self.assigned]
 
     @property
     def shift(self) -> Points:
-        """How far each matched element goes."""
+        """Return the displacement of each matched element, in pixels."""
         return self.targets - self.starts
 
     def report(self) -> dict[str, Any]:
-        """Return what was decided, in JSON types."""
+        """Return the decisions, in JSON types."""
         return {
             "scale": round(self.scale, 6),
             "angle": round(self.angle, 6),
@@ -109,7 +113,7 @@ class Match:
 
 
 def list_element_points(entry: ElementAnalysis) -> Points:
-    """Return the elements that may be moved: also foreground that none was found for, where elements are disjoint."""
+    """Return the elements that may be moved. They include foreground without an element if the texture is disjoint."""
     disjoint = entry.layout == Layout.DISJOINT
     return split_foreground(entry).points if disjoint else entry.points
 
@@ -117,15 +121,16 @@ def list_element_points(entry: ElementAnalysis) -> Points:
 def match_layouts(
     a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int], *, align: bool, scale: float | None = None
 ) -> Match:
-    """Match the elements of A with B's layout, brought to the spacing of A, or enlarged as asked, middle upon middle.
+    """Match the elements of A with B's layout, scaled to the spacing of A or by ``scale``, with equal centres.
 
-    Separate elements on their own layout in a larger output lie as they are sown.
+    Separate elements that keep their own layout in a larger output are sown.
     """
     unit = spacing(a.points)
     if a.layout == Layout.DISJOINT and scale in (None, 1) and is_own(a, b):
         sown = sow(a, size, math.ceil(BEYOND * unit))
         if sown is not None:
             return Match(sown.points, sown, np.arange(len(sown.points)), 1.0, 0.0, 1.0, 0.0)
+    # Find the scale of the layout, and whether elements need more room.
     layout = lay_out(b, beyond=True)
     gain, disjoint, centre = 1.0, a.layout == Layout.DISJOINT, layout.points.mean(axis=0)
     if scale is not None:
@@ -142,22 +147,24 @@ def match_layouts(
         for angle in turns
     ]
     if not all(len(wanted) for wanted in asked):
-        raise InvalidInput("layout: its layout has no point within the output")
+        raise InvalidInput("layout: must have a point inside the output")
+    # Extend A until it has enough elements for every turn, and take the cheapest turn.
     most = max(len(wanted) for wanted in asked)
     extension = _extend_until(a, size, unit, SPARE * most)
     if len(extension.points) < most:
         raise InvalidInput(
-            f"elements: {len(extension.points)} of its elements lie within reach, {most} are needed; "
-            "take a smaller size or a larger picture"
+            f"elements: must have {most} elements within reach, got {len(extension.points)}; "
+            "take a smaller size or a larger image"
         )
     best: Match | None = None
     for angle, wanted in zip(turns, asked, strict=True):
         assigned, cost = match_points(extension.points, wanted)
         if best is None or cost < TURN * best.cost:
             best = Match(wanted, extension, assigned, factor * gain, angle, gain, cost)
-    assert best is not None  # no turn is always among them
+    assert best is not None  # a turn of 0 is always among them
     if disjoint or scale is not None:
         return best
+    # Try offsets of the layout, because a connected figure bends less if its elements move less.
     for offset in _find_offsets(extension.points, best.targets, unit):
         wanted = _place_targets(layout, centre, factor, best.angle, size, beyond, offset)
         if 0 < len(wanted) <= len(extension.points):
@@ -168,15 +175,16 @@ def match_layouts(
 
 
 def is_own(a: ElementAnalysis, b: ElementAnalysis) -> bool:
-    """Return whether a layout is the texture's own, in which its elements have the room that they have."""
+    """Return whether a layout is the texture's own. Its elements then keep the room that they have."""
     return np.array_equal(a.points, b.points) and np.array_equal(a.mask, b.mask)
 
 
 def go_part_of_the_way(a: ElementAnalysis, match: Match, strength: float) -> Match:
-    """Let elements go so much of their way only: 0 leaves the texture's own layout, 1 takes the other's."""
+    """Let elements go only a share of their way: 0 keeps the texture's own layout, 1 takes the other one."""
     targets, assigned = match.starts + strength * match.shift, match.assigned
     if a.layout == Layout.DISJOINT:
-        # Those that go nowhere stay, while there is room: the others would be erased where the layout hardly changes.
+        # Elements without a target stay while there is room. Otherwise they would be erased although the layout hardly
+        # changes.
         points = match.extension.points
         rest = np.setdiff1d(np.arange(len(points)), assigned)
         if len(rest):
@@ -187,16 +195,17 @@ def go_part_of_the_way(a: ElementAnalysis, match: Match, strength: float) -> Mat
 
 
 def keep_cut(a: ElementAnalysis, match: Match, strength: float) -> Match:
-    """Let elements that the border cuts stay where there is room for them: at no strength all, at the full one none.
+    """Let elements that the border cuts stay if they have room: all with strength 0, none with strength 1.
 
-    They cannot go anywhere else, and without them a texture's own layout would have a bare margin.
+    They cannot move elsewhere, and without them the texture's own layout would have an empty margin.
     """
     parts, extension = split_foreground(a), match.extension
     if not strength:
-        # Copies beyond the border would reach into the picture.
+        # Copies beyond the border would extend into the image.
         own = ((match.targets >= 0) & (match.targets <= np.array(a.mask.shape) - 1)).all(axis=1)
         kept = None if match.wanted is None else match.wanted[own]
         match = replace(match, targets=match.targets[own], assigned=match.assigned[own], wanted=kept)
+    # Sort the cut elements by their room, and keep a share of them.
     cut = np.flatnonzero(parts.present & ~parts.whole)
     if not len(cut):
         return match
@@ -225,26 +234,26 @@ def keep_cut(a: ElementAnalysis, match: Match, strength: float) -> Match:
 
 
 def find_turns(a: ElementAnalysis, b: ElementAnalysis) -> list[float]:
-    """Return the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
+    """Return the turns, in degrees, that align a direction of B's points with one of A's; the first turn is 0."""
     mine, theirs = (t.directions or find_directions(t) for t in (a, b))
-    # Lines have no sense of direction: angles are those within a quarter turn.
+    # Lines have no sense of direction, so angles are within a quarter turn.
     turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
     return [0.0, *sorted(turns - {0.0}, key=lambda t: (abs(t), t))]
 
 
 @remember(64)
 def find_directions(entry: ElementAnalysis) -> tuple[float, ...]:
-    """Return the directions in which the points of a texture line up."""
+    """Return the directions of lines of points in a texture."""
     return directions(entry.points)
 
 
 def _measure_gain(a: ElementAnalysis, distances: Points) -> float:
-    """Return what a layout must grow by so that disjoint elements have room; ``distances``: to the nearest, at A's spacing."""
+    """Return the scale that gives disjoint elements room in a layout with these nearest ``distances``."""
     parts = split_foreground(a)
     area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
     if not len(area):
         return 1.0
-    # Not the largest and the nearest: the few that still collide are pushed apart, and the rest stay dense.
+    # Use quartiles instead of extremes. The few elements that still collide are pushed apart, and the rest stay dense.
     diameter = 2 * math.sqrt(float(np.percentile(area, 75)) / math.pi)
     return max(1.0, CLEARANCE * diameter / max(float(np.percentile(distances, 25)), 1e-9))
 
@@ -261,10 +270,10 @@ def _place_targets(
     lattice: bool = False,
     shape: tuple[int, ...] | None = None,
 ) -> Points:
-    """Scale and turn a layout about a centre into the middle of an output, or beside it, and cover that and a margin.
+    """Scale and turn a layout about a centre, move it to the middle of an output, and cover the output and a margin.
 
-    With the ``shape`` of its picture it goes on as it lies, with ``lattice`` if on a lattice; else it is reflected, as the
-    elements of its own picture are, and as a connected figure goes on.
+    With the ``shape`` of its image, the layout continues in its own arrangement; with ``lattice``, on its lattice.
+    Otherwise it is reflected, like the elements of its image and like a connected figure.
     """
     turn = math.radians(angle)
     matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
@@ -276,7 +285,7 @@ def _place_targets(
     if shape is None:
         found = (layout.cover if lattice else layout.within)(first, last)[0]
     else:
-        # Of the same size for all angles.
+        # The box has the same size for all angles.
         reach = float(np.hypot(*(high - low))) / 2 / scale + float(np.abs(np.asarray(offset)).max()) / scale
         around = np.floor(centre - reach), np.ceil(centre + reach)
         found, _ = continue_points(layout, shape, first, last, around=around)
@@ -285,9 +294,9 @@ def _place_targets(
 
 
 def _find_offsets(points: Points, wanted: Points, unit: float) -> Points:
-    """Return the few offsets of a layout, within half a spacing, at which its points lie nearest to elements.
+    """Return the best offsets of a layout, within half a spacing, by the distance of its points to elements.
 
-    What is connected is bent the less the less far its elements go, and where in a layout the output lies is nobody's wish.
+    A connected figure is bent less if its elements move less, and the position of the output in the layout is free.
     """
     from scipy.spatial import cKDTree
 
@@ -299,7 +308,7 @@ def _find_offsets(points: Points, wanted: Points, unit: float) -> Points:
 
 
 def _extend_until(a: ElementAnalysis, size: tuple[int, int], unit: float, needed: float) -> Extension:
-    """Let a texture go on so far that it has as many elements as are needed, or nearly without end."""
+    """Extend a texture until it has enough elements, up to a limit."""
     margin = MARGIN
     while count_elements(a, size, math.ceil(margin * unit)) < needed and margin < WIDEST:
         margin *= 1.4
@@ -311,28 +320,28 @@ def _extend_until(a: ElementAnalysis, size: tuple[int, int], unit: float, needed
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edit:
-    """A texture's own layout, edited, on the texture as it goes on beyond its borders.
+    """A texture's own edited layout, on the texture extended beyond its borders.
 
     Attributes
     ----------
     extension : Extension
-        The texture beyond its borders, with all elements of the picture itself.
+        The extended texture, with all elements of the image itself.
     points : (n, 2) float64
-        Where each of its elements is to be.
+        New place of each element.
     kept : (n) bool
-        False where it is taken away.
+        False for elements that are removed.
     inwards : (n) bool
-        Which ones the border cuts whose straight edges would come into the picture.
+        True for elements that the border cuts and whose straight edges would enter the image.
     together : bool
-        Whether the picture is moved as a whole.
+        True if the image is moved as a whole.
     listed : bool
-        Whether the edit only lists moved points.
+        True if the edit only lists moved points.
     ruled : bool
-        Whether it moves elements by a rule, which knows nothing of their sizes.
+        True if the edit moves elements by a rule, which ignores their sizes.
     cyclic : (bool, bool)
-        Along which axes the edited layout goes around.
+        Axes along which the edited layout is periodic.
     shrink : float
-        What the layout is scaled down by; 1 where it is not.
+        Scale factor of a shrinking layout; 1 without shrinking.
 
     """
 
@@ -348,22 +357,22 @@ class Edit:
 
 
 def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = False) -> Edit:
-    """Edit a texture's own layout, as far beyond its borders as anything may come in.
+    """Edit a texture's own layout, far enough beyond its borders for all elements that may enter.
 
-    With ``labels`` the layout alone goes on there, also where the border cuts elements, and not the picture.
+    With ``labels`` only the layout is extended, not the image, also at elements that the border cuts.
     """
     if a.layout != Layout.DISJOINT and any(step["op"] == "remove" for step in steps):
-        raise InvalidInput(
-            f"edit: remove needs separate elements; those of a are {a.layout.value}, and what joins them stays"
-        )
+        raise InvalidInput(f"edit: remove must be used with separate elements, got {a.layout.value} ones")
     points = list_element_points(a)
     trial = apply_steps(points, len(points), steps, len(a.points))
     shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
     far = float(np.abs(trial.points - points).max()) / shrink
     size = (a.mask.shape[0], a.mask.shape[1])
     if far > 4 * max(size):
-        raise InvalidInput(f"edit: moves elements by up to {far:.0f} pixels, four times the picture's size is allowed")
-    # Where a layout shrinks, borders come in: there must be elements to send there.
+        raise InvalidInput(
+            f"edit: must move elements by at most four times the size of the image, got {far:.0f} pixels"
+        )
+    # If a layout shrinks, borders enter the image, and elements are needed to fill the gap.
     margin = (MARGIN if shrink == 1 else 2 * MARGIN) * spacing(points) + far
     extension = extend(a, size, math.ceil(margin), whole=False, exact=shrink == 1)
     if labels:
@@ -375,6 +384,7 @@ def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = Fal
             points=np.concatenate([points, places[new]]),
             element=np.concatenate([np.arange(len(points)), of[new]]),
         )
+    # Apply the steps to the extended layout, and find cut elements that would enter.
     edited = apply_steps(extension.points, extension.originals, steps, len(a.points))
     shift = edited.points - extension.points
     inwards = np.zeros(len(shift), bool)
@@ -390,11 +400,11 @@ def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = Fal
 
 
 def match_edit(a: ElementAnalysis, edit: Edit) -> Match:
-    """Match a texture with its own layout, edited: what the border cuts does not come in, unless all goes one way."""
+    """Match a texture with its edited layout; elements that the border cuts do not enter, unless all move equally."""
     kept = edit.kept & (edit.together | ~edit.inwards)
     assigned = np.flatnonzero(kept)
     if not len(assigned):
-        raise InvalidInput("edit: leaves no element")
+        raise InvalidInput("edit: must leave at least one element")
     moved = edit.points[assigned]
     if edit.shrink < 1 and a.layout == Layout.DISJOINT:
         left = edit.points[np.flatnonzero(edit.kept & ~kept)]
@@ -405,14 +415,14 @@ def match_edit(a: ElementAnalysis, edit: Edit) -> Match:
 
 
 def _fill_sites(sites: Points, moved: Points, size: tuple[int, int], unit: float, radius: float) -> Points:
-    """Send elements that go far beyond the output to sites in it that have none: where a layout shrinks, borders come in.
+    """Move elements that are far beyond the output to empty places in it, because borders enter if a layout shrinks.
 
-    Those are the sites of elements that the border cuts, which cannot be shown.
+    The empty places are those of elements that the border cuts, which cannot be shown.
     """
     away = np.maximum(-moved, moved - (np.array(size) - 1)).max(axis=1)
     spare = np.flatnonzero(away > radius)
     wanted = sites[((sites > -radius) & (sites < np.array(size) - 1 + radius)).all(axis=1)]
-    # Not where another is already, as beside a site that comes in from both sides of a border.
+    # Skip places near another element, such as a place that enters from both sides of a border.
     wanted = wanted[nearest_distances(wanted, 1, moved)[:, 0] > ALONE * unit] if len(wanted) else wanted
     wanted = wanted[: len(spare)]
     if not len(wanted):

@@ -1,4 +1,4 @@
-"""Pictures of the stages of `texrs.papers.splice`, drawn when they are looked at."""
+"""Images of the stages of `texrs.papers.splice`, drawn on access."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HOLE = (255, 0, 255)
 
 
 class Stages(Mapping[str, Array]):
-    """Pictures by name, in the order of the stages; each is drawn when first asked for."""
+    """Images by name, in the order of the stages; each is drawn on its first access."""
 
     def __init__(self, draw: Mapping[str, Callable[[], Array]]) -> None:
         self._draw = draw
@@ -37,7 +37,7 @@ class Stages(Mapping[str, Array]):
         return self._drawn[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Go through the names."""
+        """Iterate over the names."""
         return iter(self._draw)
 
     def __len__(self) -> int:
@@ -54,7 +54,7 @@ def draw_stages(
     filled: Draft,
     image: Array,
 ) -> Stages:
-    """Return the stages of a splice, or of an edit, which has no ``b``; where nothing was warped there is no ``target``."""
+    """Return the stages of a splice, or of an edit, which has no ``b``; without a warp the ``target`` is missing."""
     extension = match.extension
     origin = np.array(extension.origin)
     shown = to_picture(a.image)
@@ -78,7 +78,7 @@ def draw_stages(
 
 
 def to_picture(image: Array) -> Picture:
-    """Return 8-bit RGB of anything."""
+    """Return any image as 8-bit RGB."""
     return np.rint(as_rgb(to_unit(as_image(image))) * 255).astype(np.uint8)
 
 
@@ -93,19 +93,19 @@ def mark_points(image: Picture, points: Points, colour: tuple[int, int, int]) ->
 
 
 def draw_outlines(image: Picture, labels: Labels, colour: tuple[int, int, int]) -> Picture:
-    """Return a picture with the outlines of labelled regions, 0 for none, drawn over it."""
+    """Return an image with the outlines of labelled regions drawn over it; label 0 is not drawn."""
     out = image.copy()
     out[mark_outlines(labels)] = colour
     return out
 
 
 def dim_ground(image: Picture, mask: Bools) -> Picture:
-    """Show the ground dimmed."""
+    """Return the image with a dimmed background."""
     return np.where(mask[..., None], image, (image // 3 + np.array(BLUE) // 3).astype(np.uint8)).astype(np.uint8)
 
 
 def draw_lines(image: Picture, start: Points, end: Points) -> Picture:
-    """Draw from each element to its target."""
+    """Draw a line from each element to its target."""
     out = (image // 2 + 100).astype(np.uint8)
     share = np.linspace(0, 1, 200)[None, :, None]
     _put(out, np.rint(start[:, None] * (1 - share) + end[:, None] * share).astype(np.intp).reshape(-1, 2), GREEN)
@@ -113,7 +113,7 @@ def draw_lines(image: Picture, start: Points, end: Points) -> Picture:
 
 
 def draw_mesh(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8) -> Picture:
-    """Draw every so manieth line of the warped mesh, darker where the texture's foreground is."""
+    """Draw every n-th line of the warped mesh, darker on the texture's foreground."""
     out = np.full((*size, 3), 255, np.uint8)
     for of, places in ((mask[::step], target[::step]), (mask[:, ::step], target[:, ::step])):
         for shade, where in (((170, 170, 190), ~of), ((40, 40, 60), of)):
@@ -122,7 +122,7 @@ def draw_mesh(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8)
 
 
 def show_draft(image: Picture, draft: Draft) -> Picture:
-    """Show the warp, with its holes."""
+    """Draw the warp, with its holes."""
     out: Picture = image[draft.places[..., 0], draft.places[..., 1]].copy()
     out[~draft.known] = HOLE
     return out

@@ -1,8 +1,9 @@
-"""An edited layout of separate elements: whole elements put in their new places, nothing warped.
+"""Edit the layout of separate elements: put whole elements into their new places, without warping.
 
-What does not move stays, byte for byte. Where something left, the ground is completed; what moves is cut in with its matte,
-as in splices (`ground`). Where an element that the border cuts would come in, a whole one takes its place, and where the
-picture goes on beyond its border, others than those that lie there: a mirrored row would be seen beside its own.
+Pixels that do not move keep their bytes. The background is completed where an element left. Moved elements are cut in
+with their mattes, as in splices (`ground`). If an element that the border cuts would enter, a whole one takes its
+place. Elements from beyond the border are exchanged for others, because a mirrored row next to its original would be
+visible.
 """
 
 from __future__ import annotations
@@ -32,35 +33,37 @@ Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 
 SEEN = 0.1
-"""Share of the texture that is ground enough to complete all of it: what is completed lies among what was there."""
+"""Share of background in a texture that is enough to complete all of it, because completed pixels are between original
+ones.
+"""
 BELOW = 3
-"""Pixels that ground reaches below elements, so that these are cut into it."""
+"""Number of pixels that the background extends below elements, so that these can be cut into it."""
 CROWDED = 0.75
-"""Share of their radii that elements which come in must be away from others."""
+"""Least distance of entering elements from others, as a share of the sum of their radii."""
 ALIKE = 5
-"""Elements of about one size of which one that comes in is drawn."""
+"""Number of elements of similar size that compete for the place of an entering one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rearrangement:
-    """What `rearrange` makes.
+    """Result of `rearrange`.
 
     Attributes
     ----------
     match : Match
-        Which element is where.
+        Places of the elements.
     draft, filled : Draft
-        The places with holes where something left, and without.
+        Source pixels with holes where elements left, and with these holes filled.
     label : (H, W) uint32
         The target of each pixel of an element, counted from 1; 0 elsewhere.
     changed : (H, W) bool
-        What does not stay as it is.
+        Pixels that change.
     pasted : (H, W) bool
-        Where elements were put, without what lies around them.
+        Pixels of moved elements, without their surroundings.
     light : Light or None
-        What was taken off the texture.
+        Light that was removed from the texture, or None.
     field : (H, W, c) float32 or None
-        What is to be put back.
+        Light that will be restored, or None.
 
     """
 
@@ -75,18 +78,18 @@ class Rearrangement:
 
 
 def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progress) -> Rearrangement | None:
-    """Put the elements of a texture where an edit has them; None where too little of its ground is seen.
+    """Put the elements of a texture where an edit moves them; return None if too little background is visible.
 
     Parameters
     ----------
     a : ElementAnalysis
-        The texture: its elements are separate.
+        The texture of separate elements.
     steps : sequence
-        The edit, as `as_steps` returns it.
+        Steps of the edit, as returned by `as_steps`.
     seed : int
-        Chooses the elements that come in, and the patches that fill the ground.
+        Number that selects the entering elements, and the patches that fill the background.
     watch : callable
-        Called as ``watch(stage, share)``.
+        Function called as ``watch(stage, share)``.
 
     """
     watch("match", 0.0)
@@ -97,7 +100,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     match, still = choose_elements(a, parts, edit, step, seed)
     watch("match", 1.0)
     base, seen = move_picture(a, step)
-    # What stays is the ground, and elements that do not move; and scraps whose straight edges do not come in.
+    # Keep the background and elements that do not move. Keep scraps unless their straight edges enter the image.
     number = np.zeros(len(parts.points) + 1, np.uint32)
     number[match.assigned[still] + 1] = np.flatnonzero(still) + 1
     stays = (number[np.maximum(scene.own, 0)] > 0) | (scene.own == 0) | mark_scraps(scene.own, step, edit.cyclic)
@@ -126,7 +129,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
 
 
 def move_picture(a: ElementAnalysis, step: NDArray[np.intp]) -> tuple[Places, Bools]:
-    """Return where each pixel comes from when a picture is moved as a whole, and where one does."""
+    """Return the source pixels of an image that is moved as a whole, and the pixels that have a source."""
     base = np.moveaxis(np.indices(a.mask.shape, np.int32), 0, -1) - step.astype(np.int32)
     limits = np.array(a.mask.shape, np.int32)
     base = np.where(a.wrap, base % limits, base)
@@ -135,7 +138,7 @@ def move_picture(a: ElementAnalysis, step: NDArray[np.intp]) -> tuple[Places, Bo
 
 
 def mark_scraps(own: NDArray[np.int32], step: NDArray[np.intp], cyclic: tuple[bool, bool]) -> Bools:
-    """Mark the scraps of a texture that stay when it is moved: all but those at a border that comes in."""
+    """Return the scraps of a texture that stay when it is moved: all except those at an entering border."""
     from scipy.ndimage import label
 
     pieces, count = label(own < 0)
@@ -148,10 +151,10 @@ def mark_scraps(own: NDArray[np.int32], step: NDArray[np.intp], cyclic: tuple[bo
 
 
 def fill_holes(scene: Scene, base: Places, known: Bools, pasted: Bools, seed: int, watch: Progress) -> Places | None:
-    """Return the places of a picture with its holes filled by ground; None where too little is seen of that.
+    """Return the source pixels of an image with its holes filled by background, or None if too little is visible.
 
-    As much of it as is to be filled is enough, and a share of the picture that is seen everywhere between elements. Deep
-    below elements nothing is filled.
+    Enough is a background as large as the holes, or a fixed share of the image. Pixels deep below elements are not
+    filled.
     """
     from scipy.ndimage import binary_erosion
 
@@ -174,24 +177,25 @@ def fill_holes(scene: Scene, base: Places, known: Bools, pasted: Bools, seed: in
 def choose_elements(
     a: ElementAnalysis, parts: Foreground, edit: Edit, step: NDArray[np.intp], seed: int
 ) -> tuple[Match, Bools]:
-    """Return which element lies where, those that come in first, and which do not move but by the step of all."""
+    """Return the places of the elements, entering ones first, and which elements do not move relative to the image."""
     extension, size = edit.extension, np.array(a.mask.shape)
     beyond = np.arange(len(extension.points)) >= extension.originals
     comes, wide = edit.inwards | beyond, max(a.box)
     usable = np.flatnonzero(parts.whole)
     shown = ((edit.points > -wide) & (edit.points < size - 1 + wide)).all(axis=1) & (len(usable) > 0)
-    # What did not move into the picture is not in it, and where it goes around, all of it is the picture's own.
+    # Skip copies that do not move into the image. On periodic axes all elements belong to the image itself.
     around = (np.abs(extension.points - parts.points[extension.element]) > 0.5) & edit.cyclic
     shift = np.rint(edit.points - extension.points)
     away = ((extension.points < 0) & (shift <= 0)) | ((extension.points > size - 1) & (shift >= 0))
     shown &= (shift != 0).any(axis=1) & ~(around | (away & ~np.array(edit.cyclic))).any(axis=1)
     chosen = np.flatnonzero(edit.kept & (shown | ~comes))
-    # The last ones lie on top, and have the first choice of places.
+    # The last elements are on top, and choose their places first.
     chosen = chosen[np.argsort(2 * ~comes[chosen] + edit.inwards[chosen], kind="stable")]
     element, goal = extension.element[chosen].copy(), edit.points[chosen].copy()
     comes, inwards = comes[chosen], edit.inwards[chosen]
     radius = np.sqrt(np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:] / math.pi)
     usual = float(np.median(radius[usable])) if len(usable) else 0.0
+    # Replace each entering element by a random whole one of similar size.
     noise, boxes = np.random.default_rng(seed), measure_boxes(parts)
     for k in np.flatnonzero(comes).tolist():
         i = int(element[k])
@@ -210,7 +214,7 @@ def choose_elements(
 
 
 def measure_boxes(parts: Foreground) -> Points:
-    """Return how far each element reaches from its centre, (n, 2, 2): the first and the last pixel along each axis."""
+    """Return the extent of each element from its centre, (n, 2, 2): the first and the last pixel along each axis."""
     from scipy.ndimage import find_objects
 
     boxes = np.zeros((len(parts.points), 2, 2))
@@ -222,14 +226,14 @@ def measure_boxes(parts: Foreground) -> Points:
 
 
 def align_boxes(fragment: Points, whole: Points, cut: Bools) -> Points:
-    """Return what brings the inner edge of a whole element to that of one that the border cuts."""
+    """Return the shift that moves the inner edge of a whole element to that of an element at the border."""
     first, last = cut[:, 0] & ~cut[:, 1], cut[:, 1] & ~cut[:, 0]
     aside = fragment - whole
     return np.asarray(np.where(first, aside[:, 1], np.where(last, aside[:, 0], 0.0)), np.float64)
 
 
 def find_room(goal: Points, radius: Points, comes: Bools) -> NDArray[np.intp]:
-    """Return which elements are shown: all but those that come in where another is already, the last ones first."""
+    """Return the elements that are shown: all except entering ones without room; the last ones choose first."""
     kept = np.flatnonzero(~comes).tolist()
     for k in np.flatnonzero(comes)[::-1].tolist():
         if not (np.hypot(*(goal[kept] - goal[k]).T) < CROWDED * (radius[kept] + radius[k])).any():
@@ -240,9 +244,9 @@ def find_room(goal: Points, radius: Points, comes: Bools) -> NDArray[np.intp]:
 def paste_elements(
     parts: Foreground, match: Match, moved: NDArray[np.intp], rest: NDArray[np.uint32], cyclic: tuple[bool, bool]
 ) -> tuple[NDArray[np.uint32], Places]:
-    """Return the targets of the pixels of moved elements, counted from 1, 0 elsewhere, and where these come from.
+    """Return the targets of the pixels of moved elements, counted from 1, or 0, and their source pixels.
 
-    They cover what stays, the ``rest``, and later ones cover earlier ones; what lies around an element covers none.
+    Moved elements cover the ``rest``, and later ones cover earlier ones. Their surroundings do not cover elements.
     """
     label, size = np.zeros(rest.shape, np.uint32), np.array(rest.shape)
     places = np.zeros((*rest.shape, 2), np.int32)
@@ -253,7 +257,7 @@ def paste_elements(
         for k in moved.tolist():
             i = int(match.assigned[k])
             pixels = np.stack(np.divmod(order[begin[i + 1] : begin[i + 2]], size[1]), axis=-1)
-            # Where the texture wraps, an element lies on both sides of its border.
+            # If the texture wraps, an element may be on both sides of its border.
             at = pixels + shift[k] - np.rint((pixels - parts.points[i]) / size).astype(np.intp) * size
             at = np.where(cyclic, at % size, at)
             seen = ((at >= 0) & (at < size)).all(axis=1)

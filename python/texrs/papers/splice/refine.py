@@ -1,7 +1,8 @@
-"""Holes filled and the ground made whole again: section 4.3 of `texrs.papers.splice`.
+"""Fill holes and refine the background: section 4.3 of `texrs.papers.splice`.
 
-The warp leaves holes, and stretches what is not rigid. Both are mended in coordinates: each pixel names the pixel of
-the texture that it shows, and those that may change take what fits their neighbours (k-coherence, at two resolutions).
+The warp leaves holes, and stretches pixels that are not rigid. Both are repaired in coordinates: each pixel refers to
+a pixel of the texture. Pixels that may change take a reference that fits their neighbours (k-coherence, at two
+resolutions).
 """
 
 from __future__ import annotations
@@ -31,41 +32,48 @@ Places = NDArray[np.int32]
 Kinds = NDArray[np.uint8]
 
 BITS = ONE.bit_length() - 1
-"""Of places, after the point."""
+"""Number of fractional bits of a fixed-point position."""
 JITTER = 1.0
-"""Samples of a level that places of what is not rigid are displaced by before they are corrected."""
+"""Jitter of the positions of non-rigid pixels before their correction, in samples of a level."""
 PASSES = 2
 WIDE = 1.0
-"""A hole wider than so many spacings is filled with patches; less is grown over from its boundary."""
+"""Width of a hole, in spacings, above which it is filled with patches. Narrower holes are grown from their boundary."""
 PATCH, LEAST = 0.33, 6
-"""Of the spacing: the side of those patches; and the least side in pixels of one whose roughness says anything."""
+"""Side of those patches, as a share of the spacing, and least side in pixels for a meaningful roughness."""
 STROKE, ROUGH, MOST = 2.5, 0.95, 1.1
-"""How many times the usual gradient is an edge, and no roughness; how rough a patch must be, in that of the ground; how much of
-roughness and edges together it may show."""
+"""Gradient that counts as an edge and not as roughness, in median gradients.
+
+Least roughness of a patch, relative to the background. Largest sum of roughness and edges of a patch, relative to the
+background.
+"""
 CHOICE, FEWEST, PLENTY = 100, 32, 4000
-"""Patches to choose from, of those as rough as the ground; and of any; and how many are enough: of a plain ground all fit."""
+"""Least number of patches as rough as the background.
+
+Least number of patches of any roughness. Number of patches that is enough, because all patches of a plain background
+fit.
+"""
 K, APART = 3, 0.05
-"""Size of a similarity set, and how far apart its samples are, as a share of the shorter side."""
+"""Size of a similarity set, and distance between its samples, as a share of the shorter side."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """A picture before its refinement.
+    """An image before its refinement.
 
     Attributes
     ----------
     places : (H, W, 2) int32
-        The pixel of the texture that each one shows; anything in the holes.
+        Texture pixel that each pixel shows; undefined in the holes.
     known : (H, W) bool
         False in the holes.
     fixed : (H, W) bool
-        What is rigid and stays as it is.
+        Rigid pixels, which do not change.
     kinds : (h, w) uint8
-        Of the texture's pixels: what may take the place of what. Ground is 0.
+        Kind of each texture pixel. Only pixels of the requested kind may replace a pixel. Background is 0.
     wanted : (H, W) uint8
-        The kind that each pixel is to show.
+        Requested kind of each pixel.
     mirrored : (H, W, 2) bool
-        Along which axes the texture is mirrored there.
+        Axes along which the texture is mirrored at a pixel.
 
     """
 
@@ -78,7 +86,7 @@ class Draft:
 
 
 def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, progress: Progress | None) -> Draft:
-    """Fill the holes: wide ones with patches of the ground alone, the others with what goes on from their boundary."""
+    """Fill the holes: wide ones with patches of background, others by continuing their boundary."""
     from scipy.ndimage import distance_transform_edt
 
     holes = ~draft.known
@@ -95,7 +103,8 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
         filled = fill_with_patches(image, draft, ground, scale, seed, progress)
         if filled is not None:
             return filled
-    # From the nearest pixel that is known, as if the ground went on: where that is no ground, some ground at random.
+    # Continue the nearest known pixel as if the background went on. If that position is not background, take random
+    # background.
     at = np.argwhere(holes)
     start = near[:, holes].T
     there = places[start[:, 0], start[:, 1]] + (at - start)
@@ -121,9 +130,9 @@ def fill_with_patches(
     *,
     hidden: Bools | None = None,
 ) -> Draft | None:
-    """Return the draft with its holes filled by patches of the ground alone; none where it has no place for a patch.
+    """Return the draft with its holes filled by background patches, or None if no patch fits into the background.
 
-    What is ``hidden`` will not be seen, and is not filled.
+    ``hidden`` pixels will not be visible, and are not filled.
     """
     guide = guidance(as_image(image))
     found = find_patches(guide, ground, scale)
@@ -132,7 +141,7 @@ def fill_with_patches(
     side, allowed = found
     known, colours = draft.known, guide[draft.places[..., 0], draft.places[..., 1]]
     if hidden is not None:
-        # As the ground is on the whole: no patch fits better or worse for it.
+        # Hidden pixels get the mean background colour, so that they do not influence the choice of patches.
         known, colours[hidden] = known | hidden, guide[ground].mean(axis=0)
         if known.all():
             return replace(draft, known=known)
@@ -151,10 +160,10 @@ def fill_with_patches(
 
 
 def find_patches(guide: Floats, ground: Bools, scale: float) -> tuple[int, Bools] | None:
-    """Return the side of patches of a ground, and the corners of those that may be copied.
+    """Return the side of background patches, and the corners of those that may be copied.
 
-    Of noise the smoothest patches fit best, so that what is filled with any looks blurred. Taken are those that are as rough as
-    the ground is, and show no more of what lies about in it; any, where these are too few.
+    The smoothest patches of noise fit best, so that a filling from all patches looks blurred. Therefore only patches
+    as rough as the background, and without more edges, are used. If these are too few, all patches are used.
     """
     steep = np.sqrt(sum((np.gradient(guide, axis=axis) ** 2).sum(axis=-1) for axis in range(2)))
     inner = mark_corners(ground, 3)
@@ -175,7 +184,7 @@ def find_patches(guide: Floats, ground: Bools, scale: float) -> tuple[int, Bools
 
 
 def thin_out(places: Bools) -> Bools:
-    """Return so many of the places as are enough, evenly."""
+    """Return an evenly spaced selection of enough places."""
     at = np.flatnonzero(places)
     out = np.zeros(places.shape, bool)
     out.flat[at[:: -(-len(at) // PLENTY)]] = True
@@ -183,7 +192,7 @@ def thin_out(places: Bools) -> Bools:
 
 
 def average_windows(values: NDArray[np.floating], side: int) -> NDArray[np.float64]:
-    """Return the mean of each window by its first corner; 0 where it does not fit in."""
+    """Return the mean of each window, stored at its first corner; 0 for windows that do not fit in."""
     total = np.pad(np.asarray(values, np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
     out = np.zeros(values.shape)
     means = (total[side:, side:] - total[:-side, side:] - total[side:, :-side] + total[:-side, :-side]) / side**2
@@ -194,9 +203,9 @@ def average_windows(values: NDArray[np.floating], side: int) -> NDArray[np.float
 def refine_places(
     image: NDArray[np.generic], wrap: tuple[bool, bool], draft: Draft, seed: int, progress: Progress | None
 ) -> Places:
-    """Return corrected places of what may change: at half the resolution first, then at the full one.
+    """Return corrected positions of pixels that may change: first at half the resolution, then at the full one.
 
-    The engine of `texrs.growth` starts from the draft, and its corrector is `Refinement`.
+    The engine of `texrs.growth` starts from the draft, with `Refinement` as its corrector.
 
     Returns
     -------
@@ -208,7 +217,7 @@ def refine_places(
 
 
 def correct_draft(refinement: Refinement, wrap: tuple[bool, bool], progress: Progress | None) -> Places:
-    """Return corrected places of what a refinement may change."""
+    """Return corrected positions of the pixels that a refinement may change."""
     draft, image = refinement.draft, refinement.exemplar.image
     grown = grow(
         Region.whole(draft.fixed.shape),
@@ -219,7 +228,7 @@ def correct_draft(refinement: Refinement, wrap: tuple[bool, bool], progress: Pro
         ask=refinement.at,
         progress=progress,
     )
-    # Of whole numbers a shift, which rounds down as well, takes a tenth of the time of a division.
+    # Shift instead of dividing: both round down, and a shift of integers takes a tenth of the time.
     result = (grown.places.reshape(draft.places.shape) + ONE // 2) >> BITS
     for axis, n in enumerate(image.shape[:2]):
         along = result[..., axis]
@@ -230,20 +239,20 @@ def correct_draft(refinement: Refinement, wrap: tuple[bool, bool], progress: Pro
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
-    """What the engine does for a draft: pixels that are not rigid are jittered, and choose among similar ones of their kind.
+    """Corrector of a draft: it jitters non-rigid pixels, and chooses among similar samples of their kind.
 
     Attributes
     ----------
     exemplar : Exemplar
         The texture.
     draft : Draft
-        The picture.
+        The image before its refinement.
     seed : int
-        Of the jitter.
+        Seed of the jitter.
     coarsest : int
         Least side of the texture at half its resolution.
     levels : int
-        Two, or one where the texture is too small to be halved.
+        Number of resolutions: 2, or 1 if the texture is too small to be halved.
 
     """
 
@@ -262,11 +271,11 @@ class Refinement:
         return cls(exemplar, draft, seed, coarsest, count)
 
     def begin(self, region: Region) -> Places:
-        """Return the draft at the first level."""
+        """Return the positions of the draft at the first level."""
         places = self.draft.places.astype(np.int32, copy=False) << BITS
         if self.levels == 1:
             return places.reshape(-1)
-        # The coarse sample that lies between this pixel and the next, at (S + 1/2) / 2 - 1/2.
+        # Take the coarse sample between this pixel and the next, at (S + 1/2) / 2 - 1/2.
         return np.ascontiguousarray((places[::2, ::2] - ONE // 2) >> 1).reshape(-1)
 
     def frames(self, region: Region, spacing: int) -> NDArray[np.int16]:
@@ -280,7 +289,7 @@ class Refinement:
         return out
 
     def at(self, level: int, region: Region, spacing: int) -> Asked:
-        """Return what is rigid; at the first level it has its places already."""
+        """Return the rigid pixels; at the first level they already have their positions."""
         held = self.draft.fixed[::spacing, ::spacing].ravel()
         return Asked(held=held, given=None if level == 0 else (self.draft.places << BITS).reshape(-1))
 
@@ -293,7 +302,7 @@ class Refinement:
         asked: Asked,
         progress: Progress | None,
     ) -> Corrected:
-        """One level: jitter what is not rigid, then choose among similar samples of the right kind."""
+        """Correct one level: jitter non-rigid pixels, then choose among similar samples of the right kind."""
         here = self.exemplar.analyse(coarsest=self.coarsest).levels[level]
         apart = max(3, 2 * int(APART * min(here.shape)) + 1)
         sets = self.exemplar.similarity(level, coarsest=self.coarsest, k=K, n=apart)
@@ -316,7 +325,7 @@ class Refinement:
 
 
 def _halve_kinds(kinds: Kinds) -> Kinds:
-    """Return the kinds of the coarser texture: ground where all that it is made from is."""
+    """Return the kinds of the coarser texture: background if all four pixels are background."""
     rows, columns = (n // 2 * 2 for n in kinds.shape)
     four = kinds[:rows, :columns].reshape(rows // 2, 2, columns // 2, 2)
     found: Kinds = four.max(axis=(1, 3))

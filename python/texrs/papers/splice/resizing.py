@@ -1,7 +1,7 @@
-"""A texture in another size, for edits of it: an entry like that of a picture, which looks into the texture.
+"""Bring a texture to another size before an edit.
 
-A larger one is the texture spliced with itself, whose layout goes on as layouts do; a smaller one is cut out of its middle.
-What is edited then is a picture like any other, and the source maps are composed.
+For a larger size, the texture is spliced with itself, so that its layout continues. For a smaller size, its middle is
+cut out. The edit then treats the result like any other analysed texture, and the source maps are composed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["check_resized", "crop", "read_elements", "report_resized"]
 
 
 def crop(a: ElementAnalysis, size: Sequence[int]) -> Synthesis:
-    """Return the middle of a texture, as a splice would."""
+    """Return the middle of a texture, as a splice result."""
     shape = a.mask.shape
     first = [(n - m) // 2 for n, m in zip(shape, size, strict=True)]
     places = np.moveaxis(np.indices(tuple(size)), 0, -1) + first
@@ -42,16 +42,16 @@ def crop(a: ElementAnalysis, size: Sequence[int]) -> Synthesis:
 
 
 def read_elements(a: ElementAnalysis, made: Synthesis) -> ElementAnalysis:
-    """Return the entry of a picture that shows elements of a texture: those whose centres lie in it.
+    """Return an image's elements that a splice placed in it: those whose centres are inside.
 
-    Nothing is looked for: the splice says where its elements are, and the mask is looked up as the picture is.
+    Elements are not searched. The splice gives their places, and the mask is looked up like the image.
     """
     size = np.array(made.source_map.shape)
     found = [match["found"] for match in made.report["matches"] if match["found"] is not None]
     points = np.array(found, np.float64).reshape(-1, 2)
     points = points[((points >= 0) & (points <= size - 1)).all(axis=1)]
     mask = made.source_map.render(a.mask, interpolation="nearest")
-    # A side that was left as it is goes around as it did.
+    # A side of unchanged length wraps as before.
     wrap = [w and n == m for w, n, m in zip(a.wrap, size, a.mask.shape, strict=True)]
     return replace(
         a,
@@ -68,17 +68,19 @@ def read_elements(a: ElementAnalysis, made: Synthesis) -> ElementAnalysis:
 
 
 def check_resized(entry: ElementAnalysis) -> ElementAnalysis:
-    """Check that a picture in another size shows enough elements for its layout to be edited."""
+    """Check that an image in another size shows enough elements for its layout to be edited."""
     if len(entry.points) < FEWEST:
         size = entry.mask.shape
-        raise InvalidInput(f"size: {size} shows {len(entry.points)} elements, steps need {FEWEST} or more")
+        raise InvalidInput(
+            f"size: must show at least {FEWEST} elements for the steps, got {len(entry.points)} at {size}"
+        )
     return entry
 
 
 def report_resized(
     a: ElementAnalysis, entry: ElementAnalysis, resized: Synthesis, edited: Synthesis, steps: Sequence[Step]
 ) -> Synthesis:
-    """Return an edit of a texture in another size as one of the texture itself."""
+    """Return the edit of a resized texture as an edit of the texture itself."""
     whole = edited.source_map
     if edited is not resized:
         whole = replace(whole.compose(resized.source_map), finish=whole.finish)

@@ -1,4 +1,4 @@
-"""The result of `texrs.papers.splice`: picture, source map, pictures of the stages and report."""
+"""Build the result of `texrs.papers.splice`: image, source map, images of the stages and report."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["compose", "list_place", "measure_realised", "report_ways"]
 
 STAYS = 0.5
-"""Pixels: what is to go less far than that stays."""
+"""Requested displacement in pixels below which an element counts as staying in place."""
 
 
 def compose(
@@ -42,7 +42,7 @@ def compose(
     screening: float = 0.0,
     light: Light | None = None,
 ) -> Synthesis:
-    """Return the result of a splice from what its stages made."""
+    """Return the result of a splice from the results of its steps."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     size = label.shape
     frames = _make_frames(filled.mirrored)
@@ -75,7 +75,7 @@ def compose_edit(a: ElementAnalysis, laid: Rearrangement, *, seed: int, screenin
     """Return the result of an edit whose elements were rearranged."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     source = SourceMap.from_coordinates(laid.filled.places.astype(np.float32), shape, label=laid.label)
-    # Elements keep their colours, which another one that they cover would change.
+    # Elements keep their colours, because an element that they cover would change them.
     source = say_finish(source, screening if laid.changed.any() else 0.0, laid.changed & ~laid.pasted)
     image = source.render(a.image, interpolation="nearest")
     if screening and laid.changed.any():
@@ -101,17 +101,17 @@ def compose_edit(a: ElementAnalysis, laid: Rearrangement, *, seed: int, screenin
 
 
 def say_finish(source: SourceMap, screening: float, within: Bools | None = None) -> SourceMap:
-    """Say how the seams of a picture are made to disappear."""
+    """Set how the seams of an image are hidden."""
     if not screening:
         return source.with_finish((False, False), interpolation="nearest")
-    # Between whole pixels nothing is looked up: "linear" is "nearest" that may be corrected.
+    # Coordinates are whole pixels, where "linear" equals "nearest". Only "linear" permits a correction.
     return source.with_finish((False, False), interpolation="linear", screening=screening, within=within)
 
 
 def correct_colours(
     a: ElementAnalysis, source: SourceMap, light: Light | None, field: NDArray[np.float32] | None
 ) -> Array:
-    """Return the picture of a source map in the light that is to fall on it, with its seams made to disappear."""
+    """Return the image of a source map in its final light, with hidden seams."""
     image = apply(source, a.image if light is None else light.even)
     if light is None or field is None:
         return image
@@ -119,7 +119,7 @@ def correct_colours(
 
 
 def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
-    """Return the Jacobians of pixels, some of which show the texture mirrored; none where none does."""
+    """Return the Jacobians of pixels if some show the texture mirrored, else None."""
     if not mirrored.any():
         return None
     frames = np.zeros((*mirrored.shape, 2), np.float32)
@@ -129,7 +129,7 @@ def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
 
 
 def _list_matches(a: ElementAnalysis, match: Match) -> tuple[list[dict[str, Any]], float]:
-    """Return which element goes where, in JSON types, and how much of all their ways they go."""
+    """Return each element's target and place, in JSON types, and the reached share of all displacements."""
     points = list_element_points(a)
     wanted = match.targets if match.wanted is None else match.wanted
     parts, whole = measure_realised(match.starts, wanted, match.targets)
@@ -150,7 +150,7 @@ def _list_matches(a: ElementAnalysis, match: Match) -> tuple[list[dict[str, Any]
 def measure_realised(
     start: NDArray[np.float64], wanted: NDArray[np.float64], found: NDArray[np.float64]
 ) -> tuple[list[float | None], float]:
-    """Return how much of its way each element goes, 0 to 1, None for those that are to stay, or were not found; and of all."""
+    """Return the reached share of each displacement, 0 to 1, and of their sum."""
     asked, missed = (np.hypot(*(x - wanted).T) for x in (start, found))
     there = np.isfinite(missed)
     part = 1 - np.where(there, missed, 0) / np.maximum(asked, STAYS)
@@ -169,25 +169,26 @@ def report_ways(
     found: NDArray[np.float64],
     size: tuple[int, ...],
 ) -> tuple[dict[str, float], list[dict[str, Any]]]:
-    """Report what became of the ways of elements that are put where targets are, in JSON types.
+    """Return a summary and a list of elements that were put at targets, in JSON types.
 
     Parameters
     ----------
     own : (n, 2) float64
-        Elements of A where they lie around the middle of the output: where those come from that have no ``start``.
+        Elements of A around the middle of the output. Targets without a ``start`` use the nearest one.
     start : (m, 2) float64, optional
-        Where each target's element comes from.
+        Origin of each target's element. Default: taken from ``own``.
     goal, found : (m, 2) float64
-        Where it is wanted and where it is, NaN where it is not shown.
+        Requested place and place in the result; NaN if the element is not visible.
     size : tuple of int
-        Of the output, whose inner targets alone are counted in the summary.
+        Size of the output. Only targets inside it count in the summary.
 
     Returns
     -------
     summary : dict
-        "present", the share that is shown, and "displacement_reached", how much of their ways they go.
+        "present" is the share of targets with a visible element, and "displacement_reached" the reached share of the
+        displacements.
     matches : list of dict
-        A target each: "target", "found" and "displacement_reached".
+        One entry per target: "target", "found" and "displacement_reached".
 
     """
     from scipy.spatial import cKDTree

@@ -1,8 +1,9 @@
-"""The layout of points beyond their picture: sown as they lie, for a layout that is mirrored again and again is seen.
+"""Extend the layout of points beyond their image by sowing, because repeated reflections are visible.
 
-Where a lattice goes on, or the border is near, nothing is sown. Else the points are drawn as discs, the drawing is grown by
-quilting, whose cuts keep out of the discs, and the points are read off it. Those of the picture itself stay where they are.
-Elements are sown in the same way, each beside those that it lies beside in the picture; those that the border cuts are not.
+Nothing is sown if a lattice continues, or the border is near. Otherwise the points are drawn as discs, and the drawing
+is grown by quilting, whose cuts avoid the discs. The points are then read from it. Points of the image itself stay.
+Elements are sown in the same way, each next to its neighbours in the image. Elements that the border cuts are not
+sown.
 """
 
 from __future__ import annotations
@@ -25,29 +26,37 @@ Points = NDArray[np.float64]
 Reals = NDArray[np.float64]
 
 NEAR = 1.5
-"""Spacings beyond the picture up to which a layout is reflected."""
+"""Distance beyond the image up to which a layout is reflected, in spacings."""
 FEWEST = 6
-"""Points that say how they lie."""
+"""Least number of points that define an arrangement."""
 DRAWN, LARGE = (6.0, 12.0), 640.0
-"""Pixels that points are apart in the drawing, at least and at most, and the side of it beyond which they are less."""
+"""Least and largest distance of points in the drawing, in pixels, and side of the drawing beyond which the distance
+shrinks.
+"""
 DISC = 0.45
 """Radius of a disc, in spacings."""
 PATCH, SMALLEST, OVERLAP = 3.5, 1.0, 0.36
-"""Side of a patch in spacings, but half a picture's at most, and the least that tells how points lie; overlap, in sides."""
+"""Side of a patch in spacings (at most half an image), least side that contains an arrangement, and overlap as a share
+of the side.
+"""
 CLOSE = (0.7, 1.04)
-"""Share of the sum of their radii that elements from different patches must be apart, at least and at most."""
+"""Least and largest distance between elements of different patches, as a share of the sum of their radii."""
 ROUGH, TIGHT, ROUNDS = 0.7, 0.92, 12
-"""Of that, how near sown elements may lie that are then pushed apart, and may lie in the end; and how often they are pushed."""
+"""Shares of that distance: least distance of sown elements before and after they are pushed apart.
+
+Number of pushes.
+"""
 FINE = 6.0
-"""Places in a spacing where gaps are sought."""
+"""Number of positions per spacing when gaps are searched."""
 AWAY, ALIKE = 4.0, 6
-"""Spacings within which no element is to lie twice, and how many of about one size take each other's place."""
+"""Distance in spacings up to which an element should not repeat. Number of similar-sized elements that may replace it.
+"""
 APART = 0.8
-"""Share of the usual distance to the nearest that points keep which come from different patches."""
+"""Least distance of points from different patches, as a share of the usual nearest distance."""
 
 
 class Sown(NamedTuple):
-    """Points (n, 2) float64 that go on as they lie, and which of the picture's each one stands for; its own come first."""
+    """Points (n, 2) of an extended arrangement and their originals; the image's points come first."""
 
     points: Points
     of: NDArray[np.intp]
@@ -64,18 +73,18 @@ def continue_points(
     *,
     around: tuple[Points, Points] | None = None,
 ) -> tuple[Points, str]:
-    """Return the points of a layout in a box, and how it goes on there.
+    """Return the points of a layout in a box, and how the layout continues there.
 
     Parameters
     ----------
     layout : PointLayout
-        The points of a picture, and how they could be reflected.
+        Points of an image, and how they could be reflected.
     shape : (rows, columns)
-        Of the picture.
+        Shape of the image.
     low, high : (2,) float64
-        The box.
+        First and last corner of the box.
     around : (low, high), optional
-        A box that is sown in place of that one, for several that lie in it.
+        Larger box that is sown instead, and then reused for several boxes inside it. Default: the box.
 
     """
     points, how = layout.cover(low, high)
@@ -92,25 +101,25 @@ def continue_points(
 def sow_elements(
     layout: PointLayout, shape: tuple[int, ...], whole: Bools, radius: Reals, low: Points, high: Points
 ) -> Sown | None:
-    """Return the elements of a picture that goes on, in a box; None where it need not, or goes on by a rule.
+    """Return the elements of an extended image in a box, or None if sowing is not needed.
 
     Parameters
     ----------
     layout : PointLayout
-        All elements of the picture.
+        All elements of the image.
     shape : (rows, columns)
-        Of the picture.
+        Shape of the image.
     whole : (n,) bool
-        Which ones the border leaves whole: these alone are sown.
+        True for elements that the border does not cut. Only these are sown.
     radius : (n,) float64
-        How large each is: no two come nearer than they have room, unless they lie so in the picture.
+        Radius of each element in pixels. Elements do not overlap, unless they do so in the image.
     low, high : (2,) float64
-        The box.
+        First and last corner of the box.
 
     """
     if layout.cover(low, high)[1] != "reflected" or not _is_far(layout, shape, low, high):
         return None
-    # What lies so near to the border is cut, or may be: there the picture does not tell how dense its elements are.
+    # Exclude the margin where elements may be cut, because it does not show how dense they are.
     margin = float(np.median(radius[whole])) if whole.any() else 0.0
     ends = np.full(2, margin), np.array(shape) - 1 - margin
     own, large = layout.points[whole], radius[whole]
@@ -126,7 +135,7 @@ def sow_elements(
 
 
 def _is_far(layout: PointLayout, shape: tuple[int, ...], low: Points, high: Points) -> bool:
-    """Return whether a box goes on so far beyond the picture that a mirror is seen."""
+    """Return whether a box extends so far beyond the image that a reflection is visible."""
     return bool(np.maximum(-low, high - (np.array(shape) - 1)).max() > NEAR * layout.scale)
 
 
@@ -138,7 +147,7 @@ def _sow_once(
     high: Points,
     radius: Reals | None,
 ) -> Sown | None:
-    """Sow points of a picture, of which what lies between the ``ends`` tells how they lie; None where too little does."""
+    """Sow points of an image by their arrangement between the ``ends``; return None if this area is too small."""
     unit = float(np.clip(LARGE * scale / (high - low).max(), *DRAWN)) / scale
     too_small = (ends[1] - ends[0]).min() < 2 * SMALLEST * scale
     if len(points) < FEWEST or (high - low).max() * unit > 4 * LARGE or too_small:
@@ -156,7 +165,7 @@ def _sow(
     unit: float,
     radius: Reals | None,
 ) -> Sown:
-    """Quilt a drawing of the points, so many of its pixels to one of theirs, and read them off it."""
+    """Quilt a drawing of the points, with ``unit`` pixels per pixel of the image, and read the points from it."""
     first = ends[0]
     sides = tuple(round(n * unit) for n in (ends[1] - first + 1).tolist())
     places = (points - first) * unit
@@ -164,6 +173,7 @@ def _sow(
     picture = Picture(disc[..., np.newaxis], SourceMap.identity(sides), disc)
     size = tuple(int(np.ceil(n)) + 1 for n in (high - low) * unit)
     patch = min(PATCH * scale * unit, min(sides) / 2)
+    # Grow the drawing of the points by quilting.
     grown = quilt(
         [picture],
         (size[0], size[1]),
@@ -173,6 +183,7 @@ def _sow(
         seed=0,
         progress=lambda share: None,
     )
+    # Read the points from the quilt: each pixel of a point in the drawing is one point.
     drawn = np.flatnonzero(((places >= 0) & (places <= np.array(sides) - 1)).all(axis=1))
     pixel = np.rint(places[drawn]).astype(np.intp)
     number = np.zeros(sides, np.int32)
@@ -184,6 +195,7 @@ def _sow(
     of = drawn[which]
     sown = np.round(low + (np.stack([rows, columns], axis=-1) + places[of] - pixel[which]) / unit, 6)
     beyond = ~((sown >= first) & (sown <= ends[1])).all(axis=1)
+    # Keep the points of the image itself, and add sown points outside of it.
     own = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
     usual = float(np.quantile(nearest_distances(points, 1), 0.25))
     both = Sown(np.concatenate([points[own], sown[beyond]]), np.concatenate([own, of[beyond]]))
@@ -193,14 +205,14 @@ def _sow(
 
 
 def _measure_closest(points: Points, radius: Reals) -> float:
-    """Return how near elements come to each other, over the sum of their radii; a tenth of them may come nearer."""
+    """Return the usual least distance of elements over the sum of their radii; a tenth of them are closer."""
     apart = np.hypot(*np.moveaxis(points[:, np.newaxis] - points, -1, 0)) / (radius[:, np.newaxis] + radius)
     np.fill_diagonal(apart, np.inf)
     return float(np.clip(np.quantile(apart.min(axis=1), 0.1), *CLOSE))
 
 
 def _push_apart(found: Sown, points: Points, radius: Reals, closest: float) -> Sown:
-    """Push sown elements apart that come nearer than they do in the picture, and leave out those that find no room."""
+    """Push sown elements apart that are closer than in the image, and remove those without room."""
     from scipy.spatial import cKDTree
 
     at, own = found.points.copy(), len(points)
@@ -231,7 +243,7 @@ def _fill_gaps(
     share: float,
     room: float,
 ) -> Sown:
-    """Put elements into the largest gaps between others until these cover their share of the box, or no more have room."""
+    """Fill the largest gaps with elements until they cover their share of the box, or have no room."""
     from scipy.spatial import cKDTree
 
     sides = [np.arange(a, b + step / 2, step) for a, b in zip(low, high, strict=True)]
@@ -252,12 +264,12 @@ def _fill_gaps(
 
 
 def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float) -> NDArray[np.intp]:
-    """Exchange elements for others of about their size where the same one lies near, from the picture outwards."""
+    """Exchange elements for others of similar size if the same one is near, from the image outwards."""
     from scipy.spatial import cKDTree
 
     count = len(radius)
     turn = (np.arange(count) - np.arange(count)[:, np.newaxis]) % count
-    # Itself first, and then not always the same ones.
+    # Each element comes first in its own list, and ties have different orders for different elements.
     alike = np.lexsort((turn, np.abs(radius - radius[:, np.newaxis])), axis=1)[:, :ALIKE]
     middle = at[:own].mean(axis=0) if own else at.mean(axis=0)
     order = np.argsort(np.hypot(*(at[own:] - middle).T), kind="stable") + own
@@ -274,7 +286,7 @@ def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float)
 
 
 def _draw(places: Points, sides: tuple[int, int], radius: float) -> Floats:
-    """Draw points as cones, 1 at the point."""
+    """Draw points as cones with the value 1 at the point."""
     from scipy.spatial import cKDTree
 
     pixels = np.stack(np.meshgrid(*(np.arange(n) for n in sides), indexing="ij"), -1).reshape(-1, 2)
@@ -285,7 +297,7 @@ def _draw(places: Points, sides: tuple[int, int], radius: float) -> Floats:
 def _keep_apart(
     found: Sown, own: int, points: Points, apart: float, radius: Reals | None, closest: float = 0.0
 ) -> NDArray[np.intp]:
-    """Return which points do not come too near to earlier ones; a layout's own, the first ones, may lie as they do."""
+    """Return the points that are not too close to earlier ones; the layout's own points, at the start, are all kept."""
     from scipy.spatial import cKDTree
 
     far = apart if radius is None else 2 * float(radius.max())
@@ -293,7 +305,7 @@ def _keep_apart(
     if radius is not None:
         one, two = found.of[pairs[:, 0]], found.of[pairs[:, 1]]
         away = found.points[pairs[:, 1]] - found.points[pairs[:, 0]]
-        # As they lie in the picture any two may lie.
+        # Any two points may keep the offset that they have in the image.
         copied = (np.abs(away - (points[two] - points[one])) < 1).all(axis=1)
         pairs = pairs[~copied & (np.hypot(*away.T) < closest * (radius[one] + radius[two]))]
     dropped = np.zeros(len(found.points), bool)

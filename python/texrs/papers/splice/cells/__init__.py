@@ -1,18 +1,21 @@
-"""Connected textures by cells: each target cell shows a whole cell of A, and cells are joined by cuts.
+"""Splice connected textures by cells: each target cell shows a whole cell of A, and cells are joined by cuts.
 
-Bending a figure as printed (Liu et al. 2009, Eq. 5) realises about half of what a layout asks of a connected texture, and
-mirrors what is asked of it beyond its picture. Here nothing is bent but cells, each for itself. The flow, and where each stage
-is:
+Bending a figure as printed (Liu et al. 2009, Eq. 5) reaches about half of the displacements in a connected texture. It
+shows reflections beyond the image. Here only single cells are bent. The steps, and the module of each step:
 
-1. the cells of A, and those of B, or the Voronoi cells of B's points where these are not connected (`texrs.exemplar.cells`,
-   `tessellation`, `continuation`);
-   for a part of the way only, tessellations between A's own and that one (`strength`);
-2. for each target cell the cell of A that is most like it and was shown least (`choice`);
-3. its outline brought to the target's, its inside with it, its joints as wide as they were (`outlines`, `charts`);
-4. cells joined by cuts in a band around their outlines (`joining`);
-5. what is stretched corrected from what is not (`refinement`).
+1. Find the cells of A (`texrs.exemplar.cells`). The target cells are those of B, or the Voronoi cells of B's points if B
+   is not connected (`tessellation`, `continuation`). A strength below 1 interpolates between A's own cells and these
+   (`strength`).
 
-All five make a source map; the picture is looked up through it once.
+2. Choose for each target the most similar cell of A that was shown least (`choice`).
+
+3. Move its outline to the target's, and its inside with it. The joints keep their width (`outlines`, `charts`).
+
+4. Join the cells by cuts in a band around their outlines (`joining`).
+
+5. Correct stretched pixels from unstretched ones (`refinement`).
+
+The five steps give a source map, and the image is looked up once.
 """
 
 from __future__ import annotations
@@ -44,15 +47,17 @@ from texrs.synthesis import Synthesis
 __all__ = ["find_entry_cells", "splice_cells"]
 
 FEWEST = 3
-"""Cells that can be shown, at least."""
+"""Least number of cells that can be shown."""
 HERE = 0.2
-"""Sizes from a cell's centre within which a pixel of the output must show it, for the cell to be there."""
+"""Distance from a cell's centre, in cell sizes, within which an output pixel must show it for the cell to count as
+present.
+"""
 
 _TARGETS: Cache[bytes, Tessellation] = Cache(16)
 
 
 def find_entry_cells(entry: ElementAnalysis, watch: Progress | None = None) -> Cells | None:
-    """Return the cells of a connected texture; none where it has none that are sure enough, as nets."""
+    """Return the cells of a connected texture, or None if they are not reliable enough, as in nets."""
     found = find_sure_cells(entry.image, entry.mask, entry.box, entry.layout, watch, known=entry.known)
     return found if found is not None and len(list_usable(found)) >= FEWEST else None
 
@@ -77,31 +82,31 @@ def splice_cells(
     a, b : ElementAnalysis
         The textures.
     cells : Cells
-        Those of A.
+        Cells of A.
     size : (rows, columns)
-        Of the result.
+        Size of the result, in pixels.
     strength : float
-        How much of the way cells go, from A's own tessellation, 0, to B's, 1.
+        Share of the way from A's own tessellation, 0, to B's, 1.
     scale : float, optional
-        What B's layout is enlarged by, not to the size of A's cells.
+        Scale of B's layout. Default: the scale that gives it the size of A's cells.
     turns : bool, optional
-        Whether cells may be turned; by default where nothing tells A from itself upside down.
+        If True, cells may be turned. By default True, unless the image shows which side of A is up.
     refine : bool
-        Whether what is stretched is corrected.
+        If True, stretched pixels are corrected.
     seed : int
-        Of what is chosen by chance, and of the correction.
+        Number that selects random choices and the noise of the correction.
     watch : callable
-        Called as ``watch(stage, share)``.
+        Function called as ``watch(stage, share)``.
 
     Returns
     -------
     Synthesis
-        Whose labels are targets, counted from 1, as in the report's "matches".
+        Labels of the source map are targets, counted from 1 as in the report's "matches".
 
     Raises
     ------
     InvalidInput
-        B has no cell or point that could be taken.
+        B has neither usable cells nor usable points.
 
     """
     watch("cells", 0.0)
@@ -111,6 +116,7 @@ def splice_cells(
         wanted = go_part_of_the_way(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
     chosen = _list_shown(wanted)
     watch("cells", 0.2)
+    # Choose a cell for each target, bend it, and join the cells.
     choices = shortlist(cells, wanted, chosen, turns=may_turn, seed=seed)
     charts = draw_charts(cells, wanted, chosen, choices)
     watch("cells", 0.6)
@@ -139,7 +145,7 @@ def splice_cells(
 def _take_targets(
     b: ElementAnalysis, size: tuple[int, int], unit: float, scale: float | None, seed: int
 ) -> Tessellation:
-    """Return the target cells: kept, for one layout often serves several textures of one size."""
+    """Return the target cells from a cache, because one layout often serves several textures of one size."""
     parts = np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.box, b.wrap, b.known
     key = content_hash(*parts, size, unit, scale, seed)
 
@@ -155,14 +161,14 @@ def _take_targets(
 
 
 def _list_shown(wanted: Tessellation) -> NDArray[np.intp]:
-    """Return the rows of the targets that reach into the output, from top to bottom."""
+    """Return the rows of the targets that extend into the output, from top to bottom."""
     m = wanted.margin
     rows = np.unique(wanted.labels[m:-m, m:-m]) - 1
     return np.asarray(rows[np.lexsort((wanted.centre[rows, 1], wanted.centre[rows, 0]))], np.intp)
 
 
 def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.float64]:
-    """Return where in the output the centre of each shown cell is, from the source map; NaN where it is not shown."""
+    """Return each shown cell's centre in the output, from the source map; NaN if it is not visible."""
     shape = joined.chart.shape
     chart = joined.chart.ravel()
     pixel = joined.pixel.ravel()
@@ -179,7 +185,7 @@ def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.flo
 
 
 def _report(cells: Cells, wanted: Tessellation, charts: Charts, joined: Joined) -> dict[str, Any]:
-    """Say what was found, what was wanted and what has become of it, in JSON types."""
+    """Return the cells that were found, requested and reached, in JSON types."""
     size = joined.chart.shape
     own = cells.centre + (np.array(size) - cells.labels.shape) / 2
     start = None if wanted.start is None else wanted.start[charts.target]

@@ -1,8 +1,9 @@
-"""Charts: for each pixel of a target cell and a band around it, where in A it looks.
+"""Charts: the source position in A for each pixel of a target cell and a band around it.
 
-A cell is turned and scaled, its outline brought to the target's, and what lies inside goes along (`outlines`). Joints would
-be stretched with it; so beside the outline, on both sides, source points slide along the gradient of the distance to the
-source's own outline until they are as far from it as the pixel is from the target's: joints keep their width.
+A cell is turned and scaled, its outline is moved to the target's, and its inside follows (`outlines`). This would
+stretch the joints. Therefore source points near the outline, on both sides, slide along the gradient of the distance
+to the source's outline. They stop at the distance that the pixel has from the target's outline, so that joints keep
+their width.
 """
 
 from __future__ import annotations
@@ -23,46 +24,54 @@ from texrs.papers.splice.cells.tessellation import Tessellation
 __all__ = ["Charts", "draw_charts"]
 
 BAND = 0.12
-"""Sizes of a cell beyond its outline that it is drawn for, so that it can be cut against those beside it."""
+"""Width of the band around a cell that is drawn also, so that it can be cut against its neighbours, in cell sizes."""
 JOINT = 0.25
-"""Sizes from the outline within which distances to it are those of the target."""
+"""Distance from the outline within which source distances equal target distances, in cell sizes."""
 SMOOTH = 0.09
-"""Standard deviation, in sizes, of the Gaussian that distances to outlines are smoothed by: within a joint outlines waver, and
-what follows them would. Both sides alike, so that corners meet corners."""
+"""Standard deviation of the Gaussian that smooths distances to outlines, in cell sizes.
+
+Outlines waver within a joint, and the slide would follow them. Both sides are smoothed equally, so that corners meet
+corners.
+"""
 SLIDES, SLIDE = 4, 0.9
-"""Steps in which source points slide, and the share of what is missing that they go in each."""
+"""Number of steps of the slide of source points, and share of the remaining distance per step."""
 CORE, EDGE, STEEP = 0.8, 1.5, 0.4
-"""What is deeper in the target than half of a joint, and so many pixels, is at least as deep as that in the source, and so much
-deeper for each pixel; but no deeper than a share of the source's greatest depth."""
+"""Bounds on the depth of source points: a share of the source's greatest depth, a number of pixels, and a factor.
+
+The limit is half a joint plus the number of pixels. A pixel that is deeper in the target is at least this deep in the
+source. The bound grows by the factor per further pixel, up to the share of the greatest depth.
+"""
 GRID, KNOT = (6, 20), 3.0
-"""Places along each side of the box of a cell at which displacements are interpolated, linearly between them: fewest and most,
-and pixels from one to the next."""
+"""Least and largest number of grid points along each side of a cell's box, and pixels between them.
+
+Displacements are interpolated linearly on this grid.
+"""
 GROUP = 128
-"""Targets that are drawn at once: of more, what is looked at on the way would take as much memory as hundreds of pictures."""
+"""Number of targets that are drawn at once. More would need intermediate memory for hundreds of images."""
 MISFIT = 2.0
-"""Weight of the root of an outline's matching cost against the cost of the shortlist."""
+"""Weight of the root of an outline's matching cost, relative to the cost of the shortlist."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Charts:
-    """The pixels of all target cells, box by box in one row.
+    """Pixels of all target cells, box after box in one row.
 
     Attributes
     ----------
     target : (cells,) int
-        Row of the target of each box.
+        Target of each box, as a row of the targets.
     source : (cells,) int
-        Row of the cell of A that is shown.
+        Cell of A that is shown, as a row of the cells.
     turn, scale : (cells,) float64
-        Degrees that it is turned by, and what it is scaled by before it is bent.
+        Turn in degrees and scale factor of the cell before it is bent.
     first : (cells + 1,) int
-        Where the pixels of each box begin.
+        Index of the first pixel of each box.
     corner, sides : (cells, 2) int
-        First row and column of each box in the output, and how many it has.
+        First row and column of each box in the output, and its number of rows and columns.
     depth : (n,) float32
-        How far inside the target each pixel lies; less than 0 outside.
+        Depth of each pixel inside the target, in pixels; negative outside.
     places : (n, 2) float32
-        Where in A each pixel looks.
+        Source position in A of each pixel.
 
     """
 
@@ -77,12 +86,12 @@ class Charts:
     places: Floats
 
     def box(self, k: int) -> tuple[slice, slice]:
-        """Return where a box lies in the output."""
+        """Return the slices of a box in the output."""
         (top, left), (rows, columns) = self.corner[k], self.sides[k]
         return slice(int(top), int(top + rows)), slice(int(left), int(left + columns))
 
     def measure_frames(self, pixel: NDArray[np.integer], chart: NDArray[np.integer]) -> Floats:
-        """Return the Jacobians, (..., 2, 2), at some pixels of the row, each of a given box: central differences."""
+        """Return the Jacobians, (..., 2, 2), at pixels of given boxes, by central differences."""
         number, sides = pixel - self.first[chart], self.sides[chart]
         at = np.divmod(number, sides[..., 1])
         frames = np.zeros((*number.shape, 2, 2), np.float32)
@@ -95,7 +104,7 @@ class Charts:
 
 
 def draw_charts(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist) -> Charts:
-    """Draw the chart of each chosen target: the best of its shortlist, once outlines are matched."""
+    """Draw the chart of each chosen target, from the best cell of its shortlist by matched outlines."""
     unit, band = cells.size, max(2.0, BAND * cells.size)
     groups = [slice(k, k + GROUP) for k in range(0, len(chosen), GROUP)]
     parts = [_choose(cells, wanted, chosen[g], choices.part(g), unit) for g in groups]
@@ -120,13 +129,13 @@ def _draw(
     number: NDArray[np.intp],
     count: int,
 ) -> None:
-    """Find where the pixels of some boxes look."""
+    """Compute the source positions of the pixels of some boxes."""
     sides, corner, source = charts.sides[group], charts.corner[group], charts.source[group]
     pixels = slice(charts.first[group][0], charts.first[group.start + len(sides)])
     which = np.repeat(np.arange(len(sides)), sides.prod(axis=1))
     at = _list_pixels(sides, which)
 
-    # Displacement of the outline, carried to a grid over each box, and from there to its pixels.
+    # Interpolate the displacement of the outline on a grid over each box, and from there at its pixels.
     goal, middle = wanted.outlines[charts.target[group]], wanted.centre[charts.target[group]]
     step = np.maximum(sides - 1, 1) / (count - 1)
     knots = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), -1).reshape(1, -1, 2)
@@ -136,7 +145,7 @@ def _draw(
     tall = np.ascontiguousarray(grid.reshape(-1, count, 2))
     moved = at + (corner - middle)[which] + gather(tall, knot[None], interpolation="linear")[0]
 
-    # Back through the turn and the scale.
+    # Invert the turn and the scale.
     angle = np.radians(charts.turn[group])
     inverse = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / charts.scale[group]
     places = np.einsum("na,abn->nb", moved, inverse[:, :, which]) + cells.centre[source][which]
@@ -147,7 +156,7 @@ def _draw(
 def _choose(
     cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist, unit: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Match the outlines of all that are on the shortlists; return source, turn, scale, and outline of the best."""
+    """Match the outlines of all cells on the shortlists; return source, turn, scale, and outline of the best cells."""
     count, k = choices.source.shape
     source, turn, scale = (x.reshape(-1) for x in (choices.source, choices.turn, choices.scale))
     angle = np.radians(turn)
@@ -166,7 +175,7 @@ def _choose(
 def _measure_depths(
     wanted: Tessellation, chosen: NDArray[np.intp], band: float, smooth: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Return the box of each target in the output, and how deep inside the target each of its pixels lies."""
+    """Return the box of each target in the output, and the depth of its pixels inside the target."""
     from scipy.ndimage import find_objects
 
     boxes, pad = find_objects(wanted.labels), int(np.ceil(band)) + 2
@@ -186,7 +195,7 @@ def _measure_depths(
 
 
 def _list_pixels(sides: NDArray[np.intp], which: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the place of each pixel in its box, of boxes that lie in one row."""
+    """Return the position of each pixel in its box, for boxes in one row."""
     first = np.concatenate([[0], np.cumsum(sides.prod(axis=1))])
     number = np.arange(len(which)) - first[which]
     return np.stack(np.divmod(number, sides[which, 1]), axis=-1).astype(np.float64)
@@ -195,7 +204,7 @@ def _list_pixels(sides: NDArray[np.intp], which: NDArray[np.intp]) -> NDArray[np
 def _slide(
     cells: Cells, fields: Fields, kind: NDArray[np.intp], depth: Floats, places: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Slide source points beside outlines until they are as deep inside the source as the pixels are inside the target."""
+    """Slide source points near outlines to the depth that the pixels have inside the target."""
     unit = cells.size
     reach = JOINT * unit
     joint = min(reach, 0.5 * cells.joint_width + EDGE)
@@ -206,7 +215,7 @@ def _slide(
     def measure(at: Floats, kind: NDArray[np.intp]) -> Floats:
         return np.asarray(gather(fields.values, at[None], kind[None].astype(np.uint16))[0], np.float32)
 
-    # Beside the outline as deep as the target is, farther inside as deep as they are, but never in the joint again.
+    # Near the outline, use the target's depth. Farther inside, keep the own depth, but never in the joint.
     inside, before = depth[kept], measure(at, kind)[:, 0]
     weight = np.clip(1.3 - np.abs(inside) / reach, 0, 1)
     weight = weight * weight * (3 - 2 * weight)
@@ -225,16 +234,16 @@ def _slide(
 
 
 class Fields(NamedTuple):
-    """How deep places lie inside of cells of A.
+    """Depths of positions inside cells of A.
 
     Attributes
     ----------
     values : list of (h, w, 3) float32
-        Of each cell the signed distance to its outline, and its slopes.
+        Signed distance to the outline of each cell, and its two slopes.
     corner : (n, 2) float64
-        Place of the first pixel of each.
+        Position of the first pixel of each field.
     deepest : (n,) float32
-        The greatest distance in each.
+        Greatest distance in each field.
 
     """
 
@@ -244,13 +253,13 @@ class Fields(NamedTuple):
 
 
 def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: float) -> Fields:
-    """Measure signed distances to the outlines of some cells."""
+    """Return signed distances to the outlines of some cells."""
     from scipy.ndimage import find_objects
 
     boxes = find_objects(cells.labels)
     fields, corners = [], []
     for row in shown.tolist():
-        # As if a cell at the border went on there: nothing is known of its joint.
+        # Treat a cell at the border as if it continued there, because its joint is unknown.
         signed = _measure_depth(cells.labels, row + 1, boxes[row], pad, smooth)
         fields.append(np.ascontiguousarray(np.stack([signed, *np.gradient(signed)], axis=-1), np.float32))
         corners.append([s.start - pad for s in boxes[row]])
@@ -259,7 +268,7 @@ def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: flo
 
 
 def _measure_depth(labels: Labels, number: int, box: tuple[slice, ...], pad: int, smooth: float) -> NDArray[np.float64]:
-    """Return the smoothed signed distance to the outline of one label, over its box and so many pixels around."""
+    """Return the smoothed signed distance to the outline of one label, over its box and a margin."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     inside = np.pad(labels[box] == number, pad)

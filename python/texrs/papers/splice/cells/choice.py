@@ -1,4 +1,4 @@
-"""Which cell of A goes to each target cell: the one that needs least bending, and has been shown least."""
+"""Choose the cell of A for each target cell: one that needs little bending and was shown rarely."""
 
 from __future__ import annotations
 
@@ -16,40 +16,43 @@ from texrs.papers.splice.cells.tessellation import Tessellation
 __all__ = ["TURNS", "Shortlist", "shortlist"]
 
 RAYS = 72
-"""Of the radial profiles that shapes are compared by: one every five degrees."""
+"""Number of rays of the radial profiles that compare shapes: one every five degrees."""
 TURNS = (0, 30, -30, 60, -60, 90, 180)
-"""Degrees by which a cell may be turned, where nothing speaks against it; whole steps of the rays."""
+"""Turns of a cell in degrees, if turning is permitted; whole steps of the rays."""
 TURN, SIZE, USE, BESIDE, NOISE = 0.06, 0.25, 0.05, 0.15, 0.02
-"""Costs, in root mean square differences of profiles of unit area: of a quarter turn, of a size that is e times another's, of
-each time that a cell has been shown, of showing it beside itself, and the largest one of chance."""
+"""Costs, in root mean square differences of profiles of unit area.
+
+The first four are for a quarter turn, a size ratio of e, each earlier use of a cell, and use next to itself. The last
+is the largest random cost.
+"""
 SMALLEST, LARGEST = 0.6, 1.7
-"""What a cell is scaled by at least and at most; what is left is bent."""
+"""Least and largest scale factor of a cell. The remaining difference is bent."""
 BEST = 3
-"""Cells whose outlines are matched in full for each target."""
+"""Number of cells per target whose outlines are matched in full."""
 SMALL = 0.25
-"""Share of the usual area below which a cell is not shown."""
+"""Share of the median area below which a cell is not shown."""
 TRUSTED = 0.5
-"""Certainty below which a cell is not shown, where enough are surer."""
+"""Certainty below which a cell is not shown, if there are enough cells of higher certainty."""
 GROUP = 256
-"""Targets that are compared at once."""
+"""Number of targets that are compared at once."""
 ENOUGH = 6
-"""Cells to choose from that are wanted before less certain ones are left out."""
+"""Least number of cells to choose from, before less certain ones are left out."""
 FEW = 3
-"""Whole cells, of whatever certainty, that are wanted before those that the border cuts are left out."""
+"""Least number of whole cells of any certainty, before cells that the border cuts are left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shortlist:
-    """The cells that might go to each target, the best first.
+    """Candidate cells for each target, the best first.
 
     Attributes
     ----------
     source : (targets, k) int
         Rows of the cells of A.
     turn : (targets, k) float64
-        Degrees that each is turned by, from the columns' axis towards the rows'.
+        Turn of each candidate in degrees, from the axis of columns towards the axis of rows.
     scale : (targets, k) float64
-        What each is scaled by.
+        Scale factor of each candidate.
     cost : (targets, k) float64
 
     """
@@ -60,25 +63,25 @@ class Shortlist:
     cost: NDArray[np.float64]
 
     def part(self, rows: slice) -> Shortlist:
-        """Return those of some of the targets."""
+        """Return the shortlists of some of the targets."""
         return Shortlist(self.source[rows], self.turn[rows], self.scale[rows], self.cost[rows])
 
 
 def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, turns: bool, seed: int) -> Shortlist:
-    """Compare the shapes of cells and targets, target by target, those in the upper rows first.
+    """Compare the shapes of cells and targets, one target after the other, upper rows first.
 
     Parameters
     ----------
     cells : Cells
-        Those of A.
+        Cells of A.
     wanted : Tessellation
-        The targets.
+        Target cells.
     chosen : (targets,) int
-        Rows of the targets that are looked at, in the order in which they choose.
+        Rows of the targets, in the order of their choices.
     turns : bool
-        Whether cells may be turned.
+        If True, cells may be turned.
     seed : int
-        Of the chance between cells that fit about equally well.
+        Number that selects between cells that fit nearly equally well.
 
     """
     usable = list_usable(cells)
@@ -95,7 +98,8 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
     used = np.zeros(len(usable))
     taken = np.full(len(wanted.area), -1)
     beside = list_neighbours(wanted)
-    # Of few cells all would be on each list, and the one that bends best would be shown everywhere.
+    # Limit the shortlist if there are few cells. Otherwise all would be on each list, and the cell that bends best
+    # would be everywhere.
     k = min(BEST, max(1, len(usable) // 2))
     source = np.zeros((len(chosen), k), np.intp)
     turn, cost = np.zeros((2, len(chosen), k))
@@ -115,10 +119,10 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
 def _compare(
     theirs: NDArray[np.float64], turned: NDArray[np.float64], angles: NDArray[np.intp]
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return how much each target's profile differs from each cell's, at the best turn, and which turn that is."""
+    """Return the difference between each target's profile and each cell's, at the best turn, and this turn."""
     flat = turned.reshape(-1, RAYS)
     own = (theirs**2).mean(axis=1)[:, None]
-    # Cells that are alike must be so to the last bit, which in products of matrices hangs on the processor and the place.
+    # Similar cells must tie exactly. Matrix products differ in the last bit by processor and position.
     square = (own + (flat**2).mean(axis=1) - 2 * theirs @ flat.T / RAYS).round(9)
     cost = np.sqrt(np.maximum(square, 0) / own).reshape(len(theirs), *turned.shape[:2]) + TURN * np.abs(angles) / 90
     which = cost.argmin(axis=2)
@@ -126,11 +130,11 @@ def _compare(
 
 
 def list_usable(cells: Cells) -> NDArray[np.intp]:
-    """Return the rows of the cells that may be shown: whole and certain ones, or others where there are few."""
+    """Return the rows of cells that may be shown: whole and certain ones, or others if these are few."""
     usual = cells.size**2
     fair = cells.area >= SMALL * usual
     certain = cells.certain >= TRUSTED
-    # Cells that the border cuts lack a joint there, which is worse than to see the same ones again.
+    # Cells that the border cuts lack a joint there, which looks worse than a repetition.
     for allowed, enough in ((cells.whole & certain, ENOUGH), (cells.whole, FEW), (cells.area >= 0.6 * usual, 1)):
         rows = np.flatnonzero(fair & allowed)
         if len(rows) >= enough:
@@ -139,7 +143,7 @@ def list_usable(cells: Cells) -> NDArray[np.intp]:
 
 
 def list_neighbours(wanted: Tessellation) -> list[NDArray[np.intp]]:
-    """Return the rows of the targets beside each target."""
+    """Return the rows of the targets next to each target."""
     flat = wanted.labels.ravel().astype(np.int64) - 1
     one, other = (flat[side] for side in list_borders(wanted.labels))
     both = np.unique(np.concatenate([one << 32 | other, other << 32 | one]))

@@ -1,8 +1,9 @@
-"""Cells of a texture beyond its picture.
+"""Continue the cells of a texture beyond its image.
 
-On the lattice that they lie on, if there is one; around, where the texture wraps. Others are drawn as their joints alone, and
-the drawing is grown by quilting: reflected cells would be seen as a kaleidoscope. Those that are known, not found, stay as they
-are where they cover the output, and the border's are made whole by reflection. No picture is continued.
+Cells on a lattice continue on it, and a texture that wraps repeats. For other textures the joints are drawn, and the
+drawing is grown by quilting, because reflected cells look like a kaleidoscope. Known cells, which were not detected,
+stay in place if they cover the output, and cells at the border are completed by reflection. Only cells are continued,
+not the image.
 """
 
 from __future__ import annotations
@@ -25,26 +26,31 @@ __all__ = ["continue_cells"]
 Points = NDArray[np.float64]
 
 NEARLY = 0.75
-"""Share of the median area from which on a cell that the border cuts is taken for whole."""
+"""Share of the median area above which a cell that the border cuts counts as whole."""
 DRAWN, LARGE = (16.0, 28.0), 320.0
-"""Pixels that a cell is wide in the drawing of the joints, at least and at most, and the side of the drawing beyond which they
-are fewer."""
+"""Least and largest width of a cell in the drawing of the joints, in pixels, and side of the drawing beyond which the
+width shrinks.
+"""
 LINE = 0.17
-"""How far from an outline the drawing of the joints reaches, in sizes."""
+"""Distance from an outline that the drawing of the joints covers, in cell sizes."""
 SEEN, HINTED, COVERED = 0.3, 0.05, 0.35
-"""Share of a cell that a patch of a quilt shows for the cell to be taken first, and for it to be taken at all; the share that
-others may cover."""
+"""Share of a cell that one patch must show to place the cell first, or at all.
+
+Share that other cells may cover.
+"""
 TRIALS, FINE = 2, 0.05
-"""Quilts that are tried at the most, and the share of torn cells with which one is taken at once."""
+"""Maximum number of quilts, and share of torn cells below which a quilt is taken at once."""
 SOLID, HUGE = 0.8, 3.0
-"""Solidity below which, and squared sizes beyond which, a cell of a quilt is taken for torn."""
+"""Solidity below which a cell of a quilt counts as torn, and area above which it does, in squared sizes."""
 CLOSED, LEAST, ROOM = 0.8, 0.08, 0.25
-"""Height in the drawing above which a pixel lies inside of a cell, the least area of what does so together, and what must be
-left between cells for one more, in squared sizes."""
+"""Height in the drawing above which a pixel is inside a cell.
+
+Least area of such a cell, and least free area between cells for one more, in squared sizes.
+"""
 BESIDE = 0.5
-"""Sizes beyond the picture up to which cells that the border cuts are made whole by reflection."""
+"""Distance beyond the image up to which cells at the border are completed by reflection, in cell sizes."""
 PATCH, OVERLAP = 4.0, 1.2
-"""Side of a patch of the drawing, and overlap of two, in sizes."""
+"""Side of a patch of the drawing, and overlap of two patches, in cell sizes."""
 
 
 def continue_cells(
@@ -55,41 +61,39 @@ def continue_cells(
     seed: int,
     seen: tuple[float, float] | None = None,
 ) -> tuple[NDArray[np.float64], float, str]:
-    """Return the outlines of the cells around the middle of a texture.
+    """Return the outlines of the cells around the centre of a texture.
 
     Parameters
     ----------
     cells : Cells
-        What is there.
+        Cells of the texture.
     wrap : (bool, bool)
-        Whether the texture repeats without a seam.
+        Axes along which the texture is tileable.
     far : (float, float)
-        How far from the middle cells are wanted, along rows and columns, in sizes of a cell.
+        Distance from the centre up to which cells are needed, along rows and columns, in cell sizes.
     seed : int
-        Chooses what cannot be continued by rule.
+        Number that selects cells that no rule determines.
     seen : (float, float), optional
-        Of cells that are to stay as they are, how far from the middle they are seen.
+        Distance from the centre up to which cells are visible, for cells that should stay in place.
 
     Returns
     -------
     outlines : (n, P, 2) float64
-        About the middle, in sizes of a cell.
+        Outlines relative to the centre, in cell sizes.
     scale : float
-        What a pixel of the texture is there.
+        Size of a pixel of the texture in these units.
     continued : str
-        "" where the texture is large enough, else "lattice", "wrap" or "quilted".
+        How the cells continue: "" if the texture is large enough, else "lattice", "wrap" or "quilted".
 
     Raises
     ------
     InvalidInput
-        Too few cells are whole.
+        Fewer than three cells are whole.
 
     """
     usable = np.flatnonzero(cells.whole | (cells.area >= NEARLY * cells.size**2))
     if len(usable) < 3:
-        raise InvalidInput(
-            f"layout: {len(usable)} of its cells are whole, three or more are needed; take a larger picture"
-        )
+        raise InvalidInput(f"layout: must have at least three whole cells, got {len(usable)}; take a larger image")
     scale = 1 / cells.size
     centre = (np.array(cells.labels.shape) - 1) / 2
     reach = np.array(far) / scale
@@ -111,15 +115,15 @@ def continue_cells(
 
 
 def _copy(cells: Cells, of: NDArray[np.intp], places: Points, mirrored: Bools, centre: Points) -> NDArray[np.float64]:
-    """Return outlines of cells at other places, about a centre."""
+    """Return copies of outlines at other places, relative to a centre."""
     signs = np.where(mirrored, -1.0, 1.0)[:, None]
     return (cells.outlines[of] - cells.centre[of][:, None]) * signs + places[:, None] - centre
 
 
 def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
-    """Return outlines in which those that the border cuts go on beyond it, mirrored; so many pixels, at most the picture's.
+    """Return label images whose border cells continue by reflection over a margin, at most the image's size.
 
-    Those that are nearly whole as they are do not: others lie beside them.
+    Nearly whole cells do not continue, because other cells are next to them.
     """
     cut = cells.area < NEARLY * cells.size**2
     margin = [int(np.clip(np.ceil(b), 0, n)) for b, n in zip(beyond, cells.labels.shape, strict=True)]
@@ -129,7 +133,7 @@ def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
         at.append(np.where(turn == 0, place, side - 1 - place))
         turns.append(turn)
     labels = cells.labels[at[0][:, None], at[1][None]]
-    # A cell that goes on keeps its number there; what is mirrored of others are others.
+    # A continued cell keeps its number there; reflections of other cells get new numbers.
     goes_on = np.concatenate([[False], cut])[labels]
     near, inside = np.zeros(labels.shape, np.int64), np.where(cells.joints > 0.5, 0, cells.labels)
     for axis, turn in enumerate(turns):
@@ -145,10 +149,10 @@ def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
 
 
 def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float64]:
-    """Quilt a drawing of the joints, and take the cells that it shows.
+    """Quilt a drawing of the joints, and return the cells that it shows.
 
-    Seams cut cells, and run others together. So there are two readings, of which the one that is less torn is taken: what
-    the lines of the quilt enclose, and cells that it shows the most of, whole.
+    Seams cut cells and merge others. Therefore the quilt is read in two ways, and the reading with fewer torn cells is
+    used. One reading is the areas that the lines enclose, the other is the cells that are mostly visible, each whole.
     """
     unit = float(np.clip(LARGE / (2 * max(far)), *DRAWN))
     size = (round(2 * far[0] * unit), round(2 * far[1] * unit))
@@ -167,6 +171,7 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
         )
         drawn = grown.render(drawing, interpolation="nearest")
         whole = _stamp(cells, grown.coordinates, np.array(drawing.shape) / cells.labels.shape, drawn)
+        # Keep the reading of the quilt with the fewest torn cells.
         for labels in (_enclose(drawn, unit), whole):
             torn = _measure_torn(labels, unit)
             if torn < least:
@@ -175,14 +180,17 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
             break
     if not best.any():
         raise InvalidInput(
-            "layout: its cells cannot be continued as far as that; take a smaller size or a larger picture"
+            "layout: must have cells that can be continued over the output; take a smaller size or a larger image"
         )
     outlines = trace(best, np.arange(1, int(best.max()) + 1))
     return (outlines - (np.array(size) - 1) / 2) / unit
 
 
 def _enclose(drawn: Floats, unit: float) -> Labels:
-    """Label what the lines of a quilt enclose: narrow gaps in them are closed, and those that end somewhere part nothing."""
+    """Label the areas that the lines of a quilt enclose.
+
+    Narrow gaps in lines are closed, and lines with a free end are ignored.
+    """
     from skimage.segmentation import watershed
 
     pieces = split_touching(drawn > CLOSED, np.zeros_like(drawn))
@@ -191,18 +199,18 @@ def _enclose(drawn: Floats, unit: float) -> Labels:
 
 
 def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> Labels:
-    """Label the cells that a quilt shows the most of, each whole, and what room is left between them.
+    """Label the cells that are mostly visible in a quilt, each whole, and the free areas between them.
 
     Parameters
     ----------
     cells : Cells
-        Those that are drawn.
+        Cells in the drawing.
     coordinates : (H, W, 2) float32
-        Where the quilt looks in the drawing.
+        Source positions of the quilt in the drawing.
     factor : (2,) float64
-        Pixels of the drawing for one of the texture.
+        Pixels of the drawing per pixel of the texture.
     drawn : (H, W) float32
-        What the quilt shows there.
+        The quilted drawing.
 
     """
     from scipy.ndimage import distance_transform_edt, label
@@ -212,7 +220,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
     at = np.clip(np.rint((coordinates + 0.5) / factor - 0.5), 0, limits - 1).astype(np.intp)
     shown = cells.labels[at[..., 0], at[..., 1]] - 1
     pixels = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1)
-    # All that one patch shows of one cell says the same of where it would lie.
+    # All visible pixels of a cell in one patch vote for the same place of the cell.
     moved = np.rint(pixels - coordinates).astype(np.int64)
     votes, count = np.unique(np.dstack([shown, moved]).reshape(-1, 3), axis=0, return_counts=True)
     of = votes[:, 0]
@@ -239,7 +247,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
 
 
 def _measure_torn(labels: Labels, unit: float) -> float:
-    """Return the share of the area in cells that seams have run together, or left with dents."""
+    """Return the share of the area in cells that seams merged or dented."""
     shapes = Shapes.of(labels)
     area, solid = shapes.area[1:], shapes.measure_solidity()[1:]
     if not len(area):
@@ -249,7 +257,7 @@ def _measure_torn(labels: Labels, unit: float) -> float:
 
 
 def _draw(cells: Cells, unit: float) -> Floats:
-    """Draw the distance to outlines, 0 on them and 1 from a little inside on, at a fixed size of cells."""
+    """Draw the distance to outlines at a fixed size of cells: 0 on them and 1 inside from a small depth on."""
     from scipy.ndimage import distance_transform_edt
     from skimage.transform import resize
 

@@ -1,4 +1,4 @@
-"""Cells joined: each is cut into what is there, in a band around its outline, where it shows least."""
+"""Join cells: each is cut into the earlier ones, in a band around its outline, where the seam is least visible."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from texrs.papers.splice.cells.charts import BAND, Charts
 __all__ = ["Joined", "join"]
 
 COLOUR, DEPTH = 1.0, 30.0
-"""What a seam costs by the colours on both sides, in standard deviations, and by how deep inside of a cell it lies."""
+"""Weights of a seam's cost: for the colours on both sides, in standard deviations, and for the depth inside a cell."""
 STEEP, DEEP = 4.0, 6.0
-"""Depth at a whole joint's width from the middle of a joint, and the one from which on all is equally deep."""
+"""Depth at one joint's width from the middle of a joint, and largest depth."""
 CORE = 0.5
-"""Bands inside of its outline from which on a cell keeps its pixels."""
+"""Depth inside the outline beyond which a cell keeps its pixels, in bands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joined:
-    """Which pixel of which chart each pixel of the output shows.
+    """Chart and pixel that each output pixel shows.
 
     Attributes
     ----------
     pixel : (H, W) uint32
-        Number in the row of all charts.
+        Number of the pixel in the row of all charts.
     chart : (H, W) int32
-        Which chart that is of.
+        Number of the pixel's chart.
 
     """
 
@@ -51,10 +51,10 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
     far = distance_transform_edt(~mark_outlines(cells.labels)).astype(np.float32)
     looked = gather(np.dstack([colours, far]), charts.places[None], interpolation="linear")[0]
     band = max(2.0, BAND * cells.size)
-    # The cheapest place is a joint.
+    # The cheapest place of a seam is a joint.
     inside = np.clip(STEEP * (looked[:, -1] / (0.5 * cells.joint_width + 0.5) - 1), 0, DEEP)
     samples = Samples(np.ascontiguousarray(looked[:, :-1]), np.ascontiguousarray(inside), (COLOUR, DEPTH))
-    # Where the border cuts a cell it has no joint: the one of whatever lies beside it is shown.
+    # A cell has no joint where the border cuts it, so the neighbour's joint is shown there.
     limits = np.array(cells.labels.shape) - 1
     within = 0.5 * cells.joint_width + 1
     bare: Bools = np.asarray((np.minimum(charts.places, limits - charts.places) < within).any(axis=-1))
@@ -80,7 +80,7 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
 
 
 def _fill(pixel: NDArray[np.uint32], charts: Charts) -> None:
-    """Give what no chart covers to the one that it lies least far outside of."""
+    """Fill pixels without a chart from the chart whose outline is nearest."""
     if not (pixel == FREE).any():
         return
     best = np.full(pixel.shape, -np.inf, np.float32)

@@ -1,8 +1,8 @@
-"""Outlines matched point by point, and what lies inside bent with them.
+"""Match outlines point by point, and bend the inside of cells with them.
 
-The match is the monotone one of least cost around the outline, by dynamic programming on position and bending; displacements of
-the outline are carried inside and just outside by mean value coordinates (K. Hormann and M. S. Floater, "Mean value coordinates
-for arbitrary planar polygons", ACM Transactions on Graphics 25(4), 2006).
+The match is monotone around the outline and has the least cost, by dynamic programming on position and bending. Mean
+value coordinates carry displacements of the outline inside and just outside (K. Hormann and M. S. Floater, "Mean value
+coordinates for arbitrary planar polygons", ACM Transactions on Graphics 25(4), 2006).
 """
 
 from __future__ import annotations
@@ -17,25 +17,27 @@ __all__ = ["Matched", "interpolate", "match_outlines", "rematch_outlines"]
 Polygons = NDArray[np.float64]
 
 FINE = 2
-"""Points of the source's outline for each one of the target's."""
+"""Number of points on the source's outline for each point on the target's."""
 STRIDES = np.arange(0, 6)
-"""Of these, how many may lie between the matches of neighbouring points."""
+"""Number of these points between the matches of neighbouring points, least and largest."""
 APART = 16
-"""Of these, how far a match may lie from where even strides would lead: a sixth of the way around."""
+"""Largest number of these points between a match and the place of even strides: a sixth of the outline."""
 BEND, STRETCH = 0.05, 0.12
-"""Weights of the difference in bending, in squared radians, and of strides that are longer or shorter than even ones; that of
-the squared distance, in squared sizes, is 1."""
+"""Weights of the difference in bending, in squared radians, and of uneven strides.
+
+The squared distance, in squared sizes, has weight 1.
+"""
 
 
 class Matched(NamedTuple):
-    """Points of outlines matched with places on others.
+    """Points of outlines, matched with places on other outlines.
 
     Attributes
     ----------
     places : (n, points) int
-        Of `FINE` times as many places on the source's outline, in order.
+        Index of the place on the source's outline, which has `FINE` times as many places as points, in order.
     cost : (n,) float64
-        Mean cost of a point.
+        Mean cost per point.
 
     """
 
@@ -43,17 +45,17 @@ class Matched(NamedTuple):
     cost: NDArray[np.float64]
 
     def locate(self, source: Polygons) -> Polygons:
-        """Return where the places are, (n, points, 2)."""
+        """Return the positions of the places, (n, points, 2)."""
         return np.take_along_axis(_refine(source), self.places[..., None], axis=1)
 
 
 def match_outlines(target: Polygons, source: Polygons, unit: float) -> Matched:
-    """Match the points of outlines with places on others that lie over them.
+    """Match the points of outlines with places on overlapping outlines.
 
     Parameters
     ----------
     target, source : (n, points, 2) float64
-        Closed outlines in the same sense, equally spaced, in the same coordinates.
+        Closed outlines with the same orientation, equally spaced points and the same coordinates.
     unit : float
         Size of a cell.
 
@@ -64,7 +66,7 @@ def match_outlines(target: Polygons, source: Polygons, unit: float) -> Matched:
 
 
 def rematch_outlines(target: Polygons, source: Polygons, unit: float, found: Matched) -> Matched:
-    """Match again, from where the match that was found is surest to be right: where it began nothing was weighed."""
+    """Match again, starting at the most reliable match, because the first start was not optimised."""
     half = target.shape[1] // 2
     again = _match_from(_describe(target, unit), _describe_places(source, unit), half, found.places[:, half])
     better = again.cost < found.cost
@@ -80,26 +82,26 @@ def _refine(source: Polygons) -> Polygons:
 
 
 def measure_bending(polygons: Polygons) -> NDArray[np.float64]:
-    """Return by what angle an outline turns at each point."""
+    """Return the turning angle of an outline at each point, in radians."""
     ahead, behind = np.roll(polygons, -2, axis=1) - polygons, polygons - np.roll(polygons, 2, axis=1)
     cross = behind[..., 0] * ahead[..., 1] - behind[..., 1] * ahead[..., 0]
     return np.asarray(np.arctan2(cross, (behind * ahead).sum(axis=-1)))
 
 
 def _describe(outline: Polygons, unit: float) -> NDArray[np.float32]:
-    """Return of each point what it is compared by, (n, points, 3): its place, and how the outline bends there."""
+    """Return the features of each point, (n, points, 3): its position, and the bending of the outline."""
     bends = np.sqrt(BEND) * measure_bending(outline)
     return np.concatenate([outline / unit, bends[..., None]], axis=-1, dtype=np.float32)
 
 
 def _describe_places(outline: Polygons, unit: float) -> NDArray[np.float32]:
-    """Return the same of `FINE` times as many places."""
+    """Return these features for `FINE` times as many places."""
     bends = np.repeat(np.sqrt(BEND) * measure_bending(outline), FINE, axis=1)
     return np.concatenate([_refine(outline) / unit, bends[..., None]], axis=-1, dtype=np.float32)
 
 
 def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int, first: NDArray[np.intp]) -> Matched:
-    """Match what is described, beginning at one point of the targets, whose place is given."""
+    """Match features, starting at one point of the targets whose place is given."""
     count, points = goal.shape[:2]
     places, wide = fine.shape[1], 2 * APART + 1
     around = (first[:, None] + np.arange(-APART, places + APART + 1)) % places
@@ -113,7 +115,7 @@ def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int
             least = np.where(np.arange(wide)[:, None] == APART, np.float32(0), total)
         else:
             least = np.full_like(total, np.inf)
-            # An even stride keeps the distance from where even strides lead; others change it.
+            # An even stride keeps the distance from the even places; other strides change it.
             for k, step in enumerate((STRIDES - FINE).tolist()):
                 to = slice(max(step, 0), wide + min(step, 0))
                 tried = total[max(-step, 0) : wide - max(step, 0)] + stride[k]
@@ -134,12 +136,12 @@ def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int
 
 
 def interpolate(at: Polygons, outline: Polygons, values: Polygons) -> NDArray[np.float32]:
-    """Carry values at the points of outlines to other places, by mean value coordinates.
+    """Interpolate values at the points of outlines at other positions, by mean value coordinates.
 
     Parameters
     ----------
     at : (n, m, 2) float64
-        Places, inside or outside.
+        Positions inside or outside.
     outline, values : (n, points, 2) float64
         Outlines, and the values at their points.
 
@@ -153,11 +155,11 @@ def interpolate(at: Polygons, outline: Polygons, values: Polygons) -> NDArray[np
     after, length_after = np.roll(away, -1, axis=2), np.roll(length, -1, axis=2)
     cross = away[..., 0] * after[..., 1] - away[..., 1] * after[..., 0]
     dot = away[..., 0] * after[..., 0] + away[..., 1] * after[..., 1]
-    # tan of half the angle that an edge is seen under: sin / (1 + cos). On an edge that is half a turn.
+    # Tangent of half the angle that an edge subtends: sin / (1 + cos). On an edge the angle is a half turn.
     seen = cross / np.maximum(length * length_after + dot, np.float32(1e-6))
     weight = (np.roll(seen, 1, axis=2) + seen) / length
     total = weight.sum(axis=2, keepdims=True)
     weight /= np.where(np.abs(total) > 1e-12, total, 1)
-    # Not as a product of matrices, whose sums go in another order on another processor.
+    # Avoid a product of matrices, because its order of summation depends on the processor.
     few = values.astype(np.float32)[:, None]
     return np.stack([(weight * few[..., k]).sum(axis=2) for k in range(2)], axis=-1)

@@ -1,4 +1,4 @@
-"""Pictures of the stages of `texrs.papers.splice.cells`, drawn when they are looked at."""
+"""Images of the stages of `texrs.papers.splice.cells`, drawn on access."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def draw_cell_stages(
 
 
 def _draw_cells(picture: Picture, cells: Cells) -> Picture:
-    """Draw the outlines of all cells, and a ring in those that are whole: green where they are sure, red where they are not."""
+    """Draw the outlines of all cells, and a ring in whole ones: green for certain cells, red for others."""
     out = draw_outlines(picture, cells.labels, BLUE)
     for sure, colour in ((True, GREEN), (False, RED)):
         out = mark_points(out, cells.centre[cells.whole & ((cells.certain >= 0.5) == sure)], colour)
@@ -51,7 +51,7 @@ def _draw_cells(picture: Picture, cells: Cells) -> Picture:
 
 
 def _shade(chart: Labels, source: NDArray[np.intp], count: int) -> Picture:
-    """Give each cell of A a colour of its own, and show who is where."""
+    """Colour each pixel by its cell of A."""
     turn = np.arange(count) * 0.618034 % 1 * 2 * np.pi
     colours = 150 + 90 * np.stack([np.cos(turn), np.cos(turn - 2.1), np.cos(turn + 2.1)], axis=-1)
     picture = colours.astype(np.uint8)[source[chart]]

@@ -1,7 +1,7 @@
-"""What a chart stretches, corrected: pixels take what fits their neighbours from what A shows at its own size.
+"""Correct stretched pixels of charts: they take pixels that fit their neighbours from A at its own size.
 
-The corrector is that of the ground between separate elements (`texrs.papers.splice.refine`). Joints, and what is not stretched,
-stay as they are, and no joint comes into a cell.
+The corrector is the same as for the background between separate elements (`texrs.papers.splice.refine`). Joints and
+unstretched pixels stay, and pixels of joints do not enter a cell.
 """
 
 from __future__ import annotations
@@ -24,21 +24,26 @@ from texrs.papers.splice.refine import Draft, Refinement, correct_draft
 __all__ = ["refine_charts"]
 
 STRETCH = 1.35
-"""Pixels of the output for one of A beyond which it is corrected."""
+"""Output pixels per pixel of A above which pixels are corrected."""
 EDGE = 2.0
-"""Pixels beside a joint that stay as they are, as joints do: these are lines, which the corrector would fray."""
+"""Width of the border next to a joint that stays like the joint, in pixels.
+
+Joints are lines, which the corrector would fray.
+"""
 SMALLEST = 24.0
-"""Size of a cell, in pixels, below which its windows hold more joint than cell."""
+"""Size of a cell, in pixels, below which its windows contain more joint than cell."""
 GRAIN, FINE = 0.24, 2.0
-"""Least share of the variance inside of cells that must be finer than so many pixels: what is smooth, or one figure, as the
-bottom of a comb's cell, is stretched better than it is corrected."""
+"""Least share of the variance inside cells that must be finer than a number of pixels.
+
+Smooth cells, and cells with a single figure such as a honeycomb's bottom, look better stretched than corrected.
+"""
 LEAST = 0.01
-"""Share of the output below which nothing is."""
+"""Share of the output below which nothing is corrected."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurnedRefinement(Refinement):
-    """A refinement whose pixels look at A turned, as their charts are."""
+    """Refinement whose pixels use A turned, as in their charts."""
 
     turned: Floats
 
@@ -58,7 +63,7 @@ def refine_charts(
     seed: int,
     progress: Progress,
 ) -> tuple[Floats, Floats]:
-    """Return places and frames, corrected where charts stretch A."""
+    """Return positions and Jacobians, corrected where charts stretch A."""
     if cells.size < SMALLEST or _measure_grain(a, cells) < GRAIN:
         return places, frames
     stretch = 1 / np.maximum(_measure_least(frames), 1e-3)
@@ -80,13 +85,13 @@ def refine_charts(
 
 
 def _measure_least(frames: Floats) -> Floats:
-    """Return the lesser singular value of matrices (..., 2, 2)."""
+    """Return the smaller singular value of matrices (..., 2, 2)."""
     (a, b), (c, d) = np.moveaxis(frames, (-2, -1), (0, 1))
     return np.asarray(np.abs(hypot_single(a + d, b - c) - hypot_single(a - d, b + c)) / 2, np.float32)
 
 
 def _measure_grain(a: ElementAnalysis, cells: Cells) -> float:
-    """Return the share of the variance of lightness inside of cells that is of fine grain."""
+    """Return the share of fine grain in the variance of lightness inside cells."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     light = guidance(as_image(a.image)).mean(axis=-1)

@@ -1,7 +1,7 @@
-"""Tessellations between A's own and the one that is wanted.
+"""Interpolate between A's own tessellation and the requested one.
 
-Cells of the two are matched one to one at the least total squared distance, as elements are (Eq. 4), and each outline goes a
-part of its way. Those that find no partner shrink away, or grow.
+Cells of both are matched one to one at the least total squared distance, like elements (Eq. 4). Each outline moves a
+share of its way. Cells without a partner shrink away, or grow.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ __all__ = ["go_part_of_the_way", "take_own_cells"]
 def take_own_cells(
     cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], margin: int, *, seed: int
 ) -> Tessellation:
-    """Take A's own cells as they lie, around the middle of the output; beyond its picture, the labels reflected.
+    """Return A's own cells around the centre of the output; beyond its image the labels are reflected.
 
-    Where the output is larger than the picture, they go on as those of any layout (`take_cells`).
+    If the output is larger than the image, they continue like those of any layout (`take_cells`).
     """
     shape = cells.labels.shape
     if any(n > m for n, m in zip(size, shape, strict=True)):
@@ -45,14 +45,14 @@ def take_own_cells(
 
 
 def go_part_of_the_way(own: Tessellation, wanted: Tessellation, strength: float) -> Tessellation:
-    """Let the cells of one tessellation go so much of their way to those of another.
+    """Move the cells of one tessellation a share of their way to those of another.
 
     Parameters
     ----------
     own, wanted : Tessellation
-        Of one size, with one margin.
+        Tessellations of one size and margin.
     strength : float
-        0 to 1.
+        Share of the way, 0 to 1.
 
     """
     if strength <= 0:

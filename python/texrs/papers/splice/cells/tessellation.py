@@ -1,7 +1,7 @@
-"""Target cells: the tessellation that the cells of one texture are to take from another.
+"""Build the target cells: the tessellation that the cells of one texture take from another.
 
-A connected texture gives its own cells, any other the Voronoi cells of its points. Both are brought to the size of the cells
-that come, and go on beyond their picture (`continuation`); no picture is continued.
+A connected texture provides its own cells, any other the Voronoi cells of its points. Both are scaled to the size of
+A's cells, and continue beyond their image (`continuation`). Only cells are continued, not the image.
 """
 
 from __future__ import annotations
@@ -24,35 +24,35 @@ __all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
 Points = NDArray[np.float64]
 
 MARGIN = 1.0
-"""Target cells are drawn up to so many of their sizes beyond the output, so that those at its border are whole."""
+"""Margin around the output with target cells, in cell sizes, so that cells at its border are whole."""
 SAMPLES = 640
-"""Along each axis, at the most, by which the areas of Voronoi cells are measured."""
+"""Maximum number of samples along each axis that measure the areas of Voronoi cells."""
 SLIVER = 0.2
-"""Share of the median area below which a target cell is given to those beside it."""
+"""Share of the median area below which a target cell is merged into its neighbours."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tessellation:
-    """Where cells are wanted.
+    """Requested cells.
 
     Attributes
     ----------
     labels : (H, W) int32
-        The target cell of each pixel, from 1, of the output and a margin around it.
+        Target cell of each pixel, from 1, in the output and a margin around it.
     margin : int
-        Pixels of the margin on each side.
+        Width of the margin on each side, in pixels.
     outlines : (n, P, 2) float64
-        Outlines of the target cells, in the output.
+        Outlines of the target cells, in output coordinates.
     centre : (n, 2) float64
-        Their centroids, in the output.
+        Centroids of the target cells, in output coordinates.
     area : (n,) float64
-        In squared pixels.
+        Areas, in squared pixels.
     scale : float
-        What the layout was scaled by.
+        Scale factor of the layout.
     continued : str
-        How it goes on beyond its picture: "lattice", "wrap", "quilted", "reflected", or "" where it need not.
+        How the layout continues beyond its image: "lattice", "wrap", "quilted", "reflected", or "" if it need not.
     start : (n, 2) float64, optional
-        Where each cell comes from, of A's own, where it goes part of the way only.
+        Origin of each cell among A's own, if it moves only a share of its way.
 
     """
 
@@ -67,7 +67,7 @@ class Tessellation:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Rows and columns of the output."""
+        """Return the number of rows and columns of the output."""
         return self.labels.shape[0] - 2 * self.margin, self.labels.shape[1] - 2 * self.margin
 
 
@@ -81,14 +81,14 @@ def take_cells(
     margin: int | None = None,
     exact: bool = False,
 ) -> Tessellation:
-    """Take the cells of a connected texture, at a median size of ``unit`` pixels; ``exact`` ones that are known, not found.
+    """Return the cells of a connected texture, scaled to a median size of ``unit`` pixels.
 
-    The margin has so many pixels; by default as many as `MARGIN` says.
+    ``exact`` cells are known, not detected. The margin is in pixels, by default `MARGIN` cell sizes.
 
     Raises
     ------
     InvalidInput
-        Too few of its cells are whole.
+        Fewer than three cells are whole.
 
     """
     margin = int(np.ceil(MARGIN * unit)) if margin is None else margin
@@ -109,13 +109,13 @@ def take_points(
     scale: float | None = None,
     centre: Points | None = None,
 ) -> Tessellation:
-    """Take the Voronoi cells of a picture's points, at a median size of ``unit`` pixels, or enlarged as asked.
+    """Return the Voronoi cells of a texture's points, scaled to a median size of ``unit`` pixels or by ``scale``.
 
-    Their middle, or the ``centre``, comes to lie on that of the output.
+    The middle of the points, or ``centre``, is at the centre of the output.
     """
     from scipy.spatial import cKDTree
 
-    # Of the layout as it goes on, so that the cells at its border are like the others.
+    # Use the continued layout, so that cells at its border are like the others.
     low, high = layout.points.min(axis=0), layout.points.max(axis=0)
     around, _ = layout.cover(low - 2 * layout.scale, high + 2 * layout.scale)
     step = max(layout.scale / 16, float((high - low).max()) / SAMPLES)
@@ -126,14 +126,14 @@ def take_points(
     # Points on one line have no cells between them.
     area = float(np.median(counts[counts > 0])) * step**2 if counts.any() else layout.scale**2
     factor = unit / float(np.sqrt(area)) if scale is None else scale
-    # Cells reach as far as they are wide.
+    # Cells extend as far as they are wide.
     wide = max(unit, factor * float(np.sqrt(area)))
     margin = int(np.ceil(MARGIN * wide))
     middle, origin = (np.array(size) - 1) / 2, (low + high) / 2 if centre is None else centre
     box = [(side * (middle + margin + 2 * wide)) / factor + origin for side in (-1, 1)]
     wanted, continued = continue_points(layout, shape, box[0], box[1])
     if not len(wanted):
-        raise InvalidInput("layout: its layout has no point within the output")
+        raise InvalidInput("layout: must have a point inside the output")
     points = (wanted - origin) * factor + middle + margin
     shape = (size[0] + 2 * margin, size[1] + 2 * margin)
     pixels = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)
@@ -142,7 +142,7 @@ def take_points(
 
 
 def finish_cells(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:
-    """Keep one connected piece of each cell that is no sliver, give the rest to those beside it, and trace what is left."""
+    """Keep one connected piece of each cell that is large enough, fill the rest from neighbours, and trace outlines."""
     from scipy.ndimage import distance_transform_edt
     from skimage.measure import label
 

@@ -1,17 +1,20 @@
-"""Nets by their graph: at each target a knot of A, with the lines that hang on it, cut to those of its neighbours.
+"""Splice nets by their graph: each target shows a knot of A with its lines, cut to those of its neighbours.
 
-A net, as chainmail or a keyboard, is connected, but nothing parts it into cells: its elements are the knots. Bent as printed
-(Liu et al. 2009, Eq. 5) it goes half of its way, and is torn or mirrored. Here no line is bent. The flow, and where each stage
-is:
+A net, such as chainmail or a keyboard, is connected but not divided into cells; its elements are the knots. Bent as
+printed (Liu et al. 2009, Eq. 5) it reaches half of the displacements, and is torn or mirrored. Here lines are not
+bent. The steps, and the module of each step:
 
-1. where knots are wanted: the points of B's layout at the spacing of A's, going on on their lattice (`targets`); for a part
-   of the way only, points between A's own and those;
-2. the Gabriel graphs of A's points and of the targets, and where in its graph each pixel lies (`graph`);
-3. at each target the knot whose surroundings lie likest in the graph, and fit best to what is there; it is cut in, in a band
-   between targets, and may miss its own by a little so that lines meet (`knots`);
-4. what is left, far from all knots, grown by the stitcher, which the same numbers guide.
+1. Find the requested places of the knots: the points of B's layout at the spacing of A's, continued on their lattice
+   (`targets`). A strength below 1 interpolates between A's own points and these.
 
-All four make a source map of whole pixels; the picture is looked up through it once.
+2. Build the Gabriel graphs of A's points and of the targets, and features of each pixel in its graph (`graph`).
+
+3. Lay at each target the knot whose surroundings have the most similar features and fit the earlier knots best. It is
+   cut in, in a band between targets. It may be off by a little so that lines meet (`knots`).
+
+4. Grow the pixels far from all knots by the stitcher, with the same features as a guide.
+
+The four steps give a source map of whole pixels, and the image is looked up once.
 """
 
 from __future__ import annotations
@@ -44,26 +47,26 @@ __all__ = ["has_knots", "is_net", "splice_nets"]
 Points = NDArray[np.float64]
 
 SURE = 0.5
-"""Confidence of the layout from which on a connected texture without cells is believed to be a net."""
+"""Confidence of the layout above which a connected texture without cells counts as a net."""
 FEWEST = 6
-"""Knots that there must be: those of fewer come again and again."""
+"""Least number of knots. Fewer would repeat visibly."""
 LEAST = 8.0
-"""Pixels from knot to knot below which lines cannot be told from knots."""
+"""Least distance of knots in pixels. Below it lines cannot be distinguished from knots."""
 PATCH, CANDIDATES, WEIGHT = 0.8, 4, 3
-"""Of what is grown: side of a patch, in spacings, places that are tried, and what the graph counts."""
+"""Settings of the grown rest: side of a patch in spacings, number of places that are tried, and weight of the graph."""
 NEAR = 1.5
-"""Pixels by which the pixel at a knot's place may show another one, for the knot to be there."""
+"""Largest offset of the pixel shown at a knot's place, in pixels. Otherwise the knot counts as missing."""
 
 
 def is_net(entry: ElementAnalysis) -> bool:
-    """Return whether a texture is connected, surely, and has knots enough to be shown by these."""
+    """Return whether a texture is reliably connected and has enough knots."""
     sure = entry.report.get("confidence")
     trust = sure.get("layout", 1.0) if isinstance(sure, dict) else 1.0
     return trust >= SURE and has_knots(entry)
 
 
 def has_knots(entry: ElementAnalysis) -> bool:
-    """Return whether a texture is connected and has as many knots as a net needs, far enough from each other."""
+    """Return whether a texture is connected and has enough knots at sufficient distances."""
     return entry.layout != Layout.DISJOINT and len(entry.points) >= FEWEST and spacing(entry.points) >= LEAST
 
 
@@ -85,27 +88,27 @@ def splice_nets(
     a, b : ElementAnalysis
         The textures.
     cells : Cells, optional
-        Those of B, whose centres are its points then.
+        Cells of B, whose centres are then its points.
     size : (rows, columns)
-        Of the result.
+        Size of the result, in pixels.
     strength : float
-        How much of the way knots go, from A's own places, 0, to B's, 1.
+        Share of the way from A's own places, 0, to B's, 1.
     scale : float, optional
-        What B's layout is enlarged by, not to the spacing of A's knots.
+        Scale of B's layout. Default: the scale that gives it the spacing of A's knots.
     seed : int
-        Of what is chosen by chance.
+        Number that selects random choices.
     watch : callable
-        Called as ``watch(stage, share)``.
+        Function called as ``watch(stage, share)``.
 
     Returns
     -------
     Synthesis
-        Whose labels are targets, counted from 1, as in the report's "matches", and 0 where what was grown lies.
+        Labels of the source map are targets, counted from 1 as in the report's "matches", and 0 for grown pixels.
 
     Raises
     ------
     InvalidInput
-        B has no point that could be taken.
+        B has no usable points.
 
     """
     watch("nets", 0.0)
@@ -117,6 +120,7 @@ def splice_nets(
     mine, theirs = describe_places(a.points, shape, unit), describe_places(wanted.points, size, unit)
     laid = lay_knots(a, mine, wanted.points, theirs, unit, seed, watch)
     places = grow_rest(a, laid, mine, theirs, unit, seed, watch)
+    # Number the visible targets from top to bottom.
     shown = np.unique(laid.target[laid.target != FREE]).astype(np.intp)
     shown = shown[np.lexsort((wanted.points[shown, 1], wanted.points[shown, 0]))]
     number = np.zeros(len(wanted.points) + 1, np.uint32)
@@ -140,7 +144,7 @@ def splice_nets(
 def grow_rest(
     a: ElementAnalysis, laid: Laid, mine: Floats, theirs: Floats, unit: float, seed: int, watch: Progress
 ) -> NDArray[np.int32]:
-    """Return places in which what no knot covers is grown from patches, around what is there."""
+    """Return the source pixels after patches, grown around the knots, filled the pixels without a knot."""
     free = laid.target == FREE
     if not free.any():
         return laid.places
@@ -165,14 +169,14 @@ def grow_rest(
 
 
 def _code(said: Floats) -> NDArray[np.int16]:
-    """Return numbers up to 2 as integers: one stands for a thousand."""
+    """Return numbers up to 2 as integers, in thousandths."""
     return np.rint(np.clip(said, -2, 2) * 1000).astype(np.int16).reshape(-1)
 
 
 def _report(
     a: ElementAnalysis, wanted: Targets, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp], unit: float
 ) -> dict[str, Any]:
-    """Say what was wanted and what has become of it, in JSON types."""
+    """Return the requested and reached knots, in JSON types."""
     size, source = places.shape[:2], laid.source[shown]
     own = a.points + (np.array(size) - a.mask.shape) / 2
     start = None if wanted.start is None else wanted.start[shown]
@@ -192,7 +196,7 @@ def _report(
 
 
 def _find_places(a: ElementAnalysis, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
-    """Return where each knot is in the output, as the source map has it; NaN where it is not shown."""
+    """Return the position of each knot in the output, from the source map; NaN if it is not visible."""
     found: Points = laid.found[shown]
     size = np.array(places.shape[:2])
     pixel = np.rint(found)

@@ -1,4 +1,4 @@
-"""The graph of a net: which knots a line joins, and what each pixel says of its place between them."""
+"""Graph of a net: which knots a line connects, and features of each pixel relative to the graph."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ __all__ = ["describe_places", "join_knots"]
 Points = NDArray[np.float64]
 
 EMPTY = 1e-3
-"""Share of its radius by which a circle may be entered and count as empty: lattices have many knots on one circle."""
+"""Share of a circle's radius that knots may be inside it, while it counts as empty.
+
+Lattices have many knots on one circle.
+"""
 FAR = 1.0
-"""Spacings from a knot beyond which all is equally far."""
+"""Distance from a knot beyond which the feature is constant, in spacings."""
 ASIDE = 0.5
-"""Spacings from a line beyond which all is equally far, and no direction counts."""
+"""Distance from a line beyond which the feature is constant and the direction has no weight, in spacings."""
 DENSE = 1.0
-"""Pixels from one point of a line to the next by which the line nearest to a pixel is found."""
+"""Distance between sampled points of a line, in pixels, when the nearest line of a pixel is searched."""
 
 
 def join_knots(points: Points) -> NDArray[np.intp]:
-    """Return the pairs (n, 2) of knots that are neighbours: those of the Gabriel graph, whose diametral circle is empty.
+    """Return the pairs (n, 2) of neighbouring knots: the Gabriel graph, whose diametral circles are empty.
 
     K. R. Gabriel and R. R. Sokal, "A new statistical approach to geographic variation analysis", Systematic Zoology 18(3),
     1969. It is a part of the Delaunay triangulation. Knots on one line are joined one after the other.
@@ -43,10 +46,10 @@ def join_knots(points: Points) -> NDArray[np.intp]:
 
 
 def describe_places(points: Points, shape: tuple[int, int], unit: float) -> Floats:
-    """Return four numbers a pixel (rows, columns, 4) that say where in a net it lies.
+    """Return four features of each pixel, (rows, columns, 4), for its place in a net.
 
-    How far the nearest knot is, and how far the nearest line, in spacings; the direction of that line, its angle doubled, the
-    less the farther it is: so lines have no ends that are before or behind.
+    They are the distances to the nearest knot and line, in spacings, and the direction of that line. The direction is
+    a doubled angle, because lines have no forward end. Its weight decreases with the distance.
     """
     from scipy.spatial import cKDTree
 
@@ -54,7 +57,7 @@ def describe_places(points: Points, shape: tuple[int, int], unit: float) -> Floa
     pixels = np.argwhere(np.ones(shape, bool)).astype(np.float64)
     knot = cKDTree(points).query(pixels)[0] / unit
     start, along = points[pairs[:, 0]], points[pairs[:, 1]] - points[pairs[:, 0]]
-    # The nearest line is that of the nearest of many points on lines.
+    # The nearest line is the line of the nearest sampled point.
     count = np.ceil(np.hypot(*along.T) / DENSE).astype(np.intp) + 1
     owner = np.repeat(np.arange(len(pairs)), count)
     share = (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[owner] - 1, 1)

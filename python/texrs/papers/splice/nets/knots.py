@@ -1,4 +1,4 @@
-"""Knots laid: at each target a knot of A with what hangs on it, cut to what its neighbours show in a band between them."""
+"""Lay knots: each target shows a knot of A with its lines, cut to its neighbours in a band between them."""
 
 from __future__ import annotations
 
@@ -18,42 +18,52 @@ __all__ = ["Laid", "lay_knots"]
 Points = NDArray[np.float64]
 
 REACH = 1.4
-"""Spacings around a knot that it may show, where no other one is nearer: in gaps of a layout a net goes on as it is."""
+"""Distance around a knot that it may show if no other knot is nearer, in spacings.
+
+The net then continues as in A in gaps of a layout.
+"""
 BAND = 0.3
-"""Spacings by which a pixel may be farther from a knot than from the next one, and show what hangs on it; pixels that are so
-much nearer show nothing else."""
+"""Half width of the band between two knots, in spacings.
+
+A pixel in the band may show either knot; outside it shows the nearer one.
+"""
 CORE = 0.18
-"""Spacings around a knot that show it in any case."""
+"""Distance around a knot that always shows it, in spacings."""
 LOOSE = 0.05
-"""Spacings by which a knot may miss its target, so that its lines meet those that are there."""
+"""Largest distance of a knot from its target, in spacings, so that its lines meet the lines of others."""
 TRIED, CUT = 6, 6
-"""Knots that are shifted, and places that are cut in, of which the cheapest stays."""
+"""Number of knots that are shifted, and number of places that are cut in; the cheapest stays."""
 GRAPH, BEYOND, USES, AWAY, CHANCE = 1.0, 6.0, 0.1, 0.3, 0.02
-"""What places cost beside their colours: by the graph, by what lies beyond the picture, by the uses of the knot, by what it
-misses its target by, and by chance; places that have nothing to do with each other differ by one in colour."""
+"""Weights of a place's cost: graph, pixels beyond the image, earlier uses of the knot, distance from the target,
+chance.
+
+Unrelated places differ by 1 in colour.
+"""
 COLOUR, DEPTH, DEEP = 1.0, 0.3, 6.0
-"""What a seam costs by the colours on both sides, in standard deviations, and by how many pixels deep in the foreground it is,
-which beyond so many is all the same: keys stay whole."""
+"""Weights of a seam: for the colours on both sides, in standard deviations, and for the depth in the foreground.
+
+The depth has a maximum, in pixels. It keeps keys whole.
+"""
 SEEN = 16
-"""Pixels of a spacing that are looked at, one in so many, where places are judged."""
+"""Number of compared pixels per spacing when places are evaluated."""
 LOST = 0.35
-"""Share of a window that may lie beyond the picture."""
+"""Largest share of a window beyond the image."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Laid:
-    """What knots show.
+    """Pixels of the laid knots.
 
     Attributes
     ----------
     places : (H, W, 2) int32
-        The pixel of A that each pixel shows; 0 where none is known.
+        Pixel of A that each pixel shows; 0 where it is unknown.
     target : (H, W) uint32
-        The target it belongs to, a row of the targets, or ``FREE`` where it shows nothing.
+        Target of each pixel, as a row of the targets, or ``FREE`` without a target.
     source : (n,) int
-        The knot of each target, or -1.
+        Knot of each target, or -1.
     found : (n, 2) float64
-        Where that would lie; NaN where there is none.
+        Position of that knot in the output; NaN without a knot.
 
     """
 
@@ -65,16 +75,16 @@ class Laid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Window:
-    """What may be laid around a target.
+    """Pixels around a target that a knot may cover.
 
     Attributes
     ----------
     box : (slice, slice)
-        Of the output.
+        Slices of the window in the output.
     off : (h, w, 2) int
-        Pixels as seen from the target's.
+        Pixel positions relative to the target's.
     cell, core : (h, w) bool
-        Pixels that a knot may cover there, and those that it must.
+        Pixels that a knot may cover, and pixels that it must cover.
 
     """
 
@@ -94,17 +104,17 @@ def lay_knots(
     a : ElementAnalysis
         The texture.
     mine : (h, w, 4) float32
-        Where in its net each of its pixels lies (`describe_places`).
+        Features of each pixel of A in its net (`describe_places`).
     targets : (n, 2) float64
-        Where knots are wanted, also around the output.
+        Requested places of knots, also around the output.
     theirs : (H, W, 4) float32
-        Where in the wanted net each pixel of the output lies.
+        Features of each output pixel in the requested net.
     unit : float
-        Spacing of both.
+        Spacing of both nets, in pixels.
     seed : int
-        Chooses among knots that fit alike.
+        Number that selects among knots that fit equally well.
     watch : callable
-        Called as ``watch("nets", share)``.
+        Function called as ``watch("nets", share)``.
 
     """
     from scipy.ndimage import distance_transform_edt
@@ -125,6 +135,7 @@ def lay_knots(
     chance = CHANCE * np.random.default_rng(seed).random((len(targets), len(points)))
     shifts = list_shifts(LOOSE * unit)
     tree = cKDTree(targets)
+    # Visit the targets row by row, so that each knot is cut to earlier neighbours.
     order = np.lexsort((targets[:, 1], np.round(2 * targets[:, 0] / unit)))
     for turn, t in enumerate(order.tolist()):
         watch("nets", turn / len(order))
@@ -136,6 +147,7 @@ def lay_knots(
         there = flat[np.where(known, shown[box], 0)]
 
         judge = partial(judge_places, window, described, there, known, theirs[box], step)
+        # Rank knots at the exact target, then small shifts of the best knots.
         first = judge(middles) + USES * used + chance[t]
         best = np.argsort(first, kind="stable")[:TRIED]
         best = best[np.isfinite(first[best])]
@@ -147,6 +159,7 @@ def lay_knots(
         tried = tried[np.isfinite(cost[tried])]
         offers = [make_patch(window, middles[of[k]] + away[k], shape) for k in tried.tolist()]
         pastings = [Pasting(shown[box], seams[box], window.cell & ok, window.core & ok) for _, ok in offers]
+        # Cut in the offer with the cheapest seam.
         price = [samples.judge(p, patch[None])[0] for p, (patch, _) in zip(pastings, offers, strict=True)]
         k = int(np.argmin(price))
         take, after = samples.cut(pastings[k], offers[k][0])
@@ -161,7 +174,7 @@ def lay_knots(
 
 
 def list_shifts(most: float) -> NDArray[np.intp]:
-    """Return steps (n, 2) no longer than so many pixels, none first."""
+    """Return offsets (n, 2) up to a length in pixels, (0, 0) first."""
     reach = int(most)
     step = max(1, -(-reach // 2))
     every = np.arange(-(reach // step), reach // step + 1) * step
@@ -172,7 +185,7 @@ def list_shifts(most: float) -> NDArray[np.intp]:
 
 
 def open_window(targets: Points, t: int, tree: object, size: tuple[int, ...], unit: float) -> Window | None:
-    """Return what may be laid around a target, or None where that is nothing of the output."""
+    """Return the window of a target, or None if it is outside the output."""
     middle, reach = np.rint(targets[t]).astype(np.intp), int(np.ceil(REACH * unit))
     low, high = np.maximum(middle - reach, 0), np.minimum(middle + reach + 1, size)
     if (low >= high).any():
@@ -182,7 +195,7 @@ def open_window(targets: Points, t: int, tree: object, size: tuple[int, ...], un
     own = np.hypot(*np.moveaxis(here - targets[t], -1, 0))
     other = np.where(which[..., 0] == t, far[..., 1], far[..., 0])
     farther = (own - other) / unit
-    # What must show another knot is not covered.
+    # Do not cover pixels that must show another knot.
     cell = (farther <= BAND) & (own <= REACH * unit) & ~((other <= CORE * unit) & (farther > 0))
     core = ((farther <= -BAND) | ((own <= CORE * unit) & (farther < 0))) & cell
     if not cell.any():
@@ -199,9 +212,10 @@ def judge_places(
     step: int,
     corners: NDArray[np.intp],
 ) -> Floats:
-    """Return how badly A fits a window when so many of its pixels (n, 2) lie on the target; infinitely if it cannot.
+    """Return the cost of a window for each pixel of A (n, 2) at the target; infinite if it cannot be there.
 
-    A is ``described``, (h, w, 4 + C), by its net and its colours. Every so manieth pixel is looked at.
+    ``described``, (h, w, 4 + C), contains the features of A in its net, and its colours. Only every n-th pixel is
+    compared.
     """
     thin = (slice(None, None, step),) * 2
     cell, shape = window.cell[thin], np.array(described.shape[:2])
@@ -228,7 +242,7 @@ def judge_places(
 
 
 def make_patch(window: Window, corner: NDArray[np.intp], shape: NDArray[np.intp]) -> tuple[NDArray[np.uint32], Bools]:
-    """Return the pixels of A, numbered in a row, that a window shows, and which of them there are."""
+    """Return the pixels of A that a window shows, as flat indices, and which of them exist."""
     at = window.off + corner
     ok = ((at >= 0) & (at < shape)).all(axis=-1)
     rows, columns = np.moveaxis(np.clip(at, 0, shape - 1), -1, 0)

@@ -1,4 +1,4 @@
-"""Pictures of the stages of `texrs.papers.splice.nets`, drawn when they are looked at."""
+"""Images of the stages of `texrs.papers.splice.nets`, drawn on access."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the knots of a net are wanted: at the points of another layout, as it goes on beyond its picture."""
+"""Find the requested places of a net's knots: the points of another layout, continued beyond its image."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ __all__ = ["Targets", "go_part_of_the_way", "take_own_points", "take_points"]
 Points = NDArray[np.float64]
 
 AROUND = 1.5
-"""Spacings around the output in which knots are wanted, too: what hangs on those is seen."""
+"""Distance around the output with targets, in spacings, because the lines of their knots are visible."""
 ROOM = 0.75
-"""Of the distance from a knot of A to the nearest one, what two targets must at least be apart, in the median."""
+"""Least median distance of targets, as a share of the distance between A's knots."""
 FEWEST = 6
-"""Points by which a lattice is known."""
+"""Least number of points that define a lattice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """Where knots are wanted.
+    """Requested places of knots.
 
     Attributes
     ----------
     points : (n, 2) float64
-        In the output, and around it.
+        Places in the output and around it.
     scale : float
-        What the layout was scaled by.
+        Scale factor of the layout.
     continued : str
-        How it goes on beyond its picture: "lattice", "wrap", "quilted", "reflected", or "".
+        How the layout continues beyond its image: "lattice", "wrap", "quilted", "reflected", or "".
     start : (n, 2) float64, optional
-        Where each comes from, of A's own, where it goes part of the way only.
+        Origin of each knot among A's own, if it moves only a share of its way.
 
     """
 
@@ -60,15 +60,15 @@ def take_points(
     scale: float | None = None,
     seed: int,
 ) -> Targets:
-    """Take the centres of B's cells, or its points where it has none, at a spacing of ``unit`` pixels, A's own.
+    """Return the centres of B's cells, or else its points, scaled to a spacing of ``unit`` pixels (A's own).
 
-    Layouts whose points lie in pairs or rows are taken larger, so that A's knots have room in these. With a ``scale`` they
-    are enlarged by that, the middle of B's picture upon that of the output.
+    Layouts whose points form pairs or rows are scaled up, so that A's knots have room in these. If ``scale`` is given,
+    it is used instead, and the centre of B's image is at the centre of the output.
 
     Raises
     ------
     InvalidInput
-        B has no point that could be taken.
+        B has no usable points.
 
     """
     around = AROUND * unit
@@ -90,18 +90,18 @@ def take_points(
     points, continued = continue_points(layout, b.mask.shape, low, high)
     points = (points - centre) * factor + middle
     if len(points) < 3:
-        raise InvalidInput("layout: its layout has fewer than three points around the output; take a larger size")
+        raise InvalidInput("layout: must have at least three points around the output; take a larger size")
     return Targets(points, factor, continued)
 
 
 def measure_gain(mine: Points, theirs: Points) -> float:
-    """Return what a layout of the same spacing is to be enlarged by for so many knots to have room."""
+    """Return the scale that gives enough knots room in a layout of the same spacing."""
     needed, there = (float(np.median(nearest_distances(p, 1))) for p in (mine, theirs))
     return max(1.0, ROOM * needed / max(there, 1e-6))
 
 
 def take_own_points(a: ElementAnalysis, size: tuple[int, int], unit: float) -> Targets:
-    """Take A's own knots as they lie around the middle of the output."""
+    """Return A's own knots around the centre of the output."""
     layout, offset = lay_out(a, beyond=True), (np.array(size) - a.mask.shape) // 2
     low, high = -AROUND * unit - offset, np.array(size) - 1 + AROUND * unit - offset
     points, _, mirrored = layout.within(low, high)
@@ -110,9 +110,9 @@ def take_own_points(a: ElementAnalysis, size: tuple[int, int], unit: float) -> T
 
 
 def go_part_of_the_way(own: Targets, wanted: Targets, strength: float) -> Targets:
-    """Let knots go so much of their way: at the least total squared distance (Eq. 4).
+    """Move knots a share of their way, matched at the least total squared distance (Eq. 4).
 
-    Those that find no partner stay for the first half of the way, or come in the second.
+    Knots without a partner stay for the first half of the way, or enter in the second.
     """
     if strength <= 0:
         return own
