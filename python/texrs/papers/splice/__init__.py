@@ -245,8 +245,9 @@ def splice(
         - ``knots``: For method "nets": ``count``, ``spacing`` in pixels and number of ``lines``.
         - ``grown``: Share of the pixels that no knot covers, for method "nets".
         - ``present``: Share of the targets whose element is visible.
-        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), ``realised``, the
-          number of the ``element`` and its ``point`` in the example. Cells also have a ``turn`` and a ``scale``.
+        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), the
+          share of its way that was reached (``displacement_reached``), the number of the ``element`` and its ``point`` in the
+          example. Cells also have a ``turn`` and a ``scale``.
 
     Raises
     ------
@@ -442,8 +443,9 @@ def self_splice(
         - ``flipped``: Share of triangles that are turned over.
         - ``flipped_rigid``: Share of triangles inside of elements that are turned over.
         - ``system``: Size of the grid that the equations were solved on.
-        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), ``realised``, the
-          number of the ``element`` and its ``point`` in the example. Cells also have a ``turn`` and a ``scale``.
+        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), the
+          share of its way that was reached (``displacement_reached``), the number of the ``element`` and its ``point`` in the
+          example. Cells also have a ``turn`` and a ``scale``.
         - ``changed``: Share of the pixels that changed.
         - ``edit``: The steps, each with all its options.
         - ``elements``: Places of the elements before the edit, if a size was given.
