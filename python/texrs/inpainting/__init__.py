@@ -130,12 +130,7 @@ def inpaint(
     Synthesis
         The filled image, in the dtype and with the channels of the input. Its source map points into the image, or
         into ``[image, exemplar]``. Pixels that are kept map to themselves, and no pixel maps into the hole. Replace NaN in
-        the hole by any number before you render an image through the map. The stages are ``"known"``, ``"patches"``
-        (each in a shade of its own) and ``"before_blending"``, the result before ``screening``. The report
-        contains ``"measured"``, the attributes of `texrs.planes.ScaleEstimate` for a ``scale_map`` "auto".
-        ``"exemplar_measured"`` is the same for the exemplar. ``"filled"`` is the share of the image that is filled, 0 to 1. ``"candidates"`` lists the
-        sides that were tried, with the figure of each: volumes, the step at the border of the hole (1: as elsewhere).
-        ``"screening_in_source_map"`` of a volume is False if its seams are corrected.
+        the hole by any number before you render an image through the map.
 
         Stages:
 
@@ -153,7 +148,8 @@ def inpaint(
         - ``exemplar_measured``: The same for the exemplar.
         - ``replaced_outside``: Number of known pixels that changed.
         - ``patch_size``: Side of the patches, in pixels.
-        - ``candidates``: Sides of patches that were tried, each with the cost of its seams.
+        - ``candidates``: Sides of patches that were tried, each with the cost of its seams. For volumes, with the step at the
+          border of the hole; 1 is the step elsewhere.
         - ``patches``: Number of patches.
         - ``allow_mirror``: Whether patches could be mirrored.
         - ``screening``: Weight of the values in the colour correction.
@@ -162,6 +158,7 @@ def inpaint(
           ``changed``.
         - ``seams``: Mean cost of the seams. Only for volumes.
         - ``labels``: Whether the values are labels. Only for volumes.
+        - ``screening_in_source_map``: False if seams were corrected, which the source map cannot do again. Only for volumes.
 
     Raises
     ------

@@ -121,15 +121,7 @@ def tile(
     -------
     Synthesis
         The image, in the dtype and with the channels of the input. An axis that does not wrap keeps its length, or its
-        middle part of the requested length. Stages: ``"shifted"`` is the image with its halves exchanged, before any cut.
-        ``"source_regions"`` shows the part of the image that each pixel is from. ``"before_blending"`` is the result
-        before colours are corrected. ``joints`` in the report contains the overlap of each axis, 0 if the ends are
-        covered. It also contains the number of joints that were tried, and the cost of the cuts. ``already`` lists the
-        axes along which the image tiles. ``in_place`` is the share of the pixels that come from the same place of the
-        image. ``unchanged`` is the share that equal the pixel of the image there. ``resized`` is the reason for another
-        size. ``in_step`` is whether elements are on a strict lattice, so that a size must be a multiple of its period.
-        ``tiling`` is what `texrs.check_tiling` finds in the result with its source map. If a border or a seam is visible,
-        other joints are tried. ``warnings`` lists those that stay visible.
+        middle part of the requested length.
 
         Stages:
 
@@ -150,7 +142,11 @@ def tile(
         - ``joints``: For each axis: ``overlap``, ``cover``, number of joints that were tried, ``cost`` and cost of a pair of
           pixels.
         - ``in_place``: Share of the pixels from the same place of the image.
-        - ``tiling``: What `texrs.check_tiling` finds along each axis that wraps: ``tiles``, ``seam`` and ``place``.
+        - ``in_step``: Whether elements are on a strict lattice, so that a size must be a multiple of its period.
+        - ``unchanged``: Share of the pixels that equal the pixel of the image at the same place.
+        - ``tiling``: For each axis that wraps, what `texrs.check_tiling` finds in the result with its source map: ``tiles``,
+          ``seam``, ``place`` and ``step``.
+        - ``warnings``: Borders and seams that stay visible, one sentence each.
 
     Raises
     ------
