@@ -230,7 +230,7 @@ def splice(
         - ``targets``: Number of targets.
         - ``candidates``: Number of elements to choose from, with those beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.
-        - ``displacement_reached``: Share of their ways that elements were moved, 0 to 1.
+        - ``displacement_reached``: Share of the requested displacements that was reached, 0 to 1.
         - ``screening``: Weight of the values in the colour correction.
         - ``holes``: Share of the pixels that were filled.
         - ``triangles``: Number of triangles of the mesh.
@@ -245,9 +245,9 @@ def splice(
         - ``knots``: For method "nets": ``count``, ``spacing`` in pixels and number of ``lines``.
         - ``grown``: Share of the pixels that no knot covers, for method "nets".
         - ``present``: Share of the targets whose element is visible.
-        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), the
-          share of its way that was reached (``displacement_reached``), the number of the ``element`` and its ``point`` in the
-          example. Cells also have a ``turn`` and a ``scale``.
+        - ``matches``: One entry per target. ``target`` is its place, and ``found`` is the place of its element.
+          ``displacement_reached`` is the share of the way that was reached. ``element`` is the number of the element and
+          ``point`` its place in the example. Cells also have a ``turn`` and a ``scale``.
 
     Raises
     ------
@@ -436,16 +436,16 @@ def self_splice(
         - ``targets``: Number of targets.
         - ``candidates``: Number of elements to choose from, with those beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.
-        - ``displacement_reached``: Share of their ways that elements were moved, 0 to 1.
+        - ``displacement_reached``: Share of the requested displacements that was reached, 0 to 1.
         - ``screening``: Weight of the values in the colour correction.
         - ``holes``: Share of the pixels that were filled.
         - ``triangles``: Number of triangles of the mesh.
         - ``flipped``: Share of triangles that are turned over.
         - ``flipped_rigid``: Share of triangles inside of elements that are turned over.
         - ``system``: Size of the grid that the equations were solved on.
-        - ``matches``: For each target: its place (``target``), the place where the element is (``found``), the
-          share of its way that was reached (``displacement_reached``), the number of the ``element`` and its ``point`` in the
-          example. Cells also have a ``turn`` and a ``scale``.
+        - ``matches``: One entry per target. ``target`` is its place, and ``found`` is the place of its element.
+          ``displacement_reached`` is the share of the way that was reached. ``element`` is the number of the element and
+          ``point`` its place in the example. Cells also have a ``turn`` and a ``scale``.
         - ``changed``: Share of the pixels that changed.
         - ``edit``: The steps, each with all its options.
         - ``elements``: Places of the elements before the edit, if a size was given.
