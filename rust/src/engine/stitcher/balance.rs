@@ -1,12 +1,12 @@
-//! Classes in balance: what a canvas shows too often is dear, and what it shows too seldom is cheap.
+//! Balance of classes: classes that the canvas shows too often cost more, and rare classes cost less.
 //!
-//! Cuts are cheapest where nothing is to be cut, so without a counterweight the rare things of an exemplar get rarer.
+//! A cut is cheapest in a uniform area. Without this counterweight the rare features of an exemplar become rarer.
 
 use super::canvas::Canvas;
 use super::source::Source;
 use crate::foundation::fixed::Place;
 
-/// How many points of each class a canvas shows.
+/// Number of points of each class that a canvas shows.
 #[derive(Clone)]
 pub(super) struct Balance {
     counts: Vec<i64>,
@@ -35,7 +35,7 @@ impl Balance {
         }
     }
 
-    /// The balance after some points have taken other places.
+    /// Returns the balance after a patch was taken.
     pub(super) fn after<const D: usize>(
         &self,
         source: &Source<D>,
@@ -64,7 +64,7 @@ impl Balance {
         next
     }
 
-    /// Points that would have to be of another class for the shares to be those of the exemplar.
+    /// Returns the number of points that must change their class to give the shares of the exemplar.
     pub(super) fn excess<const D: usize>(&self, source: &Source<D>) -> f64 {
         let wrong =
             |(&count, &share): (&i64, &f64)| (count as f64 - share * self.covered as f64).abs();

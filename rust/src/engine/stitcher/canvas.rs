@@ -1,4 +1,4 @@
-//! What has been stitched so far, and windows of it.
+//! The state of a stitched output, and windows of it.
 
 use super::chart::Chart;
 use super::cut::Cutting;
@@ -7,49 +7,49 @@ use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 
-/// No patch yet.
+/// Number of a point that does not show a patch yet.
 pub(super) const FREE: u32 = u32::MAX;
-/// A point that is given, and stays.
+/// Number of a given point that no patch may take.
 pub(super) const HELD: u32 = u32::MAX - 1;
-/// A point that is given, until a patch takes it.
+/// Number of a given point that a patch may take.
 pub(super) const LOOSE: u32 = u32::MAX - 2;
 
-/// Whether what a point shows is a patch's.
+/// Returns whether the number of a point is the number of a patch.
 #[inline(always)]
 pub(super) fn is_patch(patch: u32) -> bool {
     patch < LOOSE
 }
 
-/// An output, some points of which show patches.
+/// An output whose points may show patches.
 pub(super) struct Canvas<const D: usize> {
     pub grid: Grid<D>,
-    /// Where each point looks.
+    /// Exemplar coordinates of each point.
     pub places: Vec<Place<D>>,
     /// The patch that each point shows, or [`FREE`], [`HELD`] or [`LOOSE`].
     pub patches: Vec<u32>,
     /// Cost of the seam from each point to the next one along each axis.
     pub seams: Vec<[f32; D]>,
-    /// How far the patch is from the field at each point; empty where nothing is bent.
+    /// Difference between the patch and the frame field at each point. Empty if there is one frame for all points.
     pub distortion: Vec<f32>,
-    /// Points without a patch.
+    /// Number of points without a patch.
     pub free: usize,
-    /// Whether it is a part of something larger: points at its ends then stay as they are.
+    /// Whether the canvas is a part of a larger output. Points at its ends then keep their patches.
     pub part: bool,
 }
 
-/// A box of a canvas; along cyclic axes it may reach over the end.
+/// A box of a canvas. Along periodic axes it may extend beyond the end.
 #[derive(Debug, Clone)]
 pub(super) struct Window<const D: usize> {
-    /// Its first point; negative ones lie before a cyclic end.
+    /// First point. Negative coordinates are before the start of a periodic axis.
     pub low: [i32; D],
-    /// Its points.
+    /// Grid of the window's points.
     pub grid: Grid<D>,
-    /// The canvas's points, in the window's order.
+    /// Positions on the canvas of the window's points.
     pub points: Vec<u32>,
 }
 
 impl<const D: usize> Canvas<D> {
-    /// An empty canvas.
+    /// Returns an empty canvas.
     pub(super) fn new(grid: Grid<D>, bent: bool) -> Result<Self> {
         let n = grid.len();
         Ok(Self {
@@ -67,7 +67,7 @@ impl<const D: usize> Canvas<D> {
         })
     }
 
-    /// Shows what a cut gave to a patch.
+    /// Gives a patch the points that a cut assigned to it.
     pub(super) fn take(
         &mut self,
         chart: &Chart<D>,
@@ -90,13 +90,13 @@ impl<const D: usize> Canvas<D> {
         }
     }
 
-    /// Whether a point shows something.
+    /// Returns whether a point shows a patch or a given sample.
     #[inline(always)]
     pub(super) fn covered(&self, point: u32) -> bool {
         self.patches[point as usize] != FREE
     }
 
-    /// The window from `low` to `high`, which is not in it; cut off where an axis ends.
+    /// Returns the window from `low` to `high` (exclusive), clipped where an axis ends.
     pub(super) fn window(&self, low: [i32; D], high: [i32; D]) -> Option<Window<D>> {
         let (mut first, mut shape) = ([0; D], [0; D]);
         for axis in 0..D {
@@ -129,7 +129,7 @@ impl<const D: usize> Canvas<D> {
 }
 
 impl<const D: usize> Window<D> {
-    /// A window of a shape, which is all that there is.
+    /// Returns a window that is a whole canvas of a shape.
     pub(super) fn alone(shape: [usize; D]) -> Result<Self> {
         let grid = Grid::new(shape, [false; D])?;
         Ok(Self {
@@ -139,13 +139,13 @@ impl<const D: usize> Window<D> {
         })
     }
 
-    /// Where a point of the window lies on the canvas, not brought around.
+    /// Returns the canvas coordinates of a point of the window, which may be beyond the end of a periodic axis.
     #[inline(always)]
     pub(super) fn at(&self, point: [usize; D]) -> [i32; D] {
         std::array::from_fn(|axis| self.low[axis] + point[axis] as i32)
     }
 
-    /// Whether a point of the canvas lies in the window.
+    /// Returns whether a point of the canvas is in the window.
     pub(super) fn holds(&self, at: [i32; D]) -> bool {
         (0..D).all(|a| (self.low[a]..self.low[a] + self.grid.shape()[a] as i32).contains(&at[a]))
     }

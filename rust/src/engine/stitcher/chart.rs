@@ -5,34 +5,35 @@ use super::mesh::Mesh;
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply, inverse};
 use crate::foundation::grid::Grid;
 
-/// Shares of a bent patch's side that are tried where the field bends much.
+/// Shares of a bent patch's side that are tried if the field bends much.
 const SHRINK: [f32; 4] = [1.0, 0.8, 0.65, 0.5];
-/// How much of the frame of the centre may be lost in the inner part of a bent patch.
+/// Maximum mean difference between the frame of the centre and the field in the inner part of a bent patch.
 const ADAPT: f32 = 0.7;
-/// Beyond this a point of a bent patch is left to others.
+/// Points of a bent patch that differ more from the field are left to other patches.
 const TORN: f32 = 0.45;
-/// Where a field has a pole, patches are so many times smaller, and rigid.
+/// Divisor of the patch side at a pole of the field, where patches are rigid.
 const POLE: f32 = 1.75;
-/// Boxes of bent patches are so many times larger.
+/// Ratio of the boxes of a bent and a rigid patch.
 const BENT: f32 = 1.2;
 
-/// The map of a patch: where its points look, relative to where its centre does.
+/// The map of a patch: exemplar coordinates of its points, relative to the coordinates of its centre.
 pub(super) struct Chart<const D: usize> {
     pub window: Window<D>,
-    /// Of each point of the window.
+    /// Relative exemplar coordinates of each point of the window.
     pub steps: Vec<Place<D>>,
-    /// Whether a point of the window is in the patch; never those of the window's border.
+    /// Whether each point of the window is in the patch. Points on the window's border are not.
     pub mask: Vec<bool>,
-    /// How far the chart is from the field at each point; empty where there is one frame for all.
+    /// Difference between the chart and the field at each point. Empty if there is one frame for all points.
     pub distortion: Vec<f32>,
     /// The Jacobian at the centre.
     pub frame: Frame<D>,
-    /// Whether the chart is the frame of the centre alone.
+    /// Whether the chart is an affine map with the frame of the centre.
     pub rigid: bool,
 }
 
 impl<const D: usize> Chart<D> {
-    /// The chart of a patch of `side` samples of the exemplar around a point, bent with the field or rigid.
+    /// Returns the chart of a patch around a point. `side` is in samples of the exemplar. The chart is rigid or follows
+    /// the field.
     pub(super) fn new(
         canvas: &Canvas<D>,
         frames: Frames<'_, D>,
@@ -59,7 +60,8 @@ impl<const D: usize> Chart<D> {
         Self::rigid(canvas, frames, frame, centre, side)
     }
 
-    /// The chart of a patch that fills a window as far as `most` samples of the exemplar go, bent with the field or rigid.
+    /// Returns the chart of a patch that fills a window, up to a side of `most` samples. The chart is rigid or follows
+    /// the field.
     pub(super) fn over(
         window: Window<D>,
         canvas: &Canvas<D>,
@@ -80,8 +82,8 @@ impl<const D: usize> Chart<D> {
         Self::affine(window, canvas, frames, frame, centre, Some(most))
     }
 
-    /// The first point and the one after the last of the box around a centre that holds a patch, bent or not, and one point
-    /// more on each side.
+    /// Returns the ends of the box around a patch, with a margin of one point: the first point, and the point after the
+    /// last.
     pub(super) fn reach(
         canvas: &Canvas<D>,
         frames: Frames<'_, D>,
@@ -106,7 +108,7 @@ impl<const D: usize> Chart<D> {
         for axis in 0..D {
             let reach: i64 = back[axis].iter().map(|&x| i64::from(x.abs())).sum();
             let half = (side * 0.5 * reach as f32 / ONE as f32 * more).ceil() as i32 + 1;
-            // A patch must not meet itself around a cyclic axis.
+            // A patch must not meet itself around a periodic axis.
             let most = canvas.grid.shape()[axis] as i32;
             let half = if canvas.grid.wrap()[axis] {
                 half.min((most - 1) / 2)
@@ -130,7 +132,7 @@ impl<const D: usize> Chart<D> {
         canvas.window(low, high)
     }
 
-    /// A chart of one frame.
+    /// Returns the affine chart of a frame around a point.
     pub(super) fn rigid(
         canvas: &Canvas<D>,
         frames: Frames<'_, D>,
@@ -149,7 +151,7 @@ impl<const D: usize> Chart<D> {
         ))
     }
 
-    /// A chart of one frame over a given window: of a patch's side, or of all of it.
+    /// Returns the affine chart of a frame over a window: of a patch with this side, or of the whole window.
     pub(super) fn affine(
         window: Window<D>,
         canvas: &Canvas<D>,
@@ -184,7 +186,7 @@ impl<const D: usize> Chart<D> {
         chart
     }
 
-    /// A chart integrated from the field: the map whose derivatives are nearest to the frames.
+    /// Returns a chart integrated from the field: the map whose derivatives are nearest to the frames.
     fn bent(
         canvas: &Canvas<D>,
         frames: Frames<'_, D>,
@@ -196,7 +198,7 @@ impl<const D: usize> Chart<D> {
         Self::integrated(window, canvas, frames, frame, centre, side)
     }
 
-    /// The same over a given window.
+    /// Returns the integrated chart over a given window.
     fn integrated(
         window: Window<D>,
         canvas: &Canvas<D>,
@@ -239,7 +241,7 @@ impl<const D: usize> Chart<D> {
         Some(chart)
     }
 
-    /// How far the chart's derivatives are from the frames.
+    /// Measures the difference between the chart's derivatives and the frames.
     fn measure(&mut self, frames: &[Frame<D>]) {
         let (grid, strides) = (self.window.grid, self.window.grid.strides());
         for (i, point) in grid.points().enumerate() {
@@ -262,8 +264,8 @@ impl<const D: usize> Chart<D> {
         }
     }
 
-    /// The points within half a side of the centre along each axis of the exemplar, but for the window's border where
-    /// the canvas goes on.
+    /// Returns the points within half a side of the centre along each axis of the exemplar. Points on the window's
+    /// border are excluded, unless the canvas ends there.
     fn inside(&self, canvas: &Canvas<D>, side: Option<f32>) -> Vec<bool> {
         let half = side.map_or(i32::MAX, |s| ((s * 0.5 - 0.01) * ONE as f32) as i32);
         let grid = &self.window.grid;
@@ -284,7 +286,7 @@ impl<const D: usize> Chart<D> {
             .collect()
     }
 
-    /// Whether a point of the canvas is in the patch.
+    /// Returns whether a point of the canvas is in the patch.
     fn has(&self, centre: [i32; D]) -> bool {
         self.index(centre).is_some_and(|i| self.mask[i])
     }
@@ -301,7 +303,7 @@ impl<const D: usize> Chart<D> {
         Some(self.window.grid.index(point))
     }
 
-    /// Leaves only what hangs together with the centre.
+    /// Removes points that are not connected to the centre.
     fn keep_connected(&mut self, centre: [i32; D]) {
         let Some(start) = self.index(centre).filter(|&i| self.mask[i]) else {
             self.mask.fill(false);
@@ -312,7 +314,7 @@ impl<const D: usize> Chart<D> {
     }
 }
 
-/// The Jacobian at a point of the canvas.
+/// Returns the Jacobian at a point of the canvas.
 fn frame_at<const D: usize>(
     canvas: &Canvas<D>,
     frames: Frames<'_, D>,
@@ -322,7 +324,7 @@ fn frame_at<const D: usize>(
     frames.at(canvas.grid.index(here))
 }
 
-/// The points of a mask that hang together with some of it.
+/// Returns the points of a mask that are connected to given points of it.
 pub(super) fn flood<const D: usize>(grid: &Grid<D>, mask: &[bool], from: &[usize]) -> Vec<bool> {
     let mut reached = vec![false; mask.len()];
     let mut open = Vec::new();
@@ -353,7 +355,7 @@ pub(super) fn flood<const D: usize>(grid: &Grid<D>, mask: &[bool], from: &[usize
     reached
 }
 
-/// Root mean square, over the axes, of the difference of two frames.
+/// Returns the root mean square, over the axes, of the difference of two frames.
 pub(super) fn difference<const D: usize>(a: &Frame<D>, b: &Frame<D>) -> f32 {
     let mut sum = 0.0;
     for i in 0..D {
@@ -365,7 +367,7 @@ pub(super) fn difference<const D: usize>(a: &Frame<D>, b: &Frame<D>) -> f32 {
     (sum / D as f32).sqrt() / ONE as f32
 }
 
-/// Mean of the values in a mask; 0 for none.
+/// Returns the mean of the values in a mask, and 0 for an empty mask.
 pub(super) fn mean(values: &[f32], mask: &[bool]) -> f32 {
     let (mut sum, mut count) = (0.0f64, 0.0);
     for (&v, _) in values.iter().zip(mask).filter(|(_, m)| **m) {

@@ -1,8 +1,8 @@
-//! Patches cut into a part of something larger that is covered already.
+//! Patches that are cut into a part of an unbounded output, which earlier layers have covered.
 //!
-//! Endless outputs are covered layer by layer: boxes of one layer tile the world, and each is cut into what the boxes of the
-//! layer before show there. A part stays as it is at its ends, so that its neighbours fit, and what becomes of it hangs on
-//! nothing but what it shows before, and on the field inside.
+//! Boxes of one layer tile the world, and each box is cut into the result of the layer before. Points at the ends of a
+//! box do not change, so that neighbouring boxes fit. The result depends only on the content of the box before the cut
+//! and on the field inside the box.
 
 use std::collections::HashMap;
 
@@ -22,20 +22,23 @@ use crate::foundation::hash::Noise;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// A box is divided where a patch would fill less of it.
+/// Minimum share of a box that one patch must fill. Other boxes are divided.
 const FILLED: f64 = 0.5;
-/// One is divided too where a patch would be so far from the field, on average: along the axes that the field changes along,
-/// as long as more than half of a patch is shown along them. Slabs between folds are few, and cubes there would be many.
+/// Maximum mean difference between a patch and the field. Boxes above it are divided along the axes along which the
+/// field changes, if more than half of a patch is shown along these axes. This gives a few slabs between folds instead
+/// of many cubes.
 const STRAY: f32 = 0.2;
-/// Patches that cover seams again are measured by ones of this share of the part, so many of their sides apart.
+/// Side of the patches that determine how many seams are covered again, as a share of the part. [`STEP`] is their
+/// distance as a share of that side.
 const OF_PART: f32 = 0.8;
 const STEP: f32 = 0.6;
-/// Windows that are covered have more points with a choice: those of more points are cut between larger blocks first.
+/// Windows with more points are first cut between blocks of this side. Covered windows have more points with a choice
+/// than others, so the largest start with larger blocks than in [`LARGE`].
 const COVERED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
-/// Side of the smallest box that is divided.
+/// Minimum side of a box that is divided.
 const SMALL: usize = 12;
 
-/// What the search needs of a source: made once, for many parts.
+/// Data for the search in a source. They are computed once for many parts.
 pub struct Prepared<const D: usize>(Index<D>);
 
 impl<const D: usize> Prepared<D> {
@@ -49,26 +52,26 @@ impl<const D: usize> Prepared<D> {
     }
 }
 
-/// What a part shows.
+/// Content of a part.
 #[derive(Debug, Clone)]
 pub struct Shown<const D: usize> {
-    /// Where each point looks.
+    /// Exemplar coordinates of each point.
     pub places: Vec<Place<D>>,
-    /// The patch that each point shows.
+    /// Number of the patch that each point shows.
     pub patches: Vec<u32>,
     /// Cost of the seam from each point to the next one along each axis (see [`judge`]).
     pub seams: Vec<[f32; D]>,
-    /// How far the patch is from the field at each point; empty where one frame serves all, and where all patches are
-    /// rigid and this is not known.
+    /// Difference between the patch and the field at each point. Empty if there is one frame for all points, or if all
+    /// patches are rigid and the difference was not stored.
     pub distortion: Vec<f32>,
-    /// The patches, with their centres as seen from the part's first point.
+    /// Patches of the part, with their centres relative to the first point of the part.
     pub table: Vec<Patch<D>>,
 }
 
-/// Returns what the seams of a part cost, between points that show different patches.
+/// Returns the costs of the seams between points that show different patches.
 ///
 /// # Errors
-/// Arrays of other sizes than the region's.
+/// Arrays whose sizes differ from the size of the region.
 pub fn judge<const D: usize>(
     source: &Source<D>,
     grid: &Grid<D>,
@@ -103,10 +106,11 @@ pub fn judge<const D: usize>(
     Ok(seams)
 }
 
-/// Cuts patches into all of a part but its ends: one where the exemplar is large enough to fill it, else several.
+/// Cuts patches into all of a part except its ends: one patch if the exemplar is large enough to fill the part, else
+/// several.
 ///
 /// # Errors
-/// Options out of their range, arrays of other sizes than the region's, or a monitor that was cancelled.
+/// Options out of their range, arrays whose sizes differ from the size of the region, or a monitor that was cancelled.
 pub fn cover<const D: usize>(
     source: &Source<D>,
     prepared: &Prepared<D>,
@@ -152,7 +156,7 @@ pub fn cover<const D: usize>(
 }
 
 impl<const D: usize> Stitching<'_, D> {
-    /// Notes which patches there are, and what they have shown.
+    /// Registers the patches of the part, and the samples that they have shown.
     fn know_patches(&mut self) {
         for (k, patch) in self.patches.iter().enumerate() {
             self.index.note(patch.place, patch.side);
@@ -162,7 +166,8 @@ impl<const D: usize> Stitching<'_, D> {
         }
     }
 
-    /// Cuts a patch into a box; smaller ones, that overlap by half, where one would leave too much of it as it is.
+    /// Cuts a patch into a box. If one patch would leave too much of the box unchanged, smaller boxes that overlap by
+    /// half are cut.
     fn cover(&mut self, low: [usize; D], high: [usize; D]) -> Result<()> {
         let Some(window) = self.window(low, high) else {
             return Ok(());
@@ -200,7 +205,7 @@ impl<const D: usize> Stitching<'_, D> {
                 } else if divide[a] {
                     first[a] = high[a] - part;
                 } else {
-                    // Not divided along this axis: the first of both is all.
+                    // The box is not divided along this axis, so its first part is the whole.
                     last[a] = first[a];
                 }
             }
@@ -209,7 +214,7 @@ impl<const D: usize> Stitching<'_, D> {
         Ok(())
     }
 
-    /// Along which axes the field changes most of a window: by half as much as along any.
+    /// Returns the axes along which the field changes at least half as much as along the axis of the largest change.
     fn varies(&self, window: &Window<D>) -> [bool; D] {
         let (grid, middle) = (&window.grid, window.grid.shape().map(|n| n / 2));
         let mut sums = [0.0f64; D];
@@ -226,7 +231,7 @@ impl<const D: usize> Stitching<'_, D> {
         sums.map(|sum| sum >= 0.5 * most)
     }
 
-    /// Covers the worst seams again, as often as if patches lay side by side.
+    /// Covers the worst seams again. Their number is a share of the number of patches that would fill the part.
     fn recover_part(&mut self) -> Result<()> {
         let shape = self.canvas.grid.shape();
         let scale = self.scale(shape.map(|n| n as i32 / 2));
@@ -242,7 +247,7 @@ impl<const D: usize> Stitching<'_, D> {
             .window(low.map(|x| x as i32), high.map(|x| x as i32))
     }
 
-    /// What has become of the part, with the patches that are left.
+    /// Returns the content of the part, with the patches that are still visible.
     fn show(self) -> Shown<D> {
         let mut numbers = vec![u32::MAX; self.patches.len()];
         self.canvas
@@ -273,7 +278,7 @@ impl<const D: usize> Stitching<'_, D> {
     }
 }
 
-/// A canvas that shows what a part does.
+/// Returns a canvas with the content of a part.
 fn paint<const D: usize>(
     region: &Region<D>,
     frames: Frames<'_, D>,

@@ -1,9 +1,9 @@
-//! The cut of one patch into the canvas: which points take it, at the least cost of the pairs that result.
+//! The cut of one patch into the canvas. It assigns points to the patch so that the pairs that result cost least.
 //!
-//! Kwatra et al. (SIGGRAPH 2003) ask how far two pictures differ on both sides of a seam. What shows is the pair that
-//! results: what is kept at `p` beside what is taken at `q`. Judged so, a cut tells a joint of two elements from the
-//! inside of one. The cost of a pair that is cut already belongs to the state in which both are kept, so the energy
-//! stays submodular, and the cut exact.
+//! Kwatra et al. (SIGGRAPH 2003) compare the two images on both sides of a seam. This cut judges the pair that results:
+//! the kept point `p` next to the taken point `q`. It can thus distinguish a joint between two elements from the inside
+//! of an element. The cost of an existing seam belongs to the state that keeps both points. The energy therefore
+//! stays submodular, and the cut is exact.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -22,34 +22,35 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
 use crate::kernels::seam::maxflow::Solver;
 
-/// Windows of more points are cut between blocks of such a side first, to be laid.
+/// Windows with more points are first cut between blocks of this side, in cuts that are applied.
 pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
-/// To be compared with others. Pictures under a field lose more by larger blocks than those take less time.
+/// The same limits for cuts that are only compared. For images under a field, larger blocks lose more quality than they
+/// save time.
 const JUDGED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 
 /// A patch at a place.
 pub(super) struct Proposal<'a, const D: usize> {
     pub window: &'a Window<D>,
     pub mask: &'a [bool],
-    /// Of all points of the window.
+    /// Exemplar coordinates of all points of the window.
     pub places: Vec<Place<D>>,
-    /// What each costs that takes the patch, by itself; empty where that is nothing.
+    /// Cost of each point if it takes the patch, without its pairs. Empty if these costs are zero.
     pub points: Vec<f32>,
 }
 
-/// What a cut comes to.
+/// Result of a cut.
 pub(super) struct Cutting<const D: usize> {
-    /// Cost of all seams of the window, and of its points.
+    /// Cost of all seams and points of the window.
     pub value: f64,
-    /// The points that take the patch.
+    /// Whether each point takes the patch.
     pub take: Vec<bool>,
-    /// Seams that it makes: the first of two points, the axis, and the cost.
+    /// New costs of seams: the first of two points, the axis, and the cost.
     pub seams: Vec<(u32, u8, f32)>,
-    /// Side of the blocks of points that it runs between.
+    /// Side of the blocks between which the cut was computed.
     block: usize,
 }
 
-/// What cuts are made in, one at a time.
+/// Buffers of one cut.
 struct Workspace<const D: usize> {
     solver: Solver<D>,
     energy: Energy<D>,
@@ -57,19 +58,19 @@ struct Workspace<const D: usize> {
     costs: Costs,
 }
 
-/// What the points of a window show that take the patch.
+/// Looks of the window's points if they take the patch.
 #[derive(Default)]
 struct Patch {
     looks: Looks,
-    /// How far that is from what is there, squared.
+    /// Squared difference of colours between the patch and the current content.
     apart: Vec<f32>,
-    /// 1 where it is the same place, else 0.
+    /// 1 if the patch shows the current sample, else 0.
     same: Vec<f32>,
-    /// Whether there is such a point.
+    /// Whether the patch shows the current sample at any point.
     meets: bool,
 }
 
-/// What the pairs of a row cost.
+/// Costs of the pairs of a row.
 #[derive(Default)]
 struct Costs {
     old_new: Vec<f32>,
@@ -77,13 +78,13 @@ struct Costs {
     capacities: Capacities,
 }
 
-/// What cuts are made with.
+/// Weights, guide and buffers of cuts.
 pub(super) struct Cutter<'a, const D: usize> {
     judge: Judge<'a, D>,
     pub guide: Option<&'a Guide<'a>>,
-    /// Windows of more points are cut between blocks of such a side first, the largest ones before the others.
+    /// Windows with more points are first cut between blocks of this side. Larger limits come first.
     pub blocks: &'static [(usize, usize)],
-    /// Workspaces of cuts, as many as are made at once.
+    /// Buffers of the cuts that run at the same time.
     workspaces: Mutex<Vec<Workspace<D>>>,
 }
 
@@ -107,13 +108,14 @@ impl<'a, const D: usize> Cutter<'a, D> {
     }
 
     fn workspaces(&self) -> MutexGuard<'_, Vec<Workspace<D>>> {
-        // A workspace is of use whatever became of the work of another.
+        // A workspace is reset before each use, so it is usable even if another task panicked.
         self.workspaces
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a window shows where a patch comes that covers a mask. Points of its core must take it; empty for none.
+    /// Returns the content of a window before a patch with a mask is cut in. Points of the core must take the patch; an
+    /// empty core has no points.
     pub(super) fn view(
         &self,
         canvas: &Canvas<D>,
@@ -127,7 +129,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         view
     }
 
-    /// A chart with its centre at a place.
+    /// Returns a patch: a chart with its centre at given exemplar coordinates.
     pub(super) fn propose<'c>(&self, chart: &'c Chart<D>, place: Place<D>) -> Proposal<'c, D> {
         let add = |s: &Place<D>| std::array::from_fn(|a| s[a].wrapping_add(place[a]));
         let places: Vec<Place<D>> = chart.steps.iter().map(add).collect();
@@ -139,7 +141,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         }
     }
 
-    /// What each point of a window that counts costs by itself that shows a place; empty where that is nothing.
+    /// Returns the costs of single points at given exemplar coordinates, without pairs. Empty if these costs are zero.
     fn weigh(
         &self,
         window: &Window<D>,
@@ -186,7 +188,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.refine(view, patch, coarse, monitor)
     }
 
-    /// Cuts a patch in between blocks of points that may be larger: enough to compare it with others.
+    /// Cuts a patch between blocks of points, which is precise enough for a comparison.
     pub(super) fn judge(
         &self,
         view: &View<D>,
@@ -197,7 +199,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.cut_between(view, patch, block, monitor)
     }
 
-    /// Cuts a patch in that was judged.
+    /// Refines the cut of a patch that was compared with others.
     pub(super) fn cut_judged(
         &self,
         view: &View<D>,
@@ -211,7 +213,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.refine(view, patch, judged, monitor)
     }
 
-    /// Cuts a patch in between blocks of points of a side.
+    /// Cuts a patch between blocks of a given side.
     pub(super) fn cut_between(
         &self,
         view: &View<D>,
@@ -222,8 +224,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.solve(view, patch, &view.ties, block, monitor)
     }
 
-    /// Cuts a patch in that was cut coarsely: by blocks half as large, then half of that; points away from the cut are
-    /// settled.
+    /// Refines a coarse cut: the side of the blocks is halved until it is 1. Only points near the cut are free.
     pub(super) fn refine(
         &self,
         view: &View<D>,
@@ -234,7 +235,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.refine_within(view, patch, coarse, 0, monitor)
     }
 
-    /// The same, with all points free that lie within some steps of the cut, but at least as many as a block has.
+    /// Refines a coarse cut. Points within `reach` steps of the cut are free, or within the side of a block if this is
+    /// more.
     pub(super) fn refine_within(
         &self,
         view: &View<D>,
@@ -269,7 +271,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         Ok(best)
     }
 
-    /// The least cut between blocks of a side.
+    /// Returns the minimum cut between blocks of a side.
     fn solve(
         &self,
         view: &View<D>,
@@ -310,7 +312,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         Ok(cutting)
     }
 
-    /// What the points show that take the patch, as far as that is asked.
+    /// Computes the looks of the points that take the patch, where a pair needs them.
     fn look(&self, view: &View<D>, patch: &Proposal<'_, D>, ties: &[Tie], out: &mut Patch) {
         let n = ties.len();
         let judged = judged(&patch.window.grid, ties);
@@ -337,7 +339,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
         }
     }
 
-    /// Costs of `n` pairs in a row, by which of the two takes the patch.
+    /// Computes the costs of `n` pairs in a row for both directions: only the second point takes the patch, or only the
+    /// first.
     fn judge_pairs(&self, view: &View<D>, patch: &Patch, run: &Run, costs: &mut Costs) {
         let (p, q, n) = (run.p, run.q, run.n);
         costs.old_new.resize(n, 0.0);
@@ -356,7 +359,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         }
     }
 
-    /// Adds what pairs cost whose points have a choice.
+    /// Adds the costs of pairs whose points have a choice.
     fn add_pairs(
         &self,
         grid: &Grid<D>,
@@ -381,7 +384,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         });
     }
 
-    /// The cut that gives some points the patch.
+    /// Returns the cut that gives the patch to some points.
     fn settle(
         &self,
         view: &View<D>,
@@ -425,13 +428,13 @@ impl<'a, const D: usize> Cutter<'a, D> {
         }
     }
 
-    /// What the window of a patch costs as it is.
+    /// Returns the cost of the window without the patch.
     pub(super) fn value(&self, view: &View<D>, patch: &Proposal<'_, D>) -> f64 {
         value_of(view, patch, |_| false)
     }
 }
 
-/// What the points cost of which some take the patch, and all seams as they are.
+/// Returns the cost of the points after some take the patch, and of the current seams.
 fn value_of<const D: usize>(
     view: &View<D>,
     patch: &Proposal<'_, D>,
@@ -446,7 +449,7 @@ fn value_of<const D: usize>(
     value
 }
 
-/// The side of the blocks that a window is cut between.
+/// Returns the side of the blocks between which a window is cut.
 fn block<const D: usize>(window: &Window<D>, sides: &[(usize, usize)]) -> usize {
     let n = window.grid.len();
     let side = sides.iter().find(|(most, _)| n > *most);

@@ -1,7 +1,8 @@
-//! The energy of a cut, and its least: exactly, or among the cuts between blocks of a few points a side.
+//! The energy of a cut, and its minimum: exact, or among the cuts between blocks of points.
 //!
-//! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005: large windows
-//! are cut between blocks first, and then only points along that cut are free. They would take most of the time otherwise.
+//! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005. Large
+//! windows are first cut between blocks, and then only points along that cut are free. Otherwise these windows would
+//! take most of the time.
 
 use super::pair::{Capacities, capacity};
 use super::runs::Run;
@@ -11,24 +12,24 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
 use crate::kernels::seam::maxflow::{Graph, Solver};
 
-/// Costs of labels, source for what is kept and sink for what is taken, in whole numbers, of blocks of points.
+/// Integer costs of the labels of blocks: source if the points are kept, sink if they take the patch.
 pub(super) struct Energy<const D: usize> {
     grid: Grid<D>,
     blocks: Grid<D>,
     side: usize,
     /// The block of each point along the last axis.
     columns: Vec<u32>,
-    /// What it costs more to take than to keep.
+    /// Cost of taking a block minus the cost of keeping it.
     terminal: Vec<i32>,
-    /// What it costs that a block keeps and the next one along the axis takes.
+    /// Cost if a block is kept and the next block along the axis is taken.
     forward: [Vec<i32>; D],
-    /// The other way round. Were it in the terminals, as it may be, it would have to flow from block to block: the cut is the
-    /// same, and took twice the time.
+    /// Cost if a block is taken and the next block is kept. This cost could be in the terminals, but would then flow
+    /// from block to block. The cut would be the same and take twice the time.
     backward: [Vec<i32>; D],
 }
 
 impl<const D: usize> Energy<D> {
-    /// No costs yet, of points that take the patch in blocks of a side, all of a block or none.
+    /// Returns an energy without costs. All free points of a block get the same label.
     pub(super) fn new(grid: Grid<D>, side: usize) -> Result<Self> {
         let mut this = Self {
             grid,
@@ -43,7 +44,7 @@ impl<const D: usize> Energy<D> {
         Ok(this)
     }
 
-    /// The same in place.
+    /// Resets the energy for another grid and keeps its buffers.
     pub(super) fn clear(&mut self, grid: Grid<D>, side: usize) -> Result<()> {
         self.grid = grid;
         self.side = side;
@@ -60,12 +61,12 @@ impl<const D: usize> Energy<D> {
         Ok(())
     }
 
-    /// Side of a block.
+    /// Returns the side of a block.
     pub(super) fn side(&self) -> usize {
         self.side
     }
 
-    /// The first block of a point's row, and the point's place in the row.
+    /// Returns the first block of a point's row, and the column of the point.
     #[inline(always)]
     fn row(&self, p: usize) -> (usize, usize) {
         let mut point = self.grid.point(p);
@@ -73,7 +74,7 @@ impl<const D: usize> Energy<D> {
         (self.blocks.index(point.map(|x| x / self.side)), column)
     }
 
-    /// Adds what it costs more to take than to keep.
+    /// Adds the difference between the costs of taking and keeping a point.
     pub(super) fn add_point(&mut self, p: usize, cost: i32) {
         let (row, column) = self.row(p);
         add(
@@ -82,9 +83,9 @@ impl<const D: usize> Energy<D> {
         );
     }
 
-    /// The pairs of a run from the first to the last one that is open: whose points have a choice that tells them apart.
+    /// Returns the part of a run from its first to its last open pair: a pair of points that can get different labels.
     pub(super) fn open(&self, ties: &[Tie], run: &Run) -> Option<Run> {
-        // Along the last axis blocks change within a run.
+        // Along the last axis, blocks change within a run.
         let apart = run.axis + 1 == D || self.row(run.p).0 != self.row(run.q).0;
         let (l, r) = (&ties[run.p..][..run.n], &ties[run.q..][..run.n]);
         let open = |(&a, &b): (&Tie, &Tie)| match (a, b) {
@@ -102,7 +103,7 @@ impl<const D: usize> Energy<D> {
         })
     }
 
-    /// Adds the costs of a run of pairs; those of points without a choice go to their neighbours.
+    /// Adds the costs of a run of pairs. If one point has no choice, the costs belong to the other point.
     pub(super) fn add_pairs(&mut self, ties: &[Tie], run: &Run, costs: &Capacities) {
         let ((p_row, p_column), (q_row, q_column)) = (self.row(run.p), self.row(run.q));
         let terminal = &mut self.terminal[..];
@@ -111,12 +112,13 @@ impl<const D: usize> Energy<D> {
             let p = p_row + self.columns[p_column + k] as usize;
             let q = q_row + self.columns[q_column + k] as usize;
             let (old_new, new_old) = (costs.old_new[k], costs.new_old[k]);
-            // A seam that was worse than this one on both sides will go; it counts as much as keeps the energy submodular.
+            // If the old seam costs more than both new seams together, it is replaced anyway. Its cost is limited to
+            // keep the energy submodular.
             let kept = costs.kept[k].min(old_new + new_old);
             match (ties[run.p + k], ties[run.q + k]) {
-                // A seam inside of a block goes with it: see `add_seams`.
+                // A seam inside a block is replaced with the block; see `add_seams`.
                 (Tie::Either, Tie::Either) if p != q => {
-                    // Half of the seam that goes is on either way, as far as there is as much.
+                    // Put half of the cost of the old seam on each direction, as far as each direction costs that much.
                     let both = old_new + new_old - kept;
                     let ahead = (old_new - kept / 2).clamp(0, both);
                     let back = both - ahead;
@@ -134,7 +136,7 @@ impl<const D: usize> Energy<D> {
         }
     }
 
-    /// Adds the seams of a run that lie inside of blocks, which go where those take the patch.
+    /// Adds the seams of a run inside blocks, which disappear if the block takes the patch.
     pub(super) fn add_seams(&mut self, ties: &[Tie], run: &Run, seams: &[f32]) {
         let ((p_row, p_column), (q_row, q_column)) = (self.row(run.p), self.row(run.q));
         for (k, &seam) in seams.iter().enumerate().filter(|(_, s)| **s > 0.0) {
@@ -147,7 +149,7 @@ impl<const D: usize> Energy<D> {
         }
     }
 
-    /// Which points take the patch at the least cost: those that must, and of those that have a choice as it is best.
+    /// Returns which points take the patch at minimum cost.
     pub(super) fn minimise(
         &self,
         ties: &[Tie],
@@ -174,7 +176,7 @@ impl<const D: usize> Energy<D> {
     }
 }
 
-/// Sums of many costs stay within 32 bits.
+/// Adds costs and saturates at 32 bits.
 #[inline(always)]
 fn add(sum: &mut i32, cost: i32) {
     *sum = sum.saturating_add(cost);

@@ -1,7 +1,7 @@
-//! Filling: patches from a lattice of centres, and then wherever something is left.
+//! Filling: patches around a lattice of centres, and then around all points that are still empty.
 //!
-//! Patches that see none of the same points are found side by side; which those are hangs on the field alone, never on how
-//! many threads there are.
+//! Patches whose windows do not overlap are searched at the same time. These patches depend only on the field, not on
+//! the number of threads.
 
 use std::collections::VecDeque;
 
@@ -13,34 +13,34 @@ use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 
-/// A patch is left out where all around its centre is covered, within this share of the step.
+/// A patch is skipped if all points within this share of the step around its centre are covered.
 const CORE: f32 = 0.45;
-/// Points that fields are sampled at to learn how much they enlarge.
+/// Number of points where the enlargement of a field is measured.
 const PROBES: usize = 4096;
-/// Patches that are found side by side, at most.
+/// Maximum number of patches that are searched at the same time.
 const BATCH: usize = 4;
-/// Centres ahead among which they are looked for.
+/// Number of the next centres that are examined for these patches.
 const AHEAD: usize = 256;
-/// Patches that the field shows smaller than they are cover at least so many points along a side, in the plane and in space:
-/// toward a horizon there would be one for every few points.
+/// Minimum side in output points, in two and three dimensions, of a patch that the field shrinks. Without it there
+/// would be one patch for every few points near a horizon.
 const SEEN: [f32; 2] = [24.0, 12.0];
-/// But none is made larger than this share of the exemplar's shortest side for it.
+/// Maximum side of a patch that was enlarged for [`SEEN`], as a share of the exemplar's shortest side.
 const LARGEST: f32 = 0.4;
 
-/// A patch that has been cut, but not laid yet.
+/// A patch that has been cut, but not applied yet.
 pub(super) struct Found<const D: usize> {
     chart: Chart<D>,
     centre: [i32; D],
     side: f32,
-    /// Where the centre looks, and where all points do.
+    /// Exemplar coordinates of the centre, and of all points.
     place: Place<D>,
     places: Vec<Place<D>>,
     cutting: Cutting<D>,
-    /// What the window costs less with it.
+    /// Difference between the cost of the window without and with the patch.
     pub gain: f64,
 }
 
-/// The first point of a box of the canvas and the one after its last, along cyclic axes perhaps over the end.
+/// A box of the canvas: its first point, and the point after its last. It may extend beyond the end of a periodic axis.
 type Reach<const D: usize> = ([i32; D], [i32; D]);
 
 impl<const D: usize> Stitching<'_, D> {
@@ -71,7 +71,7 @@ impl<const D: usize> Stitching<'_, D> {
         self.fill_gaps()
     }
 
-    /// The lattice of centres, in row-major order.
+    /// Returns the lattice of centres, in row-major order.
     fn centres(&self) -> VecDeque<[i32; D]> {
         let grid = &self.canvas.grid;
         let least = self.least_scale();
@@ -87,7 +87,8 @@ impl<const D: usize> Stitching<'_, D> {
             .collect()
     }
 
-    /// Takes the next centres that see nothing of what those before them will change. They are never none.
+    /// Takes the next centres whose patches do not overlap the patches of earlier centres. There is at least one,
+    /// unless all are covered.
     fn batch(&self, ahead: &mut VecDeque<[i32; D]>) -> Vec<[i32; D]> {
         let o = &self.options;
         let (mut batch, mut waiting) = (Vec::new(), VecDeque::new());
@@ -110,13 +111,13 @@ impl<const D: usize> Stitching<'_, D> {
                 break;
             }
         }
-        // Those that wait come before those that were not looked at.
+        // Centres that must wait stay before the centres that were not examined.
         waiting.append(ahead);
         *ahead = waiting;
         batch
     }
 
-    /// Whether two boxes share points of the canvas.
+    /// Returns whether two boxes share points of the canvas.
     fn meet(&self, a: &Reach<D>, b: &Reach<D>) -> bool {
         let grid = &self.canvas.grid;
         (0..D).all(|axis| {
@@ -130,7 +131,7 @@ impl<const D: usize> Stitching<'_, D> {
         })
     }
 
-    /// Lays patches wherever something is left.
+    /// Applies patches around points that are still empty.
     fn fill_gaps(&mut self) -> Result<()> {
         let grid = self.canvas.grid;
         let mut next = 0;
@@ -145,7 +146,7 @@ impl<const D: usize> Stitching<'_, D> {
                 }
             }
             if self.canvas.free == before || !self.canvas.covered(p as u32) {
-                // A chart that cannot even hold its centre: any sample is shown there, as a patch of one point.
+                // This chart does not contain its own centre, so any sample is shown there as a patch of one point.
                 self.canvas.patches[p] = self.patches.len() as u32;
                 self.canvas.free -= 1;
                 self.patches.push(Patch {
@@ -184,7 +185,7 @@ impl<const D: usize> Stitching<'_, D> {
         }
     }
 
-    /// The chart of a patch around a point, if it shows something new.
+    /// Returns the chart of a patch around a point if it contains empty points.
     fn chart(&self, centre: [i32; D], side: f32) -> Option<Chart<D>> {
         let chart = Chart::new(&self.canvas, self.frames, centre, side, self.options.bend)?;
         let useful = |(&p, &m): (&u32, &bool)| m && !self.canvas.covered(p);
@@ -192,13 +193,13 @@ impl<const D: usize> Stitching<'_, D> {
         any.then_some(chart)
     }
 
-    /// The points of a chart that are covered.
+    /// Returns the points of a chart that are covered.
     fn covered(&self, chart: &Chart<D>) -> Vec<bool> {
         let points = chart.window.points.iter().zip(&chart.mask);
         points.map(|(&p, &m)| m && self.canvas.covered(p)).collect()
     }
 
-    /// Finds the best patch of a chart: one that fits the points that are known, and is cheapest once it is cut in.
+    /// Finds the best patch of a chart: candidates fit the known points, and the cheapest after the cut is returned.
     pub(super) fn find(
         &self,
         chart: Chart<D>,
@@ -258,7 +259,7 @@ impl<const D: usize> Stitching<'_, D> {
         }))
     }
 
-    /// Lays a patch.
+    /// Applies a patch.
     pub(super) fn lay(&mut self, found: Found<D>) -> Result<()> {
         let Found {
             chart,
@@ -283,7 +284,7 @@ impl<const D: usize> Stitching<'_, D> {
         self.monitor.advance((before - self.canvas.free) as u64)
     }
 
-    /// The middle of what is not covered near a point.
+    /// Returns the mean position of the empty points near a point.
     fn middle(&self, at: [i32; D]) -> [i32; D] {
         let reach = (self.side(at) * 0.5 * self.scale(at)) as i32;
         let window = self
@@ -312,12 +313,12 @@ impl<const D: usize> Stitching<'_, D> {
         window.is_none_or(|w| w.points.iter().all(|&p| self.canvas.covered(p)))
     }
 
-    /// The side of a patch around a point, in samples of the exemplar.
+    /// Returns the side of a patch around a point, in samples of the exemplar.
     fn side(&self, centre: [i32; D]) -> f32 {
         self.side_seen(self.scale(centre))
     }
 
-    /// The side of a patch where the exemplar is so much enlarged.
+    /// Returns the side of a patch for a given enlargement, in samples of the exemplar.
     fn side_seen(&self, scale: f32) -> f32 {
         let patch = self.options.patch;
         let shape = self.cutter.source().grid().shape();
@@ -325,7 +326,7 @@ impl<const D: usize> Stitching<'_, D> {
         patch.max((SEEN[D - 2].min(patch) / scale).min(LARGEST * shortest))
     }
 
-    /// How much they are enlarged where that is least, but for the very least.
+    /// Returns the 2 % quantile of the enlargement.
     fn least_scale(&self) -> f32 {
         let n = self.canvas.grid.len();
         let every = if matches!(self.frames, Frames::Constant(_)) {
@@ -342,7 +343,7 @@ impl<const D: usize> Stitching<'_, D> {
     }
 }
 
-/// Centres of patches along an axis.
+/// Returns the centres of patches along an axis.
 fn along(n: usize, wrap: bool, step: f32) -> Vec<i32> {
     if wrap {
         let count = (n as f32 / step).ceil().max(1.0) as usize;

@@ -1,7 +1,7 @@
-//! The flat case: patches that lie as they are, cut into a window of what another search has laid.
+//! Patches that are not transformed, cut into a window that another search has filled.
 //!
-//! Places are numbers of samples in one row, which may be those of many pictures: nothing is asked of what lies beside a
-//! sample.
+//! Places are numbers of samples in one row, which may come from several images. The neighbours of a sample are not
+//! used.
 
 use super::canvas::{FREE, Window};
 use super::cut::{Cutter, Cutting, Proposal};
@@ -14,20 +14,20 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Samples stand in lines of so many, as a coordinate has no room for all of a row.
+/// Samples per line of the grid. A coordinate cannot hold the number of every sample.
 const LINE: usize = 1 << 14;
-/// Windows of more points are cut between blocks of such a side: to be compared, and to be laid.
+/// Windows with more points are cut between blocks of this side, both to compare and to apply a patch.
 const JUDGED: (usize, usize) = (1 << 12, 4);
 const CUT: (usize, usize) = (1 << 15, 2);
-/// How far points may lie from a cut between blocks that are cut once more, each alone.
+/// Maximum distance from a cut between blocks of the points that are cut again one by one.
 const REACH: usize = 8;
 
-/// A window of an output, and what a patch may do to it; all arrays have one entry a point.
+/// A window of an output, and the points that a patch may take. All arrays have one entry per point.
 #[derive(Debug, Clone, Copy)]
 pub struct Pasting<'a> {
     /// Rows and columns.
     pub shape: [usize; 2],
-    /// The sample that each point shows; `u32::MAX` where there is none yet.
+    /// The sample that each point shows; `u32::MAX` for an empty point.
     pub shown: &'a [u32],
     /// Cost of the seam from each point to the next one along each axis.
     pub seams: &'a [[f32; 2]],
@@ -40,13 +40,13 @@ pub struct Pasting<'a> {
 /// A patch, cut into a window.
 #[derive(Debug, Clone)]
 pub struct Pasted {
-    /// The points that take the patch.
+    /// Whether each point takes the patch.
     pub take: Vec<bool>,
-    /// Seams of the window, as they are then.
+    /// Costs of the window's seams after the cut.
     pub seams: Vec<[f32; 2]>,
 }
 
-/// Samples that patches are cut from, in a row.
+/// Source of patches: samples in a row.
 #[derive(Debug, Clone)]
 pub struct Samples {
     source: Source<2>,
@@ -55,7 +55,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Samples of some colours, each so deep inside of an element, and what a seam costs.
+    /// Prepares samples from their colours, their depth inside an element, and the weights of seams.
     ///
     /// # Errors
     /// Arrays of other sizes, values that are not finite or out of their range, and too many samples.
@@ -77,11 +77,12 @@ impl Samples {
         })
     }
 
-    /// What the seams of a window cost once each of some patches is cut into it, alone. A patch is the sample that each point
-    /// would show; large ones are cut between blocks of points, which is enough to compare them.
+    /// Returns the cost of the seams of a window after each patch alone is cut into it. A patch is the sample that each
+    /// point would show. Large patches are cut between blocks of points, which is precise enough for a comparison.
     ///
     /// # Errors
-    /// Arrays of other sizes than the window's, samples that are not there, or a monitor that was cancelled.
+    /// Arrays whose sizes differ from the size of the window, samples that do not exist, or a monitor that was
+    /// cancelled.
     pub fn judge(
         &self,
         pasting: &Pasting<'_>,
@@ -98,21 +99,20 @@ impl Samples {
         values.into_iter().collect()
     }
 
-    /// How many samples there are.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there are none.
+    /// Returns whether the number of samples is 0.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Cuts that one of some patches into a window which is chosen by what the seams would cost with each, as
-    /// [`Self::judge`] says; returns its number too.
+    /// Cuts in the patch with the lowest cost of [`Self::judge`]. Returns its number also.
     ///
     /// # Errors
-    /// As of [`Self::judge`].
+    /// The errors of [`Self::judge`].
     pub fn cut_best(
         &self,
         pasting: &Pasting<'_>,
@@ -131,7 +131,7 @@ impl Samples {
         let values: Vec<f64> = tried.iter().map(|cut| cut.value).collect();
         let chosen = choose(&values);
         let patch = self.propose(pasting, &window, patches[chosen])?;
-        // Where all cuts are between points, it is made already.
+        // If all cuts are between points, the cut is already computed.
         let coarse = if judged == last {
             tried.swap_remove(chosen)
         } else {
@@ -141,10 +141,10 @@ impl Samples {
         Ok((chosen, paste(pasting, cut)))
     }
 
-    /// Cuts a patch into a window: between any of its points, unless it is very large.
+    /// Cuts a patch into a window between any of its points, or between blocks if the window is very large.
     ///
     /// # Errors
-    /// As of [`Self::judge`].
+    /// The errors of [`Self::judge`].
     pub fn cut(&self, pasting: &Pasting<'_>, patch: &[u32], monitor: &Monitor) -> Result<Pasted> {
         let (window, view) = self.open(pasting)?;
         let patch = self.propose(pasting, &window, patch)?;
@@ -155,11 +155,11 @@ impl Samples {
     }
 
     fn cutter(&self) -> Cutter<'_, 2> {
-        // Each cut says how finely it is made.
+        // Each cut contains the side of its blocks.
         Cutter::new(&self.source, self.weights, None, &[])
     }
 
-    /// A window, and what it shows.
+    /// Returns a window and its content.
     fn open(&self, pasting: &Pasting<'_>) -> Result<(Window<2>, View<2>)> {
         let window = Window::alone(pasting.shape)?;
         let n = window.points.len();
@@ -193,7 +193,7 @@ impl Samples {
         Ok((window, view))
     }
 
-    /// A patch that is to be cut into a window.
+    /// Returns a patch for a window.
     fn propose<'a>(
         &self,
         pasting: &Pasting<'a>,
@@ -226,7 +226,7 @@ impl Samples {
     }
 }
 
-/// What a cut makes of a window.
+/// Returns the window after a cut.
 fn paste(pasting: &Pasting<'_>, cut: Cutting<2>) -> Pasted {
     let mut seams = pasting.seams.to_vec();
     for (i, axis, cost) in cut.seams {
@@ -238,12 +238,12 @@ fn paste(pasting: &Pasting<'_>, cut: Cutting<2>) -> Pasted {
     }
 }
 
-/// The side of the blocks that a window is cut between.
+/// Returns the side of the blocks between which a window is cut.
 fn side(window: &Window<2>, (most, block): (usize, usize)) -> usize {
     if window.points.len() > most { block } else { 1 }
 }
 
-/// Where a sample of the row stands.
+/// Returns the exemplar coordinates of a sample in the row.
 fn place(sample: u32) -> Place<2> {
     let at = sample as usize;
     [(at / LINE) as i32 * ONE, (at % LINE) as i32 * ONE]
@@ -264,7 +264,7 @@ mod tests {
         ..Weights::NONE
     };
 
-    /// As many samples as two windows have; all have the mean of the standard deviation 1 once they are prepared.
+    /// Returns samples for two windows. The mean of their standard deviations is 1 after preparation.
     fn samples(seed: u64, weights: Weights) -> Samples {
         let noise = Noise::new(seed);
         let colours: Vec<f32> = (0..18)
@@ -292,7 +292,7 @@ mod tests {
     }
 
     proptest! {
-        /// The pairs that result are judged, and seams that are covered are gone.
+        /// The cut judges the pairs that result, and covered seams disappear.
         #[test]
         fn the_cut_is_the_least_of_all(seed in 0u64..500) {
             let samples = samples(seed, WEIGHTS);
@@ -306,7 +306,7 @@ mod tests {
             let core: Vec<bool> = (0..9).map(|i| i == 4 && mask[4]).collect();
             let look = |sample: u32| samples.source.look(place(sample));
             let pair = |l: u32, r: u32, p: usize, q: usize| {
-                // What the patch does not cover is not compared.
+                // Points that the patch does not cover are not compared.
                 let apart = |i: usize| {
                     if mask[i] { look(shown[i]).colour[0] - look(patch[i]).colour[0] } else { 0.0 }
                 };

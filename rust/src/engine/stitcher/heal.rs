@@ -1,8 +1,8 @@
-//! Healing: elements that are torn are grown whole, or given up to what is around them.
+//! Healing: torn elements are completed, or replaced by their surroundings.
 //!
-//! What a patch shows of one element of the exemplar is an instance. It pays for what it lacks, or for what there is of
-//! it where that is less: a whole element and none are free. Moves are cuts in small windows, kept if the sum of seams
-//! and instances falls.
+//! An instance is the visible part of one element of the exemplar in one patch. It costs its missing points or its
+//! visible points, whichever are fewer. A complete element and an absent element cost nothing. Moves are cuts in small
+//! windows. A move is kept if the sum of the costs of seams and instances decreases.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
@@ -16,33 +16,33 @@ use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::functions::root;
 use crate::foundation::par;
 
-/// What a missing point of an instance costs.
+/// Cost of a missing point of an instance.
 const LACK: f64 = 0.3;
-/// Rounds over all instances.
+/// Number of rounds over all instances.
 const ROUNDS: usize = 2;
-/// An instance with more of its points is whole.
+/// Minimum share of its points that makes an instance complete.
 const WHOLE: f64 = 0.97;
-/// One with fewer is not grown, and one with more is not given up.
+/// Minimum share of an instance that is completed, and maximum share of an instance that is removed.
 const GROW: f64 = 0.35;
 const DROP: f64 = 0.7;
-/// Instances that are looked at together.
+/// Number of instances that are examined at the same time.
 const BATCH: usize = 4;
-/// Neighbours that an instance may be given up to.
+/// Maximum number of neighbouring patches that are tried to replace an instance.
 const NEIGHBOURS: usize = 4;
 
 /// A patch and an element of the exemplar.
 type Key = (u32, u32);
 
-/// The points that show one element through one patch.
+/// The points that show one element in one patch.
 struct Instance<const D: usize> {
     key: Key,
-    /// One of its points, and how far the others lie from it.
+    /// One point of the instance, and the ends of its box relative to that point.
     anchor: [usize; D],
     low: [i32; D],
     high: [i32; D],
 }
 
-/// A change of the canvas that makes it better.
+/// A change of the canvas that reduces the costs.
 struct Move<const D: usize> {
     gain: f64,
     patch: u32,
@@ -53,7 +53,7 @@ struct Move<const D: usize> {
 }
 
 impl<const D: usize> Move<D> {
-    /// Whether two moves see some of the same points.
+    /// Returns whether two moves share points.
     fn meets(&self, other: &Self) -> bool {
         let mine: HashSet<u32> = self.chart.window.points.iter().copied().collect();
         other.chart.window.points.iter().any(|p| mine.contains(p))
@@ -61,7 +61,7 @@ impl<const D: usize> Move<D> {
 }
 
 impl<const D: usize> Stitching<'_, D> {
-    /// Heals torn elements; returns how many moves were made.
+    /// Heals torn elements, and returns the number of moves.
     pub(super) fn heal(&mut self) -> Result<usize> {
         let mut moves = 0;
         if !self.cutter.source().has_elements() {
@@ -86,7 +86,7 @@ impl<const D: usize> Stitching<'_, D> {
                 let (mut done, mut again): (Vec<Move<D>>, Vec<usize>) = (Vec::new(), Vec::new());
                 for (&k, found) in batch.iter().zip(found) {
                     let Some(best) = found? else { continue };
-                    // What another move of the batch has changed must be looked at anew.
+                    // Examine instances again if another move of the batch has changed their surroundings.
                     if done.iter().any(|other| other.meets(&best)) {
                         again.push(k);
                         continue;
@@ -104,7 +104,7 @@ impl<const D: usize> Stitching<'_, D> {
         Ok(moves)
     }
 
-    /// The instance that a point shows, if any.
+    /// Returns the instance that a point shows, if any.
     #[inline(always)]
     fn instance(&self, patch: u32, place: Place<D>) -> Option<Key> {
         if !is_patch(patch) {
@@ -114,7 +114,7 @@ impl<const D: usize> Stitching<'_, D> {
         (element > 0).then_some((patch, element))
     }
 
-    /// All instances, and how many points each has.
+    /// Returns all instances, and the number of points of each.
     fn instances(&self) -> (Vec<Instance<D>>, HashMap<Key, i64>) {
         let canvas = &self.canvas;
         let mut all: Vec<Instance<D>> = Vec::new();
@@ -148,7 +148,7 @@ impl<const D: usize> Stitching<'_, D> {
         (all, counts)
     }
 
-    /// Whether an instance is cut off by an end of the canvas: it cannot be whole.
+    /// Returns whether an instance touches an end of the canvas, so that it cannot be completed.
     fn at_an_end(&self, instance: &Instance<D>) -> bool {
         let grid = &self.canvas.grid;
         (0..D).any(|a| {
@@ -159,7 +159,7 @@ impl<const D: usize> Stitching<'_, D> {
         })
     }
 
-    /// Points that an instance has where it is whole.
+    /// Returns the number of points of the complete instance.
     fn size(&self, (patch, element): Key) -> f64 {
         f64::from(self.cutter.source().size(element)) * self.patches[patch as usize].scale()
     }
@@ -168,12 +168,12 @@ impl<const D: usize> Stitching<'_, D> {
         counts.get(&key).copied().unwrap_or(0) as f64 / self.size(key).max(1.0)
     }
 
-    /// What an instance of so many points pays.
+    /// Returns the cost of an instance with a number of points.
     fn lack(&self, key: Key, count: i64) -> f64 {
         LACK * (count as f64).min((self.size(key) - count as f64).max(0.0))
     }
 
-    /// The best of growing an instance and of giving it up; none where both make it worse.
+    /// Returns the best move that completes or removes an instance, or nothing if all moves increase the costs.
     fn best_move(
         &self,
         instance: &Instance<D>,
@@ -207,7 +207,7 @@ impl<const D: usize> Stitching<'_, D> {
         Ok(best)
     }
 
-    /// The patches around an instance, those with the most points first.
+    /// Returns the patches around an instance, ordered by their number of points.
     fn neighbours(&self, instance: &Instance<D>) -> Vec<u32> {
         let Some(window) = self.bounds(instance, 5) else {
             return Vec::new();
@@ -235,7 +235,7 @@ impl<const D: usize> Stitching<'_, D> {
         )
     }
 
-    /// One move, if it makes the canvas better.
+    /// Returns a move if it reduces the costs.
     fn attempt(
         &self,
         instance: &Instance<D>,
@@ -244,7 +244,7 @@ impl<const D: usize> Stitching<'_, D> {
         counts: &HashMap<Key, i64>,
     ) -> Result<Option<Move<D>>> {
         let margin = if grow {
-            // As far as the rest of it may lie.
+            // The window is wide enough to contain the rest of the element.
             let reach = root::<D>(self.size(instance.key)) * 1.4;
             let longest = (0..D)
                 .map(|a| instance.high[a] - instance.low[a])
@@ -336,7 +336,7 @@ impl<const D: usize> Stitching<'_, D> {
         }))
     }
 
-    /// What a patch shows in a window.
+    /// Returns the chart of a patch in a window.
     fn chart_of(&self, patch: &Patch<D>, window: Window<D>) -> Option<Chart<D>> {
         let frames: Frames<'_, D> = self.frames;
         let mut chart = if patch.rigid {
@@ -349,7 +349,7 @@ impl<const D: usize> Stitching<'_, D> {
                 None,
             )
         } else if self.canvas.part {
-            // What a bent patch shows hangs on the field around its centre, which may lie elsewhere.
+            // A bent patch depends on the field around its centre, which may be outside this part.
             return None;
         } else {
             let mut chart = Chart::new(&self.canvas, frames, patch.centre, patch.side, true)?;

@@ -4,9 +4,9 @@ use super::canvas::Window;
 use crate::foundation::fixed::{Frame, ONE};
 use crate::foundation::grid::Grid;
 
-/// Nodes of the coarse lattice along an axis that a bent chart is integrated on.
+/// Number of intervals along an axis of the coarse lattice that a bent chart is integrated on.
 const NODES: usize = 16;
-/// Most steps of the conjugate gradients; as good as solved long before.
+/// Maximum number of steps of conjugate gradients. They converge long before.
 const STEPS: usize = 60;
 
 /// A coarse lattice over a window, with the frames at its nodes.
@@ -21,7 +21,7 @@ impl<const D: usize> Mesh<D> {
         let shape = window.grid.shape();
         let nodes = shape.map(|n| n.clamp(1, NODES + 1));
         let spacing = std::array::from_fn(|a| (shape[a] - 1) as f64 / (nodes[a].max(2) - 1) as f64);
-        // Never empty, as the window is not.
+        // The lattice is not empty because the window is not.
         let grid = Grid::new(nodes, [false; D]).unwrap_or(window.grid);
         let mut at = Vec::with_capacity(grid.len());
         for i in 0..grid.len() {
@@ -37,7 +37,7 @@ impl<const D: usize> Mesh<D> {
         }
     }
 
-    /// The potential of one row of the frames, by least squares: conjugate gradients on the normal equations.
+    /// Returns the potential of one row of the frames by least squares: conjugate gradients on the normal equations.
     pub(super) fn integrate(&self, row: usize) -> Vec<f64> {
         let (n, strides) = (self.grid.len(), self.grid.strides());
         let edges = |f: &mut dyn FnMut(usize, usize, usize)| {
@@ -63,7 +63,7 @@ impl<const D: usize> Mesh<D> {
                 out[i] -= d;
             });
         };
-        // From the frame in the middle, which is most of it.
+        // Start from the frame in the middle, which is close to the solution.
         let middle = &self.frames[self.grid.index(self.grid.shape().map(|s| s / 2))][row];
         let mut x: Vec<f64> = (0..n)
             .map(|i| {
@@ -104,7 +104,7 @@ impl<const D: usize> Mesh<D> {
         x
     }
 
-    /// A potential at a point of the window, between its nodes.
+    /// Returns a potential at a point of the window, interpolated between nodes.
     pub(super) fn at(&self, potential: &[f64], point: [f64; D]) -> f64 {
         let shape = self.grid.shape();
         let (mut first, mut part) = ([0; D], [0.0; D]);

@@ -1,15 +1,16 @@
-//! The stitcher: patches of an exemplar pulled into the output through any map, and cut where it shows least.
+//! The stitcher: maps patches of an exemplar into the output, and cuts them along the least visible seams.
 //!
 //! 1. *chart*: a patch is a box of the exemplar, mapped from the output by the frames around its centre;
-//! 2. *search*: the places at which it fits what is there already, exactly, for all places at once;
-//! 3. *cut*: the best few are cut in by minimum cuts that judge the pairs which result, and the cheapest stays;
-//! 4. *recover*: where seams show most, other patches may take them;
-//! 5. *heal*: elements that are torn are grown whole, or given up.
+//! 2. *search*: for all exemplar coordinates at once, the difference between the patch and the points that are known
+//!   already;
+//! 3. *cut*: minimum cuts insert the best few candidates and judge the pairs that result, and the cheapest is kept;
+//! 4. *recover*: other patches are tried over the worst seams;
+//! 5. *heal*: torn elements are completed or removed.
 //!
 //! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures*, SIGGRAPH 2003. Departures: patches follow a field; a cut
-//! judges the pair that results, not how far the two pictures differ; elements are known to it.
+//! judges the pair that results instead of the difference of two images; cuts and healing use the elements.
 //!
-//! [`Samples`] is the third step alone, for patches that lie as they are and are found by others.
+//! [`Samples`] is only the third step, for patches that are not transformed and come from another search.
 
 mod balance;
 mod canvas;
@@ -50,26 +51,27 @@ use search::{Charges, Index};
 pub use source::{Adjacency, Elements, Source};
 pub use weights::Weights;
 
-/// What the stitcher is asked for.
+/// Options of the stitcher.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// Side of a patch, in samples of the exemplar.
     pub patch: f32,
-    /// Share of it by which neighbours overlap.
+    /// Overlap of neighbouring patches, as a share of their side.
     pub overlap: f32,
-    /// Places that are cut in, of which the cheapest stays.
+    /// Number of candidates that are cut in for each patch. The cheapest is kept.
     pub candidates: usize,
-    /// Whether patches bend with the field, or are turned and scaled as a whole.
+    /// Whether patches bend with the field. Otherwise they are rotated and scaled as a whole.
     pub bend: bool,
-    /// What seams cost.
+    /// Weights of the seam costs.
     pub weights: Weights,
-    /// Cost of places that have been shown more often than others.
+    /// Cost of samples that were shown more often than others.
     pub repetition: f32,
-    /// Cost of going on exactly where a neighbour ends.
+    /// Cost of a patch that continues a neighbour exactly.
     pub continuation: f32,
-    /// Cost of points of classes that are shown more often than in the exemplar: of as many as a side of a patch has.
+    /// Cost of points of classes that are more frequent than in the exemplar. The unit is a number of points equal to a
+    /// patch's side.
     pub balance: f32,
-    /// How many of the worst seams are covered again, as a share of the patches.
+    /// Number of the worst seams that are covered again, as a share of the number of patches.
     pub recover: f32,
     /// Whether torn elements are healed.
     pub heal: bool,
@@ -77,14 +79,14 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Points that are given: none, or flags and one place a point.
+/// Points that are given: none, or one flag and one place per point.
 #[derive(Debug, Clone, Copy)]
 pub struct Given<'a, const D: usize> {
-    /// Which.
+    /// Whether each point is given.
     pub points: &'a [bool],
-    /// Where they look.
+    /// Exemplar coordinates of the given points.
     pub places: &'a [Place<D>],
-    /// Which of them patches may take, where seams show less then; empty where all stay.
+    /// Whether patches may take a given point to reduce the costs of seams. Empty if all given points must stay.
     pub loose: &'a [bool],
 }
 
@@ -97,38 +99,38 @@ impl<const D: usize> Given<'_, D> {
     };
 }
 
-/// What has been stitched.
+/// Result of the stitcher.
 #[derive(Debug, Clone)]
 pub struct Stitched<const D: usize> {
-    /// Where each point looks.
+    /// Exemplar coordinates of each point.
     pub places: Vec<Place<D>>,
     /// The patch that each point shows.
     pub patches: Vec<u32>,
     /// The Jacobian at the centre of each patch.
     pub frames: Vec<Frame<D>>,
-    /// Mean cost of the seams, a point.
+    /// Mean cost of the seams per point.
     pub seams: f64,
-    /// Moves by which elements were healed.
+    /// Number of moves that healed elements.
     pub healed: usize,
 }
 
 /// A patch that has been cut in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch<const D: usize> {
-    /// Its middle, on the canvas.
+    /// Its centre on the canvas.
     pub centre: [i32; D],
-    /// Where the centre looks.
+    /// Exemplar coordinates of the centre.
     pub place: Place<D>,
-    /// The Jacobian there.
+    /// Jacobian at the centre.
     pub frame: Frame<D>,
-    /// Whether it is that frame alone, or bent with the field.
+    /// Whether the map of the patch is affine with that Jacobian. Otherwise it bends with the field.
     pub rigid: bool,
     /// Its side, in samples of the exemplar.
     pub side: f32,
 }
 
 impl<const D: usize> Patch<D> {
-    /// Points of the output to a sample of the exemplar.
+    /// Returns the number of output points per sample of the exemplar.
     fn scale(&self) -> f64 {
         1.0 / determinant(&self.frame).abs().max(1e-6)
     }
@@ -142,11 +144,12 @@ struct Stitching<'a, const D: usize> {
     canvas: Canvas<D>,
     index: Index<D>,
     patches: Vec<Patch<D>>,
-    /// Patches by what they show at the origin, where one frame serves all: what goes on exactly is one patch.
+    /// Patches by the exemplar coordinates that they would show at the origin, if there is one frame. Patches that
+    /// continue each other exactly are one patch.
     offsets: HashMap<Place<D>, u32>,
     balance: Balance,
     noise: Noise,
-    /// Patches that have been looked for.
+    /// Number of searches for a patch so far.
     laid: u32,
     monitor: &'a Monitor,
 }
@@ -154,7 +157,7 @@ struct Stitching<'a, const D: usize> {
 /// Fills a region with patches of a source.
 ///
 /// # Errors
-/// Options out of their range, arrays of other sizes than the region's, or a monitor that was cancelled.
+/// Options out of their range, arrays whose sizes differ from the size of the region, or a monitor that was cancelled.
 #[allow(clippy::too_many_arguments)] // the inputs of the engine's other starts
 pub fn stitch<const D: usize>(
     source: &Source<D>,
@@ -166,7 +169,7 @@ pub fn stitch<const D: usize>(
     monitor: &Monitor,
 ) -> Result<Stitched<D>> {
     check(region, frames, given, options)?;
-    // Spectra of the exemplar, and of templates of its size.
+    // The search needs spectra of the exemplar and of templates of its size.
     let spectra = source.grid().len().saturating_mul(source.channels() + 4);
     memory::room("what patches are searched in", spectra, 24)?;
     memory::room("the stitched region", region.grid.len(), 24 * D)?;
@@ -257,7 +260,8 @@ fn check<const D: usize>(
 }
 
 impl<const D: usize> Stitching<'_, D> {
-    /// The number of a patch: where one frame serves all, what goes on where another ends is the same.
+    /// Returns the number of a patch. If there is one frame, patches that continue each other exactly have the same
+    /// number.
     fn number(&mut self, chart: &Chart<D>, centre: [i32; D], place: Place<D>, side: f32) -> u32 {
         let next = self.patches.len() as u32;
         let patch = Patch {
@@ -277,7 +281,7 @@ impl<const D: usize> Stitching<'_, D> {
         next
     }
 
-    /// What a patch would show at the origin if it reached there.
+    /// Returns the exemplar coordinates that a patch would show at the origin.
     fn origin(&self, patch: &Patch<D>) -> Place<D> {
         let grid = self.cutter.source().grid();
         let ahead = apply(&patch.frame, patch.centre);
@@ -291,7 +295,7 @@ impl<const D: usize> Stitching<'_, D> {
         })
     }
 
-    /// How much features are enlarged at a point.
+    /// Returns the enlargement of features at a point.
     fn scale(&self, at: [i32; D]) -> f32 {
         let grid = &self.canvas.grid;
         let point = std::array::from_fn(|a| grid.resolve(a, at[a] as isize));
@@ -299,7 +303,7 @@ impl<const D: usize> Stitching<'_, D> {
     }
 }
 
-/// A place brought around the axes along which an exemplar repeats: the sample nearest to it is one of its own.
+/// Wraps exemplar coordinates along periodic axes, so that the nearest sample is inside the exemplar.
 fn bring_around<const D: usize>(grid: &Grid<D>, place: Place<D>) -> Place<D> {
     std::array::from_fn(|a| {
         let (n, half) = (grid.shape()[a] as i32 * ONE, ONE / 2);
@@ -311,17 +315,17 @@ fn bring_around<const D: usize>(grid: &Grid<D>, place: Place<D>) -> Place<D> {
     })
 }
 
-/// Whether a place lies in an exemplar, along the axes that end.
+/// Returns whether exemplar coordinates are inside the exemplar along the axes that do not wrap.
 fn inside<const D: usize>(grid: &Grid<D>, place: Place<D>) -> bool {
     (0..D).all(|a| grid.wrap()[a] || (0..=(grid.shape()[a] as i32 - 1) * ONE).contains(&place[a]))
 }
 
-/// How much features are enlarged by a frame, by length.
+/// Returns the enlargement of lengths by a frame.
 fn enlargement<const D: usize>(frame: &Frame<D>) -> f32 {
     (1.0 / root::<D>(determinant(frame).abs().max(1e-6))) as f32
 }
 
-/// The determinant of a Jacobian.
+/// Returns the determinant of a Jacobian.
 fn determinant<const D: usize>(frame: &Frame<D>) -> f64 {
     let m = frame.map(|row| row.map(|x| f64::from(x) / f64::from(ONE)));
     match D {

@@ -1,28 +1,29 @@
-//! What is seen where two points meet, for rows of pairs at once.
+//! Costs of pairs of neighbouring points, for rows of pairs at once.
 //!
-//! The only place that says what a seam costs. Rows are judged term by term: each term is one pass over buffers that stay in
-//! the first cache, in wide registers.
+//! All seam costs are defined here. Rows are judged term by term: each term is one vectorised pass over buffers that
+//! stay in the first-level cache.
 
 use super::source::{CHANNELS, Source};
 use super::view::Row;
 use super::weights::Weights;
 use crate::foundation::wide::wide_fn;
 
-/// Added to every pair, so that ties go to the shorter seam.
+/// Cost that is added to every pair, so that the shorter of two equal seams is chosen.
 const SHORTEST: f32 = 2e-3;
-/// Costs of one pair are at most this, so that sums stay within 32 bits.
+/// Maximum cost of one pair, so that sums stay within 32 bits.
 pub(super) const MOST: f32 = 1000.0;
-/// As deep as counts.
+/// Maximum depth that counts, in samples.
 const DEEP: f32 = 6.0;
 
-/// What pairs are judged with.
+/// Source and weights with which pairs are judged.
 pub(super) struct Judge<'a, const D: usize> {
     pub source: &'a Source<D>,
     pub weights: Weights,
 }
 
 impl<const D: usize> Judge<'_, D> {
-    /// Costs of pairs: what each point of a row is beside, and how far the pictures are apart at both, squared.
+    /// Computes the costs of pairs from the looks of their points and from the squared differences of colours at both
+    /// points.
     #[inline]
     pub(super) fn pairs(&self, l: Row<'_>, r: Row<'_>, apart: [&[f32]; 2], out: &mut [f32]) {
         let w = &self.weights;
@@ -40,7 +41,7 @@ impl<const D: usize> Judge<'_, D> {
     }
 }
 
-/// How far the colours of rows are apart.
+/// Computes the differences of the colours of two rows.
 pub(super) fn distances(l: Row<'_>, r: Row<'_>, out: &mut [f32]) {
     out.fill(0.0);
     for c in 0..CHANNELS {
@@ -81,7 +82,8 @@ wide_fn! {
             let (dl, dr) = (l_depth[k], r_depth[k]);
             let inside = (if dl > 0.0 { 1.0f32 } else { 0.0 }, if dr > 0.0 { 1.0f32 } else { 0.0 });
             let mut cost = out[k];
-            // Whatever their colours: two of one colour that meet are one thing of a shape that the exemplar has not.
+            // The colours are not compared here: two touching elements of one colour merge into a shape that the
+            // exemplar does not contain.
             cost += contact * (inside.0 * inside.1);
             cost += joint * (l_beside[k] * inside.1).max(inside.0 * r_beside[k]);
             cost += depth * (dl.min(DEEP) + dr.min(DEEP)) / DEEP;
@@ -91,8 +93,8 @@ wide_fn! {
     }
 }
 
-/// What a pair costs by what it shows, as capacities: the first keeps what it has and the next one takes the patch, the
-/// other way round, and both keep.
+/// Costs of pairs as capacities: only the second point takes the patch, only the first point takes it, or both are
+/// kept.
 #[derive(Debug, Default)]
 pub(super) struct Capacities {
     pub old_new: Vec<i32>,
@@ -101,7 +103,7 @@ pub(super) struct Capacities {
 }
 
 impl Capacities {
-    /// From costs.
+    /// Computes capacities from costs.
     pub(super) fn set(&mut self, old_new: &[f32], new_old: &[f32], kept: &[f32]) {
         for plane in [&mut self.old_new, &mut self.new_old, &mut self.kept] {
             plane.resize(kept.len(), 0);
@@ -113,7 +115,8 @@ impl Capacities {
 }
 
 wide_fn! {
-    /// Where the patch shows what is there already there is no seam: what is beside it goes on, or stays as it was.
+    /// Replaces the costs of pairs where the patch shows the current sample. Such a point does not get a new seam,
+    /// and the old seam next to it stays.
     pub(super) fn go_on(same: &[f32], next_same: &[f32], kept: &[f32], out: &mut [f32]) {
         let n = out.len();
         let (same, next_same, kept) = (&same[..n], &next_same[..n], &kept[..n]);
@@ -132,10 +135,10 @@ wide_fn! {
     }
 }
 
-/// Capacities are costs times this.
+/// Factor from costs to capacities.
 const SCALE: f32 = 16384.0;
 
-/// A cost as a capacity, rounded to the nearest.
+/// Returns a cost as a capacity, rounded to the nearest integer.
 #[inline(always)]
 pub(super) fn capacity(cost: f32) -> i32 {
     let scaled = cost.clamp(-MOST, MOST) * SCALE;

@@ -1,19 +1,19 @@
-//! Re-covering: where seams show most, other patches are tried that need not fit what lies there.
+//! Recovery: other patches are tried over the worst seams. These patches need not fit the content around the seam.
 //!
-//! Kwatra et al., section 3.1: old seams count, so a patch stays only where what shows is less than before.
+//! Kwatra et al., section 3.1. The costs of old seams count, so a patch is kept only if it reduces the total.
 
 use super::Stitching;
 use super::chart::Chart;
 use crate::Result;
 use crate::foundation::grid::Grid;
 
-/// What a patch must not fit lies within this share of a patch's side.
+/// Radius of the area around a seam where a patch need not fit, as a share of a patch's side.
 const HOLE: f32 = 0.15;
-/// Side of a patch that covers a seam, as a share of others.
+/// Side of a patch that covers a seam, as a share of the side of other patches.
 const SIDE: f32 = 0.6;
 
 impl<const D: usize> Stitching<'_, D> {
-    /// Covers the worst seams again: as a share of so many patches, which have a side.
+    /// Covers the worst seams again. Their number is a share of a number of patches with a given side.
     pub(super) fn recover(&mut self, patches: usize, patch: f32) -> Result<()> {
         let count = (self.options.recover * patches as f32).round() as usize;
         if count == 0 {
@@ -43,7 +43,7 @@ impl<const D: usize> Stitching<'_, D> {
         Ok(())
     }
 
-    /// The middles of the seams in those cells of a lattice that have most of them, the worst first.
+    /// Returns the centres of the seams in the cells of a lattice with the highest costs, in descending order.
     fn worst(&self, count: usize, patch: f32) -> Result<Vec<[i32; D]>> {
         let grid = &self.canvas.grid;
         let side = ((2.0 * HOLE * patch) as usize).max(2);

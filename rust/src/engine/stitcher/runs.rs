@@ -1,9 +1,9 @@
-//! Pairs of neighbours of a window, row by row, and what is made of them.
+//! Pairs of neighbouring points of a window, row by row.
 
 use super::view::Tie;
 use crate::foundation::grid::Grid;
 
-/// Pairs of neighbours along an axis: `p` and `q`, and those that follow them in their rows.
+/// Pairs of neighbours along an axis: `p` and `q`, and the next `n - 1` pairs of their rows.
 #[derive(Clone, Copy)]
 pub(super) struct Run {
     pub axis: usize,
@@ -33,7 +33,7 @@ pub(super) fn runs<const D: usize>(grid: &Grid<D>, mut f: impl FnMut(Run)) {
     }
 }
 
-/// Points that have a choice, or a neighbour that must do something else.
+/// Returns the points that have a choice, and the points next to a point with another choice.
 pub(super) fn judged<const D: usize>(grid: &Grid<D>, ties: &[Tie]) -> Vec<bool> {
     let mut judged: Vec<bool> = ties.iter().map(|&t| t == Tie::Either).collect();
     runs(grid, |Run { p, q, n, .. }| {
@@ -46,7 +46,7 @@ pub(super) fn judged<const D: usize>(grid: &Grid<D>, ties: &[Tie]) -> Vec<bool> 
     judged
 }
 
-/// A mask, and all beside it.
+/// Returns a mask that is extended by one point along each axis.
 pub(super) fn widen<const D: usize>(grid: &Grid<D>, mask: &[bool]) -> Vec<bool> {
     let mut wide = mask.to_vec();
     runs(grid, |Run { p, q, n, .. }| {

@@ -1,4 +1,4 @@
-//! What patches are cut from: an exemplar's samples, with what is known of the elements that they belong to.
+//! The source of patches: the samples of an exemplar, and their elements.
 
 use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{BITS, ONE, Place, nearest};
@@ -6,39 +6,39 @@ use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::{Error, Result};
 
-/// Channels of a colour, at most; missing ones are zero.
+/// Maximum number of channels of a colour. Missing channels are zero.
 pub(super) const CHANNELS: usize = 4;
 /// A colour in units of the exemplar's mean standard deviation.
 pub(super) type Colour = [f32; CHANNELS];
-/// Beyond this a sample is as deep inside of its element as any.
+/// Maximum depth that is distinguished inside an element.
 const DEEP: f32 = 7.0;
 
-/// What is known of the elements of an exemplar; each array is empty or has an entry a sample.
+/// Elements of an exemplar. Each array is empty or has one entry per sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Elements<'a> {
     /// Number of the element that a sample belongs to, from 1; 0 for none.
     pub labels: &'a [u32],
-    /// Distance to the background, 0 in the background. A sample may lie in an element, but have no number.
+    /// Distance to the background, 0 in the background. A sample may be in an element that has no number.
     pub depth: &'a [f32],
 }
 
-/// How surprising it is to see two classes of samples side by side.
+/// Costs of two neighbouring classes that are rarely adjacent in the exemplar.
 #[derive(Debug, Clone, Copy)]
 pub struct Adjacency<'a> {
-    /// Class of each sample; empty where this is not to be judged.
+    /// Class of each sample. Empty if classes are not judged.
     pub classes: &'a [u8],
-    /// Cost of each pair of classes, a square table.
+    /// Square table of the costs of each pair of classes.
     pub costs: &'a [f32],
 }
 
-/// What a place shows.
+/// Appearance at exemplar coordinates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Look {
     pub colour: Colour,
     pub depth: f32,
     pub element: u32,
     pub class: u8,
-    /// Whether it lies in an element, or beside one.
+    /// Whether the sample is in an element, or next to one.
     pub beside: bool,
 }
 
@@ -48,7 +48,7 @@ pub struct Source<const D: usize> {
     grid: Grid<D>,
     channels: usize,
     looks: Vec<Look>,
-    /// Samples of each element.
+    /// Number of samples of each element.
     sizes: Vec<u32>,
     costs: Vec<f32>,
     classes: usize,
@@ -57,10 +57,10 @@ pub struct Source<const D: usize> {
 }
 
 impl<const D: usize> Source<D> {
-    /// Prepares `colours`, points of `grid` by `channels`. A cyclic axis is one along which the exemplar repeats.
+    /// Prepares `colours`, points of `grid` by `channels`. The exemplar is periodic along axes that wrap.
     ///
     /// # Errors
-    /// Arrays of other sizes, colours that are not finite, and classes that the table lacks or costs that it may not have.
+    /// Arrays of other sizes, colours that are not finite, classes that are not in the table, or negative costs.
     pub fn new(
         colours: &[f32],
         grid: Grid<D>,
@@ -125,10 +125,10 @@ impl<const D: usize> Source<D> {
         Ok(this)
     }
 
-    /// Samples in a row, each so deep inside of an element: all that is known of them is what they show.
+    /// Prepares samples in a row, with their depth inside an element. Their elements and classes are not known.
     ///
     /// # Errors
-    /// Arrays of other sizes, a grid without room for them, and values that are not finite.
+    /// Arrays of other sizes, a grid that is too small, and values that are not finite.
     pub(super) fn row(
         colours: &[f32],
         grid: Grid<D>,
@@ -157,7 +157,7 @@ impl<const D: usize> Source<D> {
         Ok(this)
     }
 
-    /// Gives the samples their colours.
+    /// Sets the colours of the samples.
     fn colour(&mut self, colours: &[f32]) {
         let (mean, deviation) = spread(colours, self.channels);
         for (look, colour) in self.looks.iter_mut().zip(colours.chunks(self.channels)) {
@@ -167,7 +167,7 @@ impl<const D: usize> Source<D> {
         }
     }
 
-    /// Marks samples beside those of elements: a joint then stays as wide as two samples.
+    /// Marks the samples next to elements, so that joints stay at least two samples wide.
     fn widen(&mut self) {
         for at in 0..self.looks.len() {
             let point = self.grid.point(at);
@@ -185,62 +185,62 @@ impl<const D: usize> Source<D> {
         }
     }
 
-    /// The exemplar's grid.
+    /// Returns the exemplar's grid.
     pub fn grid(&self) -> &Grid<D> {
         &self.grid
     }
 
-    /// Channels that count.
+    /// Returns the number of channels that are used.
     pub(super) fn channels(&self) -> usize {
         self.channels
     }
 
-    /// Whether there are elements.
+    /// Returns whether there are elements.
     pub(super) fn has_elements(&self) -> bool {
         self.sizes.len() > 1
     }
 
-    /// Samples of an element.
+    /// Returns the number of samples of an element.
     pub(super) fn size(&self, element: u32) -> u32 {
         self.sizes[element as usize]
     }
 
-    /// Share of the samples that are of each class.
+    /// Returns the share of the samples in each class.
     pub(super) fn shares(&self) -> &[f64] {
         &self.shares
     }
 
-    /// The class of the sample that a place shows.
+    /// Returns the class of the sample at exemplar coordinates.
     #[inline(always)]
     pub(super) fn class(&self, place: Place<D>) -> usize {
         usize::from(self.looks[self.sample(place)].class)
     }
 
-    /// The element that a place shows, 0 for none.
+    /// Returns the element at exemplar coordinates, 0 for none.
     #[inline(always)]
     pub(super) fn element(&self, place: Place<D>) -> u32 {
         self.looks[self.sample(place)].element
     }
 
-    /// Colours of all samples.
+    /// Returns the colours of all samples.
     pub(super) fn colours(&self) -> impl Iterator<Item = &Colour> {
         self.looks.iter().map(|look| &look.colour)
     }
 
-    /// The colour of a sample.
+    /// Returns the colour of a sample.
     #[inline(always)]
     pub(super) fn colour_at(&self, sample: usize) -> &Colour {
         &self.looks[sample].colour
     }
 
-    /// Cost of seeing two classes side by side; 0 where that is not judged.
+    /// Returns the cost of two neighbouring classes, 0 if classes are not judged.
     #[inline(always)]
     pub(super) fn surprise(&self, a: u8, b: u8) -> f32 {
         let at = usize::from(a) * self.classes + usize::from(b);
         self.costs.get(at).copied().unwrap_or(0.0)
     }
 
-    /// Row-major position of the sample nearest to a place.
+    /// Returns the row-major position of the sample nearest to exemplar coordinates.
     #[inline(always)]
     pub(super) fn sample(&self, place: Place<D>) -> usize {
         let near = nearest(place);
@@ -250,8 +250,9 @@ impl<const D: usize> Source<D> {
         })
     }
 
-    /// What a place shows: its colour between samples, all else of the nearest one. Of volumes with elements that is
-    /// the nearest one's too: measured, cuts are no worse by it, and it takes an eighth of the time.
+    /// Returns the appearance at exemplar coordinates. The colour is interpolated, and the other values are those of
+    /// the nearest sample. In volumes with elements the colour is also that of the nearest sample. This takes an
+    /// eighth of the time, and cuts were measured to be as good.
     #[inline]
     pub(super) fn look(&self, place: Place<D>) -> Look {
         let mut look = self.looks[self.sample(place)];
@@ -261,7 +262,7 @@ impl<const D: usize> Source<D> {
         look
     }
 
-    /// Whether a sample lies between elements.
+    /// Returns whether a sample is outside all elements.
     #[inline(always)]
     pub(super) fn is_bare(&self, sample: usize) -> bool {
         self.looks[sample].depth <= 0.0
@@ -270,7 +271,7 @@ impl<const D: usize> Source<D> {
     #[inline]
     fn interpolate(&self, place: Place<D>) -> Colour {
         let shape = self.grid.shape();
-        // Samples before and after the place, in steps of the row-major order.
+        // These are the samples before and after the coordinates, in steps of the row-major order.
         let (mut at, mut weight) = ([[0; 2]; D], [[0.0; 2]; D]);
         let mut stride = 1;
         for axis in (0..D).rev() {
@@ -307,7 +308,8 @@ impl Look {
     };
 }
 
-/// Mean of each channel, and the mean standard deviation of all; 1 for an exemplar of one colour.
+/// Returns the mean of each channel and the mean standard deviation of all channels, which is 1 for an exemplar of one
+/// colour.
 fn spread(colours: &[f32], channels: usize) -> ([f32; CHANNELS], f32) {
     let n = (colours.len() / channels).max(1) as f64;
     let (mut mean, mut total) = ([0.0f32; CHANNELS], 0.0);

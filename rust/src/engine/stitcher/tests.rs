@@ -1,4 +1,4 @@
-//! The stitcher's parts against slow twins, and what must hold of all that it stitches.
+//! Tests of the stitcher against slow reference implementations, and of properties of its results.
 
 use proptest::prelude::*;
 
@@ -123,7 +123,7 @@ fn the_best_place_is_that_of_a_slow_search() {
 fn a_large_exemplar_is_searched_as_exactly() {
     for wrap in [[false, false], [false, true], [true, true]] {
         let grid = Grid::new([1024, 640], wrap).unwrap();
-        // Noise that is smooth over some samples, as pictures are.
+        // The noise is smooth over some samples, as images are.
         let [rows, columns] = grid.shape().map(|n| n / 4);
         let coarse = noise(3, rows * columns);
         let colours: Vec<f32> = (grid.points())
@@ -178,7 +178,7 @@ proptest! {
                 let at = (axis * 9 + p) * 2;
                 let there = point[axis] < 2;
                 let kept = if seed % 2 == 0 { 0.0 } else { costs[at].min(costs[at + 1]) };
-                // By whether the first and the next one take the patch.
+                // The index tells whether the first and the second point take the patch.
                 pairs.push(if there { [[kept, costs[at]], [costs[at + 1], 0.0]] } else { [[0.0; 2]; 2] });
             }
         }
@@ -321,7 +321,7 @@ fn what_is_given_stays_unless_it_is_loose() {
         assert!(shown != canvas::LOOSE || (points[p] && loose[p]));
         assert_ne!(shown, FREE);
     }
-    // Of what shows another place all around it, patches take much.
+    // Patches take many points if the samples around them are shown from another place.
     let kept = made.patches.iter().filter(|&&p| p == canvas::LOOSE).count();
     assert!(kept < (0..24 * 24).filter(|p| p % 21 == 0).count());
 }
@@ -431,7 +431,7 @@ fn bad_arrays_and_options_are_refused() {
     );
 }
 
-/// What a seam costs, pair by pair.
+/// Returns the cost of a seam, pair by pair.
 fn slow_pair(w: &Weights, source: &Source<2>, l: usize, r: usize, apart: f32) -> f32 {
     let look = |i: usize| source.look(source.grid().point(i).map(|x| x as i32 * ONE));
     let (l, r) = (look(l), look(r));

@@ -1,21 +1,21 @@
-//! What a window of a canvas shows, and what its points may do while patches are tried there.
+//! The content of a window of a canvas, and the choices of its points while patches are tried.
 
 use super::canvas::{Canvas, FREE, HELD, Window};
 use super::source::{CHANNELS, Look, Source};
 use crate::foundation::fixed::Place;
 
-/// What a point of a window must do.
+/// Choices of a point of a window.
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Tie {
-    /// It shows nothing, and will not.
+    /// The point stays empty.
     Out,
     Old,
     New,
     Either,
 }
 
-/// A window, point by point: read many times while patches are tried there.
+/// Content of a window. It is copied from the canvas once and read for every candidate.
 pub(super) struct View<const D: usize> {
     pub places: Vec<Place<D>>,
     pub patches: Vec<u32>,
@@ -23,18 +23,19 @@ pub(super) struct View<const D: usize> {
     pub seams: [Vec<f32>; D],
     /// The sum of all seams.
     pub total: f64,
-    /// Empty where nothing is bent.
+    /// Difference between the patch and the field at each point. Empty if there is one frame for all points.
     pub distortion: Vec<f32>,
-    /// What points cost by themselves that stay as they are; empty where that is nothing.
+    /// Cost of each point that is kept, without its pairs. Empty if these costs are zero.
     pub points: Vec<f32>,
-    /// Of points that show something.
+    /// Appearance of the points that are not empty.
     pub looks: Looks,
-    /// What each point may do when a patch comes that covers some of them.
+    /// Choices of each point if a patch covers the mask.
     pub ties: Vec<Tie>,
 }
 
 impl<const D: usize> View<D> {
-    /// What a window shows where a patch comes that covers a mask. Points of its core must take it; empty for none.
+    /// Returns the content of a window before a patch with a mask is cut in. Points of the core must take the patch; an
+    /// empty core has no points.
     pub(super) fn new(
         canvas: &Canvas<D>,
         window: &Window<D>,
@@ -53,7 +54,7 @@ impl<const D: usize> View<D> {
         view
     }
 
-    /// The same from what the points show, of which none is bent.
+    /// Returns the content of a window from arrays, without bent patches.
     pub(super) fn bare(
         places: Vec<Place<D>>,
         patches: Vec<u32>,
@@ -89,14 +90,14 @@ impl<const D: usize> View<D> {
         }
     }
 
-    /// What a point costs by itself that stays as it is.
+    /// Returns the cost of a point that is kept, without its pairs.
     #[inline(always)]
     pub(super) fn cost(&self, i: usize) -> f32 {
         self.points.get(i).copied().unwrap_or(0.0)
     }
 }
 
-/// What points show, plane by plane, so that rows of pairs are judged in wide registers.
+/// Appearance of points in one array per value, so that rows of pairs are judged with SIMD instructions.
 #[derive(Debug, Default)]
 pub(super) struct Looks {
     colour: [Vec<f32>; CHANNELS],
@@ -106,7 +107,7 @@ pub(super) struct Looks {
 }
 
 impl Looks {
-    /// Makes room for so many points. What points show that are not set is left open.
+    /// Makes room for a number of points. The values of new points are not defined.
     pub(super) fn fit(&mut self, n: usize) {
         for plane in &mut self.colour {
             plane.resize(n, 0.0);
@@ -126,7 +127,7 @@ impl Looks {
         self.class[i] = look.class;
     }
 
-    /// Takes over what a point shows.
+    /// Copies the appearance of a point.
     #[inline(always)]
     pub(super) fn copy(&mut self, i: usize, from: &Self) {
         for c in 0..CHANNELS {
@@ -137,7 +138,7 @@ impl Looks {
         self.class[i] = from.class[i];
     }
 
-    /// How far the colour of a point is from that of a look.
+    /// Returns the difference of colours between a point and an appearance.
     #[inline(always)]
     pub(super) fn distance(&self, i: usize, look: &Look) -> f32 {
         let mut sum = 0.0;
@@ -147,7 +148,7 @@ impl Looks {
         sum
     }
 
-    /// What `n` points in a row show.
+    /// Returns the appearance of `n` points in a row.
     #[inline(always)]
     pub(super) fn row(&self, from: usize, n: usize) -> Row<'_> {
         let to = from + n;
@@ -160,12 +161,12 @@ impl Looks {
     }
 }
 
-/// What the points of a row show.
+/// Appearance of the points of a row.
 #[derive(Clone, Copy)]
 pub(super) struct Row<'a> {
     pub colour: [&'a [f32]; CHANNELS],
     pub depth: &'a [f32],
-    /// 1 in an element and beside one, else 0.
+    /// 1 in an element and next to one, else 0.
     pub beside: &'a [f32],
     pub class: &'a [u8],
 }

@@ -1,32 +1,32 @@
-//! What a seam costs, as far as its user says.
+//! Weights of the costs of seams.
 
 use crate::{Error, Result};
 
-/// What a seam costs.
+/// Weights of the costs of seams.
 #[derive(Debug, Clone, Copy)]
 pub struct Weights {
-    /// Squared differences of the colours on both sides.
+    /// Weight of squared differences of the colours on both sides.
     pub colour: f32,
-    /// Two elements in contact, of whatever colours.
+    /// Cost of two elements in contact, whatever their colours.
     pub contact: f32,
-    /// A jump of the depth: an element that is cut off.
+    /// Cost of a jump of the depth, where an element is cut off.
     pub jump: f32,
-    /// A seam inside of an element, by its depth on both sides.
+    /// Cost of a seam inside an element, by the depth on both sides.
     pub depth: f32,
-    /// An element beside another one's border: joints stay as wide as two samples.
+    /// Cost of an element next to the border of another one, so that joints stay two samples wide.
     pub joint: f32,
-    /// A point that shows none: cuts around elements are shorter, and would leave fewer of them than there are.
+    /// Cost of a point outside all elements. Without it, elements become rarer, because cuts around them are shorter.
     pub presence: f32,
-    /// Classes that are seldom side by side.
+    /// Cost of classes that are rarely adjacent.
     pub surprise: f32,
-    /// A point whose patch is bent against the field.
+    /// Cost of the difference between a bent patch and the field.
     pub distortion: f32,
-    /// A point that does not show what is asked.
+    /// Cost of a point that does not follow the guide.
     pub guide: f32,
 }
 
 impl Weights {
-    /// Nothing costs anything.
+    /// Weights that are all zero.
     pub const NONE: Self = Self {
         colour: 0.0,
         contact: 0.0,

@@ -1,4 +1,4 @@
-//! How well a patch fits at single places, sample by sample.
+//! The cost of a patch at single exemplar coordinates, sample by sample.
 
 use crate::engine::guide::{Guide, UNRELATED};
 use crate::engine::stitcher::canvas::Canvas;
@@ -6,21 +6,21 @@ use crate::engine::stitcher::chart::Chart;
 use crate::engine::stitcher::source::{Colour, Source};
 use crate::foundation::fixed::nearest;
 
-/// Points of a patch that are compared, at most, of those that are known and of those of which something is asked.
+/// Maximum number of points that are compared, both of the known points and of the points with a constraint.
 const POINTS: usize = 1024;
 
-/// What is known of a patch, and what is asked of it.
+/// Known points and constraints of a patch.
 pub(super) struct Fit<'a, const D: usize> {
     source: &'a Source<D>,
-    /// Steps of points from the centre, and what they show.
+    /// Steps of points from the centre, and their colours.
     known: Vec<([i32; D], Colour)>,
-    /// Steps of points from the centre, and which points of the output they are.
+    /// Steps of points from the centre, and their positions in the output.
     asked: Vec<([i32; D], usize)>,
     guide: Option<&'a Guide<'a>>,
 }
 
 impl<'a, const D: usize> Fit<'a, D> {
-    /// Gathers what is known of a chart, and what is asked of it.
+    /// Gathers the known points and the constraints of a chart.
     pub(super) fn new(
         source: &'a Source<D>,
         canvas: &Canvas<D>,
@@ -46,7 +46,8 @@ impl<'a, const D: usize> Fit<'a, D> {
         }
     }
 
-    /// The best place near one, and what it costs: by steps that are halved, from those of blocks of a level.
+    /// Returns the best coordinates near given ones, and their cost. Steps are halved, starting below the blocks of a
+    /// level.
     pub(super) fn settle(
         &self,
         near: [i32; D],
@@ -103,7 +104,7 @@ impl<'a, const D: usize> Fit<'a, D> {
     }
 }
 
-/// Some of many, evenly; never every second column of rows.
+/// Returns evenly spaced values. The step is odd, so that it does not select the same columns in every row.
 fn thin(all: Vec<usize>) -> Vec<usize> {
     let every = all.len().div_ceil(POINTS) | 1;
     all.into_iter().step_by(every).collect()

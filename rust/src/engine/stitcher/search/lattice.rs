@@ -1,4 +1,4 @@
-//! The samples that templates are laid out on: those of an exemplar, or means of blocks of them where it is large.
+//! The lattice of templates: samples of an exemplar, or means of blocks of samples if the exemplar is large.
 
 use crate::foundation::fft::Volumes;
 use crate::foundation::fixed::{Place, nearest};
@@ -10,9 +10,9 @@ const LARGE: usize = 1 << 18;
 /// Blocks of samples, in arrays that have room for transforms.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lattice<const D: usize> {
-    /// Of the blocks.
+    /// Grid of the blocks.
     pub grid: Grid<D>,
-    /// Of the arrays, at least the grid's.
+    /// Shape of the arrays, at least the shape of the grid.
     pub size: [usize; D],
     /// The side of a block is two to this power.
     pub level: u32,
@@ -25,7 +25,7 @@ impl<const D: usize> Lattice<D> {
         while this.grid.len() > LARGE {
             let (shape, wrap) = (this.grid.shape(), this.grid.wrap());
             if (0..D).any(|a| wrap[a] && shape[a] % 2 != 0) {
-                // Blocks would not repeat as the exemplar does.
+                // Blocks would not have the period of the exemplar.
                 break;
             }
             let Ok(half) = Grid::new(shape.map(|n| n.div_ceil(2)), wrap) else {
@@ -44,18 +44,18 @@ impl<const D: usize> Lattice<D> {
         Self { grid, size, level }
     }
 
-    /// Entries of an array.
+    /// Returns the number of entries of an array.
     pub(super) fn points(&self) -> usize {
         self.size.iter().product()
     }
 
-    /// Row-major position in an array.
+    /// Returns the row-major position of a block in an array.
     #[inline(always)]
     pub(super) fn position(&self, block: [usize; D]) -> usize {
         (0..D).fold(0, |at, a| at * self.size[a] + block[a])
     }
 
-    /// Means of what the samples of each block have, in an array.
+    /// Returns the means of values over the samples of each block, in an array.
     pub(super) fn means(&self, samples: &Grid<D>, value: impl Fn(usize) -> f32) -> Vec<f32> {
         let mut out = vec![0.0; self.points()];
         for (i, point) in samples.points().enumerate() {
@@ -73,7 +73,7 @@ impl<const D: usize> Lattice<D> {
         out
     }
 
-    /// Where a step falls in a template whose first block is `first`.
+    /// Returns the position of a step in a template whose first block is `first`.
     #[inline(always)]
     pub(super) fn splat(&self, step: Place<D>, first: [i32; D]) -> Option<usize> {
         let near = nearest(step);
@@ -94,7 +94,7 @@ impl<const D: usize> Lattice<D> {
         Some(at)
     }
 
-    /// The sample that the centre of a template lies at, by its block.
+    /// Returns the sample at the centre of a template, from its block.
     pub(super) fn centre(&self, block: [usize; D], first: [i32; D]) -> [i32; D] {
         std::array::from_fn(|a| (block[a] as i32 - first[a]) << self.level)
     }

@@ -1,10 +1,11 @@
-//! The best places for a patch: those where what is known of it fits best, for all places at once.
+//! The search for a patch: differences between its known points and the exemplar at all coordinates.
 //!
-//! Whatever the chart does to a patch, another place is another shift of the exemplar. So the points that are known
-//! already are written where the chart takes them, into a template of the exemplar's size, and the sum of squared
-//! differences of every shift is a correlation: SSD(s) = corr(E^2, W) - 2 corr(E, W T) + const.
+//! Moving a patch to other exemplar coordinates shifts all its samples equally, whatever its chart. The known points
+//! are therefore written into a template of the exemplar's size. The sum of squared differences of every shift is a
+//! correlation: SSD(s) = corr(E^2, W) - 2 corr(E, W T) + const.
 //!
-//! A large exemplar is searched by blocks of samples first; the best places are then found exactly around the best blocks.
+//! A large exemplar is searched in blocks of samples first. The costs of single samples around the best blocks are then
+//! computed exactly.
 
 mod exact;
 mod lattice;
@@ -23,32 +24,31 @@ use crate::foundation::hash::Noise;
 use exact::Fit;
 use spectra::{Spectra, Template};
 
-/// Places that are tried lie at least so many samples apart.
+/// Minimum distance of two candidates, in samples.
 const APART: i32 = 3;
-/// A neighbour goes on within so many samples of the place where it ends.
+/// Maximum distance, in samples, of a candidate that counts as the continuation of a neighbour.
 const NEAR: i32 = 6;
-/// Points of a neighbour that count as going on.
+/// Minimum number of points of a neighbour that a candidate can continue.
 const FEW: u32 = 12;
-/// What places may fall short of the best by where nothing is there to fit; windows that have nothing to do with each other
-/// differ by 2.
+/// Range of random scores if no point is known. Windows that are not related differ by 2.
 const CHANCE: f32 = 0.1;
-/// How often a place may have been shown beyond the mean, at most, as it counts.
+/// Maximum ratio of the count of a sample to the mean count.
 const OFTEN: f32 = 6.0;
-/// Blocks around which places are looked for, as a multiple of those that are wanted.
+/// Number of blocks whose surroundings are searched for candidates, as a multiple of the number of candidates.
 const BLOCKS: usize = 4;
-/// Values in a row of which the least is kept, so that the next best is found without looking at all again.
+/// Length of runs of values. The minimum of each run is stored, so that the next minimum is found quickly.
 const RUN: usize = 512;
 
-/// What it costs to choose places that others have chosen.
+/// Costs of candidates that repeat other patches.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Charges {
-    /// For places that have been shown more often than others.
+    /// Cost of samples that were shown more often than others.
     pub repetition: f32,
-    /// For going on exactly where a neighbour ends.
+    /// Cost of the exact continuation of a neighbour.
     pub continuation: f32,
 }
 
-/// An exemplar in which places are looked for.
+/// An exemplar that is searched.
 pub(super) struct Index<const D: usize> {
     grid: Grid<D>,
     spectra: Arc<Spectra<D>>,
@@ -58,7 +58,7 @@ pub(super) struct Index<const D: usize> {
     total: f64,
 }
 
-/// What the centre of a patch may look at: the first sample along each axis, and the last.
+/// Exemplar coordinates that the centre of a patch may have: the first sample along each axis, and the last.
 struct Range<const D: usize> {
     low: [i32; D],
     high: [i32; D],
@@ -84,12 +84,12 @@ impl<const D: usize> Index<D> {
         }
     }
 
-    /// The same source, of which nothing has been shown, with other charges.
+    /// Returns an index of the same source without counts, and with other charges.
     pub(super) fn afresh(&self, charges: Charges) -> Self {
         Self::over(self.grid, Arc::clone(&self.spectra), charges)
     }
 
-    /// Notes that a patch of a side has been shown around a sample.
+    /// Counts a patch of a side around a sample.
     pub(super) fn note(&mut self, place: Place<D>, side: f32) {
         let (centre, reach) = (nearest(place), side.ceil() as i32);
         let mut axes: Vec<Vec<(usize, f32)>> = Vec::with_capacity(D);
@@ -138,7 +138,7 @@ impl<const D: usize> Index<D> {
             return Vec::new();
         };
         let lattice = &self.spectra.lattice;
-        // Block i of the template is the place i - first of the centre.
+        // Block i of the template represents the place i - first of the centre.
         let first = range.low.map(|low| (-low) >> lattice.level);
         let Ok(blocks) = Grid::new(
             std::array::from_fn(|a| ((range.high[a] >> lattice.level) + first[a]) as usize + 1),
@@ -158,7 +158,7 @@ impl<const D: usize> Index<D> {
             (asked.as_ref()).map(|(asked, n)| (asked, 2.0 / (*n as f32 * UNRELATED))),
         );
         if points == 0 {
-            // Nothing is there to fit, and many places show what is asked about as well.
+            // No point is known, and many places satisfy the constraint equally well.
             for (k, score) in scores.iter_mut().enumerate() {
                 *score += CHANCE * noise.uniform([0x71, k as u32, 0, 0]) as f32;
             }
@@ -179,7 +179,7 @@ impl<const D: usize> Index<D> {
         self.part(found, count)
     }
 
-    /// What the centre of a patch may look at.
+    /// Returns the exemplar coordinates that the centre of a patch may have.
     fn range(&self, chart: &Chart<D>) -> Option<Range<D>> {
         let (least, most) = extent(chart)?;
         let low = least.map(|x| -(x >> BITS));
@@ -194,7 +194,7 @@ impl<const D: usize> Index<D> {
         Some(Range { low, high })
     }
 
-    /// The points of a chart that are known.
+    /// Writes the known points of a chart into a template.
     fn splat_known(
         &self,
         source: &Source<D>,
@@ -218,7 +218,7 @@ impl<const D: usize> Index<D> {
         (template, points)
     }
 
-    /// What is asked of the points of a chart; none where nothing is.
+    /// Writes the constraints of a chart into a template, if there are any.
     fn splat_asked(
         &self,
         guide: &Guide<'_>,
@@ -244,7 +244,7 @@ impl<const D: usize> Index<D> {
         (points > 0).then_some((template, points))
     }
 
-    /// The places at which the patches around a chart would go on.
+    /// Returns the exemplar coordinates where a chart would continue the patches around it.
     fn continuations(&self, canvas: &Canvas<D>, chart: &Chart<D>) -> Vec<[i32; D]> {
         let mut seen: Vec<(u32, u32, [i32; D])> = Vec::new();
         for (i, &p) in chart.window.points.iter().enumerate() {
@@ -266,7 +266,7 @@ impl<const D: usize> Index<D> {
         seen.iter().filter(|s| s.1 >= FEW).map(|s| s.2).collect()
     }
 
-    /// What it costs that a place has been shown more often than others.
+    /// Returns the cost of a sample that was shown more often than others.
     fn repetition(&self, centre: [i32; D]) -> f32 {
         let mean = (self.total / self.grid.len() as f64) as f32;
         if self.charges.repetition == 0.0 || mean == 0.0 {
@@ -276,7 +276,7 @@ impl<const D: usize> Index<D> {
         self.charges.repetition * (self.shown[self.grid.index(at)] / mean).min(OFTEN)
     }
 
-    /// All that it costs to choose a place, however well it fits.
+    /// Returns the cost of a candidate that does not depend on its fit.
     fn charge(&self, centre: [i32; D], continued: &[[i32; D]]) -> f32 {
         let goes_on = continued
             .iter()
@@ -285,7 +285,7 @@ impl<const D: usize> Index<D> {
         self.repetition(centre) + self.charges.continuation * goes_on as f32
     }
 
-    /// Whether two samples lie within so many of each other along each axis.
+    /// Returns whether the distance of two samples is at most `reach` along each axis.
     fn within(&self, a: [i32; D], b: [i32; D], reach: i32) -> bool {
         (0..D).all(|axis| {
             let (n, apart) = (self.grid.shape()[axis] as i32, (a[axis] - b[axis]).abs());
@@ -298,7 +298,7 @@ impl<const D: usize> Index<D> {
         })
     }
 
-    /// The centres with the least scores and their charges, apart from each other.
+    /// Returns the centres with the lowest sums of scores and charges, at a minimum distance from each other.
     fn pick(
         &self,
         scores: &[f32],
@@ -352,7 +352,7 @@ impl<const D: usize> Index<D> {
         found
     }
 
-    /// The first of some places that lie apart from each other.
+    /// Returns the first coordinates that have a minimum distance from each other.
     fn part(&self, sorted: Vec<([i32; D], f32)>, count: usize) -> Vec<Place<D>> {
         let mut found: Vec<[i32; D]> = Vec::with_capacity(count);
         for (centre, _) in sorted {
@@ -363,7 +363,7 @@ impl<const D: usize> Index<D> {
         found.into_iter().map(|c| c.map(|x| x * ONE)).collect()
     }
 
-    /// Calls `f` with each position of a box around a block, around the exemplar's cyclic axes.
+    /// Calls `f` with each position of a box around a block, which wraps along the exemplar's periodic axes.
     fn around(&self, blocks: &Grid<D>, at: [i32; D], reach: i32, mut f: impl FnMut(usize)) {
         let (width, all) = (2 * reach + 1, &self.spectra.lattice.grid);
         for k in 0..(width as usize).pow(D as u32) {
@@ -386,7 +386,7 @@ impl<const D: usize> Index<D> {
 }
 
 impl<const D: usize> Range<D> {
-    /// The nearest sample that the centre may look at.
+    /// Returns the nearest sample that the centre may have.
     fn bring(&self, at: [i32; D], grid: &Grid<D>) -> [i32; D] {
         std::array::from_fn(|a| {
             let n = grid.shape()[a] as i32;
@@ -399,13 +399,13 @@ impl<const D: usize> Range<D> {
     }
 }
 
-/// The least of some values, and where the first of such is.
+/// Returns the minimum of some values, and its first position.
 fn least(values: &[f32]) -> (f32, usize) {
     let low = values.iter().fold(f32::INFINITY, |a, &b| a.min(b));
     (low, values.iter().position(|&v| v == low).unwrap_or(0))
 }
 
-/// The least and the largest step of a chart along each axis.
+/// Returns the smallest and the largest step of a chart along each axis.
 fn extent<const D: usize>(chart: &Chart<D>) -> Option<(Place<D>, Place<D>)> {
     let mut ends: Option<(Place<D>, Place<D>)> = None;
     for (step, _) in chart.steps.iter().zip(&chart.mask).filter(|(_, m)| **m) {

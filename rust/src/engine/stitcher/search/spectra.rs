@@ -1,4 +1,4 @@
-//! Sums of squared differences of a template and an exemplar, at every shift, by transforms.
+//! Sums of squared differences of a template and an exemplar at every shift, by Fourier transforms.
 
 use super::lattice::Lattice;
 use crate::engine::guide::Guide;
@@ -6,12 +6,12 @@ use crate::engine::stitcher::source::{CHANNELS, Source};
 use crate::foundation::fft::{Complex, Volumes};
 use crate::foundation::grid::Grid;
 
-/// Distance of levels of what is asked, at most: between them costs are interpolated.
+/// Maximum distance of the levels of a constraint. Costs between levels are interpolated.
 const LEVEL: f32 = 160.0;
 
 type Spectrum = Vec<Complex<f32>>;
 
-/// An exemplar, transformed.
+/// Spectra of an exemplar.
 pub(super) struct Spectra<const D: usize> {
     pub lattice: Lattice<D>,
     plan: Volumes,
@@ -25,21 +25,21 @@ struct Squares {
     squares: Spectrum,
 }
 
-/// What is asked, as it is compared.
+/// Data with which a constraint is compared.
 enum Asked {
-    /// By squared differences.
+    /// Spectra for squared differences.
     Squares(Squares),
-    /// By any cost: what samples cost where the first value of a level is wanted.
+    /// Spectra for other costs: the cost of each sample if the first value of a level is requested.
     Levels {
         /// The first level.
         low: f32,
-        /// From one to the next.
+        /// Difference of two levels.
         step: f32,
         costs: Vec<Spectrum>,
     },
 }
 
-/// Values with weights, in the exemplar's frame.
+/// Values with weights, in the coordinates of the exemplar.
 pub(super) struct Template {
     weight: Vec<f32>,
     values: Vec<Vec<f32>>,
@@ -68,12 +68,12 @@ impl<const D: usize> Spectra<D> {
         }
     }
 
-    /// A template of colours, with nothing in it.
+    /// Returns an empty template of colours.
     pub(super) fn template(&self) -> Template {
         Template::new(self.lattice.points(), self.colours.values.len())
     }
 
-    /// A template of what is asked; none where nothing is.
+    /// Returns an empty template of the constraint, if there is one.
     pub(super) fn template_asked(&self) -> Option<Template> {
         let channels = match self.guide.as_ref()? {
             Asked::Squares(squares) => squares.values.len(),
@@ -82,7 +82,7 @@ impl<const D: usize> Spectra<D> {
         Some(Template::new(self.lattice.points(), channels))
     }
 
-    /// Adds what is asked to a template of it.
+    /// Adds a constraint to a template.
     #[inline]
     pub(super) fn ask(
         &self,
@@ -103,8 +103,7 @@ impl<const D: usize> Spectra<D> {
         }
     }
 
-    /// What each shift costs, less what is the same for all: by the colours of a template and by what is asked, each
-    /// times a scale.
+    /// Returns the cost of each shift without its constant part. Colours and constraints have a scale each.
     pub(super) fn scores(
         &self,
         colours: Option<(&Template, f32)>,
@@ -128,7 +127,7 @@ impl<const D: usize> Spectra<D> {
         self.plan.inverse(out)
     }
 
-    /// Adds the spectrum of the sums of squared differences to a template, less what is the same for all.
+    /// Adds the spectrum of the sums of squared differences, without their constant part.
     fn correlate(
         &self,
         squares: &Squares,
@@ -149,7 +148,7 @@ impl<const D: usize> Spectra<D> {
         }
     }
 
-    /// Adds the spectrum of the sums of costs of samples, by the weights of a template.
+    /// Adds the spectrum of the sums of sample costs with the weights of a template.
     fn correlate_cost(
         &self,
         cost: &Spectrum,
