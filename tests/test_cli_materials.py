@@ -259,7 +259,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: is for materials"),
         ("design rock rock/rock_albedo.png -o new", "either all are materials or none is"),
         ("design rock -o mine", "mine/rock_albedo.png is there already"),
-        ("design same -o same", "--out: same is read, and would hold other maps beside its own"),
+        ("design same -o same", "--out: same is read, and would then contain other maps"),
         ("tile rock -o new --mipmaps links/../rock", "rock is read, and would hold other maps"),
         ("tile uneven -o new", "uneven: all must have one size; height has"),
         ("design rock -o links", "is read as rock/rock_albedo.png, and would be lost"),

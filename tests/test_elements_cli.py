@@ -153,7 +153,7 @@ def test_database(here: Path, capsys: Capture) -> None:
         ("analyse in.png -o before.png", "--out: needs a name that ends in .npz"),
         ("analyse none.png -o before.npz", "none.png: there is no such file"),
         ("database db rename", "add\\|list\\|remove\\|splice\\|matrix: must be one of"),
-        ("database db list", "db: there is no such folder"),
+        ("database db list", "db: the folder does not exist"),
         ("database db add", "IMAGE: add needs images"),
         ("database in.png add in.png", "in.png: no folder"),
         ("database db add in.png mask.png --name both", "IMAGE: --name"),

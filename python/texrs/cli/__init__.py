@@ -1,10 +1,10 @@
 """The command ``texrs``.
 
-Results go to files and, where they are text, to stdout; progress and errors go to stderr. Exit codes: 0 done,
-1 internal error, 2 bad input or usage, 3 some of a batch failed, 130 stopped by Ctrl-C. What can be checked is checked before
-the work begins, and files are written whole or not at all, so that a failure leaves what was there.
+Results go to files, and text results to stdout. Progress and errors go to stderr. Exit codes: 0 done, 1 internal
+error, 2 bad input or usage, 3 some jobs of a batch failed, 130 stopped by Ctrl-C. Inputs are checked before the work
+begins as far as possible. Files are written whole or not at all, so that a failure keeps the existing files.
 
-A command is made when it is asked for, so that no other's libraries are loaded.
+A command is created when it is used, so that the libraries of other commands are not loaded.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "compare": "Compare methods, of texrs and of others that are installed, on pictures: a page of results and figures.",
     },
 }
-"""All commands, and what they are for, as the help shows them."""
+"""All commands and their purposes, as the help shows them."""
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 NAMES.update(COMMANDS)
 
@@ -115,7 +115,7 @@ def load(name: str) -> Callable[..., None]:
 
 
 def make_command(name: str) -> Any:
-    """Return a command, which can be limited; one that writes can also be told to replace whatever is there."""
+    """Return a command with the options of limits. A command that writes files also gets ``--force``."""
     from texrs.cli._limits import limit, list_parameters
     from texrs.cli._options import as_command, make_parameter
     from texrs.cli._outputs import OUTPUTS, Command, Force
@@ -127,7 +127,7 @@ def make_command(name: str) -> Any:
     ours = {p.name for p in (*limits, *forced)}
 
     def limited(**given: Any) -> None:
-        # The command itself sees to what may be replaced, before the work.
+        # The command itself checks before the work which files it may replace.
         with limit(**{p.name: given[p.name] for p in limits}, quiet=given.get("quiet", False)):
             work(**{name: value for name, value in given.items() if name not in ours})
 
@@ -138,27 +138,27 @@ def make_command(name: str) -> Any:
 
 
 class Group(TyperGroup):
-    """All commands, of which one is made when it is asked for."""
+    """Group of all commands. A command is created on demand."""
 
     make_command = staticmethod(make_command)
-    """Makes a command, in any process."""
+    """Function that creates a command, in any process."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Make a command; None where there is none of this name."""
+        """Create a command. Return None if no command has this name."""
         return make_command(cmd_name) if cmd_name in COMMANDS else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that is asked for; of a mistyped one, refuse it with the name that is most similar."""
+        """Return the requested command. Refuse a mistyped one and suggest the most similar name."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             ctx.fail(f"No such command {args[0]!r}{suggest(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List the commands without making them."""
+        """List the commands without creating them."""
         for title, group in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl(list(group.items()))
@@ -180,7 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        What comes after ``texrs``; by default what the shell gave.
+        Arguments after ``texrs``. By default those from the shell.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""The command that does another for many pictures, seeds and presets: ``texrs batch``.
+"""The command that runs another command for many images, seeds and presets: ``texrs batch``.
 
-Each result is written as soon as it is made, whole or not at all, and says how it was made. So a batch that was stopped, even
-by a power cut, goes on where it was when the same command is given again: what was made in the same way is left alone.
+Each result is written whole as soon as it is ready, with a record of its command. The same batch command therefore
+continues a batch that was stopped, even by a power cut. Results of the same command are kept.
 """
 
 from __future__ import annotations
@@ -59,26 +59,26 @@ from texrs.materials import Material
 CELL = 256
 """Side of a cell of the contact sheet."""
 NOT_ONE = ("batch", "rerun", "info", "demo", "samples", "database")
-"""Commands that do not write one file from others."""
+"""Commands that do not write one file from other files."""
 THERE, MADE = "is there", "wrote"
-"""What became of a job; anything else is why it failed."""
+"""States of a job: its result exists, or was written now. Any other text is the reason of its failure."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a job, in any process."""
+    """Outcome of a job, in any process."""
 
     said: str
     ignored: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
 
     def show(self) -> str:
-        """Return the notices of the job as the end of a line."""
+        """Return the notices of the job for the end of its line."""
         parts = [f"{title}: {'; '.join(lines)}" for title, lines in self.list_notices() if lines]
         return f" ({'; '.join(parts)})" if parts else ""
 
     def list_notices(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        """Return the notices by their title."""
+        """List the notices by title."""
         return ("ignored", self.ignored), ("assumed", self.assumed)
 
 
@@ -87,7 +87,7 @@ def batch_command(
     what: Annotated[str, make_argument("RECIPE.toml|VERB", "A recipe, or a command that makes one file.")],
     inputs: Annotated[
         list[str] | None,
-        make_argument("INPUT", "Files, patterns such as 'stones/*.jpg', or folders, with all folders in them."),
+        make_argument("INPUT", "Files, patterns such as 'stones/*.jpg', or folders with their subfolders."),
     ] = None,
     folder: Annotated[
         str | None,
@@ -98,28 +98,32 @@ def batch_command(
             help="Folder for the results, or a name such as 'made/{folder}/{name}-{seed}.png'.",
         ),
     ] = None,
-    seeds: Annotated[str | None, make_option("A:B", "Seeds from A to B - 1, as in 0:32, or some, as in 1,5,9.")] = None,
+    seeds: Annotated[
+        str | None, make_option("A:B", "Seeds from A to B - 1, such as 0:32, or a list, such as 1,5,9.")
+    ] = None,
     options: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="OPTION=VALUE", help="Option of the command, as in size=512; may be repeated."),
+        typer.Option("--set", metavar="OPTION=VALUE", help="Option of the command, such as size=512. May be repeated."),
     ] = None,
     argument: Annotated[
         list[str] | None,
         typer.Option(
             metavar="TEXT",
-            help="Further argument of the command, as in mask.png or 'masks/{name}.png'; may be repeated.",
+            help="Further argument of the command, such as mask.png or 'masks/{name}.png'. May be repeated.",
         ),
     ] = None,
     sheet: Annotated[str | None, to_write("sheet")] = None,
     workers: Annotated[
         int | None,
-        typer.Option(metavar="N", help="So many processes share the work.", show_default=False, rich_help_panel=WORK),
+        typer.Option(
+            metavar="N", help="Number of processes that share the work.", show_default=False, rich_help_panel=WORK
+        ),
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="The workers of a cluster of Dask share it, on the same disk.",
+            help="Address of a Dask cluster whose workers share the work, on the same disk.",
             show_default=False,
             rich_help_panel=WORK,
         ),
@@ -127,7 +131,7 @@ def batch_command(
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Do a command for many pictures, seeds and presets; what is done already is not done again."""
+    """Run a command for many images, seeds and presets. Existing results are kept."""
     start, who = time.monotonic(), read_scheduler(workers, scheduler)
     running = _provenance.RUNNING.get()
     more = ["--force"] * bool(running and running.force) + ["--strict"] * bool(context.params.get("strict"))
@@ -137,7 +141,7 @@ def batch_command(
         if inputs:
             raise InvalidInput(f"INPUT: a recipe says which, got {inputs[0]!r}")
         base, said = os.path.dirname(what) or ".", read_recipe(what)
-        # What is given here is seen from here.
+        # Paths on the command line are relative to the current folder.
         over |= {key: os.path.abspath(over[key]) for key in ("out", "sheet") if over[key] is not None}
     else:
         base, said = ".", {"verb": what, "inputs": inputs or []}
@@ -177,7 +181,7 @@ def batch_command(
 
 
 def make_context(command: Any, verb: str, words: list[str]) -> Any:
-    """Return the values of a job's options; say how a batch is given an argument that is missing."""
+    """Return the values of a job's options. Explain how a batch states a missing argument."""
     try:
         return command.make_context(verb, words)
     except UsageFailure as failure:
@@ -191,7 +195,10 @@ def make_context(command: Any, verb: str, words: list[str]) -> Any:
 
 
 def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: bool) -> tuple[list[tuple[Job, str]], int]:
-    """Do the jobs that are not done; return those that failed, and why, and how many ignored a part of an input."""
+    """Run the jobs without a result.
+
+    Return the failed jobs with reasons, and the number of jobs that ignored a part of an input.
+    """
     failed: dict[int, str] = {}
     total, over, partly = len(work.jobs), 0, 0
     try:
@@ -217,32 +224,35 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
 
 
 _ALONE = threading.Lock()
-"""A command has the process to itself, its folder above all; a worker of a cluster may have several threads."""
+"""Lock of the process for a command, mainly because of its current folder.
+
+A worker of a cluster may have several threads.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Does the jobs of a batch, in any process."""
+    """Runs the jobs of a batch, in any process."""
 
     load: Callable[[str], Any]
-    """Makes a command."""
+    """Function that creates a command."""
     verb: str
     jobs: list[Job]
     more: list[str]
-    """Words of all commands."""
+    """Arguments that all commands get."""
     folder: str
-    """Names are seen from there."""
+    """Folder that names are relative to."""
     limited: bool
-    """Whether commands use as many threads as are in force."""
+    """If True, commands use the number of threads in force."""
 
     def __call__(self, number: int) -> Outcome:
-        """Do a job, if it is not done; return what became of it, and its notices."""
+        """Run a job if its result is missing. Return its outcome and its notices."""
         with _ALONE, silence_warnings(), collect() as notices:
             said = self.attempt(self.jobs[number])
         return Outcome(said, tuple(notices.ignored), tuple(notices.assumed))
 
     def attempt(self, job: Job) -> str:
-        """Do a job, if it is not done; return what became of it."""
+        """Run a job if its result is missing. Return its outcome."""
         try:
             with inside(self.folder), hush():
                 return self.do(job)
@@ -252,13 +262,13 @@ class Work:
             return "needs more memory than there is"
         except (TexrsError, OSError) as error:
             return say_error(error)
-        except Exception as error:  # One that is broken does not stop the others.
+        except Exception as error:  # A broken job does not stop the others.
             if isinstance(error, typer.Abort):
                 raise
             return f"internal error: {type(error).__name__}: {error}"
 
     def do(self, job: Job) -> str:
-        """Do a job, if it is not done."""
+        """Run a job if its result is missing."""
         command, more = self.load(self.verb), list(self.more)
         if self.limited and any(p.name == "count" for p in command.params):
             more += ["--threads", str(count_threads())]
@@ -271,14 +281,14 @@ class Work:
 
 
 def is_done(command: Any, context: Any, job: Job) -> bool:
-    """Return whether all that a command writes is there, and was made as it would be now."""
+    """Return whether all outputs of a command exist and were made as they would be made now."""
     record = _provenance.make_record(command, context.params, force=False)
     for option in ("out", "source_map", "page"):
         path = context.params.get(option)
         if path is None:
             continue
         if option == "out" and io.is_store(path):
-            # What is in it already its writer knows, chunk by chunk.
+            # The writer of a store keeps track of its chunks.
             return False
         if option == "out" and os.path.isdir(path):
             packed = any(context.params.get(option) is not None for option in ("pack", "convention"))
@@ -296,7 +306,7 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
 
 
 def is_folder_done(record: _provenance.Record, folder: str, least: int) -> bool:
-    """Return whether so many maps or more are in a folder, all made as they would be now."""
+    """Return whether a folder has at least a number of maps, all made as they would be made now."""
     count = 0
     for path in _provenance.list_folder(folder):
         made = io.read_metadata(path).made
@@ -316,7 +326,7 @@ def is_folder_done(record: _provenance.Record, folder: str, least: int) -> bool:
 
 @contextmanager
 def inside(folder: str) -> Iterator[None]:
-    """Work in a folder: names in a recipe are seen from where it lies."""
+    """Work in a folder: names in a recipe are relative to the recipe's folder."""
     before = os.getcwd()
     os.chdir(folder)
     try:
@@ -326,7 +336,7 @@ def inside(folder: str) -> Iterator[None]:
 
 
 def draw_sheet(paths: Sequence[str]) -> Array:
-    """Return pictures side by side, each as large as fits a cell; what is missing is grey."""
+    """Return images side by side, each fitted into a cell. Missing images are grey."""
     columns = int(np.ceil(np.sqrt(len(paths))))
     sheet = np.full((-(-len(paths) // columns) * CELL, columns * CELL, 3), 64, np.uint8)
     for i, path in enumerate(paths):
@@ -341,7 +351,7 @@ def draw_sheet(paths: Sequence[str]) -> Array:
 
 
 def read_shown(path: str) -> Array:
-    """Read a picture, or the middle plane of a volume."""
+    """Read an image, or the middle plane of a volume."""
     if os.path.isdir(path) and not io.is_store(path):
         return Material.read(path).preview(tiles=(1, 1), side=CELL)
     try:

@@ -22,7 +22,7 @@ from texrs.tiling._borders import SEEN
 
 COPIES = (2, 2)
 BORDERS = {"rows": "bottom to top", "columns": "right to left"}
-"""The axes along which an image tiles, and the border of each."""
+"""Axes along which an image tiles, and the border of each."""
 
 
 def check_command(
@@ -36,11 +36,11 @@ def check_command(
             show_default="only the borders are checked",
         ),
     ] = None,
-    out: Annotated[str | None, to_write("out", text="Picture of 2 x 2 copies to write.")] = None,
+    out: Annotated[str | None, to_write("out", text="Image of 2 x 2 copies to write.")] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Test whether an image tiles along each axis, and how bold its borders and seams are."""
+    """Test whether an image tiles along each axis, and measure the visibility of its borders and seams."""
     if out is not None:
         _outputs.check_output(out)
     given = read_example(file, About(), single=False)
@@ -61,7 +61,7 @@ def check_command(
 
 
 def list_borders(found: Tiling) -> list[str]:
-    """Return a line about each axis."""
+    """Return a line for each axis."""
     lines = []
     for (axis, border), tiles, seam, place in zip(BORDERS.items(), found.tiles, found.seam, found.place, strict=True):
         if seam is None or place is None:
@@ -76,7 +76,7 @@ def list_borders(found: Tiling) -> list[str]:
 
 
 def tell_tiling(result: Synthesis) -> str:
-    """Return how bold borders and seams of a result are, what was changed, and the reason for another size."""
+    """Return the visibility of borders and seams of a result, the changes, and the reason for another size."""
     report = result.report
     said = []
     if "in_place" in report:

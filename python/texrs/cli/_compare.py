@@ -16,36 +16,40 @@ from texrs.cli._readers import read_picture
 from texrs.errors import InvalidInput
 
 USUAL = ("pebbles", "leaves_and_flowers", "bricks", "weave", "bark", "dots", "brick", "gravel", "grass", "coins")
-"""What is compared where nothing is said: generated examples, and photographs."""
+"""Default images of the comparison: generated examples and photographs."""
 SHOWN = ("more", "tile", "hole")
 
 
 def compare_command(
     pictures: Annotated[
-        list[str] | None, make_argument("FILE", "Pictures, or sample:NAME; ten of the built-in examples by default.")
+        list[str] | None, make_argument("FILE", "Images, or sample:NAME. Default: ten built-in examples.")
     ] = None,
-    out: Annotated[str, to_write("out", "OUT.html", "Page to write: one file that holds all of it.")] = "",
+    out: Annotated[str, to_write("out", "OUT.html", "Page to write, as one file.")] = "",
     task: Annotated[
-        list[str] | None, make_option("|".join(SHOWN), "What is compared, repeatable; all by default.")
+        list[str] | None, make_option("|".join(SHOWN), "Task to compare. May be repeated. Default: all.")
     ] = None,
-    crop: Annotated[int, typer.Option(help="Pixels a side of what is taken of the middle of each picture.")] = 128,
+    crop: Annotated[int, typer.Option(help="Side of the crop from the middle of each image, in pixels.")] = 128,
     larger: Annotated[
-        int | None, make_option(None, "Pixels a side of the larger textures; half as many again by default.")
+        int | None, make_option(None, "Side of the larger textures in pixels. Default: 1.5 times the example.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of all methods that have one.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of all methods that have one.")] = 0,
     program: Annotated[
         list[str] | None,
-        make_option("NAME=PATH", "Where a program of others is: embark or resynthesizer; repeatable."),
+        make_option("NAME=PATH", "Path of another program: embark or resynthesizer. May be repeated."),
     ] = None,
     timed: Annotated[
-        bool, typer.Option("--seconds/--no-seconds", help="Say how long each took; without, the same bytes each time.")
+        bool,
+        typer.Option(
+            "--seconds/--no-seconds",
+            help="Report the time of each method. Without times the page has the same bytes each time.",
+        ),
     ] = True,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Compare methods, of texrs and of others that are installed, on pictures: a page of results and figures."""
+    """Compare methods of texrs and of other installed programs on images: a page of results and figures."""
     start = time.monotonic()
-    # Which needs the verbs.
+    # Import here, because this loads all verbs.
     from texrs.comparison import compare
 
     if not out:

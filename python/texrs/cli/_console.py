@@ -1,4 +1,4 @@
-"""How commands meet the shell: exit codes, errors of one line, signals and progress."""
+"""Connection of commands to the shell: exit codes, one-line errors, signals and progress."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ from texrs._progress import show_lines
 from texrs.errors import TexrsError
 
 if TYPE_CHECKING:
-    # Numpy would come with it.
+    # Import the typing names only here, because they would load NumPy.
     from texrs._typing import Progress
 
 DONE, INTERNAL, BAD_INPUT, PARTLY = 0, 1, 2, 3
-"""Exit codes; a command that a signal ends has 128 plus the signal's number, so 130 for Ctrl-C."""
+"""Exit codes. A command that a signal ends has 128 plus the number of the signal, so 130 for Ctrl-C."""
 TRACEBACK = "TEXRS_TRACEBACK"
-"""Environment variable that asks for the traceback of an internal error."""
+"""Environment variable that requests the traceback of an internal error."""
 PIPE = int(getattr(signal, "SIGPIPE", 13))
-"""Windows knows no such signal, but pipes that break."""
+"""SIGPIPE. Windows does not have this signal, but pipes can break."""
 GRACE = 1.0
-"""Seconds after a signal in which others are ignored."""
+"""Seconds after a signal during which further signals are ignored."""
 
-# The root of what typer raises on wrong usage. It is click's class or typer's own copy of it, by typer's version.
+# Base class of the exceptions that typer raises on wrong usage. It is click's class or typer's own copy, depending on
+# the version of typer.
 UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
 
 
@@ -50,14 +51,14 @@ PYTHON = {
     r"texrs\.io\.read_volume reads \w+(?: as a volume)?": "texrs slice and texrs solid take volumes",
     r"a mask, 'alpha', or an image that is a masked array": "a mask, or 'alpha'",
 }
-"""Words of errors and help texts for Python, and those of the command line."""
+"""Python words of errors and help texts, and the words of the command line."""
 _HUSHED: ContextVar[bool] = ContextVar("hushed", default=False)
 KEPT: list[str] = []
-"""Files of a batch that are done, which stay when the rest fails."""
+"""Finished files of a batch, which are kept if the rest fails."""
 
 
 class Stopped(BaseException):
-    """A signal ended the work. No KeyboardInterrupt, from which typer makes an exit of its own."""
+    """A signal ended the work. This is not a KeyboardInterrupt, because typer handles that by itself."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -65,7 +66,7 @@ class Stopped(BaseException):
 
 
 def run(work: Callable[[], object]) -> int:
-    """Do the work of a command and return its exit code; say on one line of stderr what went wrong, and on one what is done."""
+    """Run a command and return its exit code. Print one line on stderr about an error, or about the result."""
     KEPT.clear()
     code = _run(work)
     if code not in (DONE, PARTLY) and KEPT:
@@ -75,7 +76,7 @@ def run(work: Callable[[], object]) -> int:
 
 
 def keep(path: str) -> None:
-    """Tell that a file of a batch is done."""
+    """Record that a file of a batch is finished."""
     KEPT.append(path)
 
 
@@ -106,7 +107,7 @@ def _run(work: Callable[[], object]) -> int:
         name = f"{error.filename}: " if isinstance(error.filename, str) else ""
         complain(f"{name}{(error.strerror or str(error)).lower()}")
         code = BAD_INPUT
-    except BaseException as error:  # A panic of the compiled part is no Exception.
+    except BaseException as error:  # A panic of the compiled part is not an Exception.
         if os.environ.get(TRACEBACK, "0") not in ("", "0"):
             traceback.print_exception(error)
         else:
@@ -121,13 +122,13 @@ def say(line: str) -> None:
     try:
         print(line, flush=True)
     except BrokenPipeError:
-        # Not left to typer, which would make an error of it.
+        # Handle a broken pipe here, because typer would report it as an error.
         raise Stopped(PIPE) from None
 
 
 @contextmanager
 def hush() -> Iterator[None]:
-    """Let commands within not say what they did: they work for another."""
+    """Suppress the result lines of commands that run inside another one."""
     token = _HUSHED.set(True)
     try:
         yield
@@ -136,15 +137,15 @@ def hush() -> Iterator[None]:
 
 
 def note(line: str, *, quiet: bool) -> None:
-    """Print what was done, unless nobody wants to know."""
+    """Print a result line, unless ``--quiet`` is given."""
     if not quiet and not _HUSHED.get():
         complain(line)
 
 
 def say_sizes(message: str) -> str:
-    """Return what an error says with sizes as options take them: the width first.
+    """Return an error text with sizes in the order of options: the width first.
 
-    Functions take rows first, and so speak their errors. Those that speak of arrays of any shape do not mean sizes.
+    Functions take rows first, and their errors use this order. Errors about arrays of any shape are not about sizes.
 
     Examples
     --------
@@ -161,7 +162,7 @@ def say_sizes(message: str) -> str:
 
     def turn(found: re.Match[str]) -> str:
         sides = [n.strip() for n in found[1].split(",")]
-        # No volume is as thin as a pixel has channels.
+        # The last number of a shape may be the number of channels. No volume has so few planes.
         channels = sides.pop() if len(sides) > 2 and int(sides[-1]) <= MOST_CHANNELS else ""
         many = f" with {channels} channel{'s' if channels != '1' else ''}" if channels else ""
         return " x ".join(reversed(sides)) + many
@@ -170,7 +171,7 @@ def say_sizes(message: str) -> str:
 
 
 def name_commands(message: str) -> str:
-    """Return a text that names the commands, not the functions of Python that they stand for.
+    """Return a text with the names of commands in place of Python functions.
 
     Examples
     --------
@@ -189,16 +190,16 @@ def name_commands(message: str) -> str:
 
 
 EXTRA_PLACES = re.compile(r"extra argument.*\(-?[\d.]+,-?[\d.]+\b")
-"""Message about places that a shell has taken apart."""
+"""Message about coordinates that the shell has split."""
 
 
 def say_error(error: Exception) -> str:
-    """Return what an error says, in the words of the command line."""
+    """Return the text of an error in the words of the command line."""
     return name_commands(say_sizes(str(error)))
 
 
 def suggest(word: str, known: Iterable[str]) -> str:
-    """Return a question about the known word that is most similar to another; nothing if none is similar.
+    """Return a question about the most similar known word, or nothing if none is similar.
 
     Examples
     --------
@@ -213,7 +214,7 @@ def suggest(word: str, known: Iterable[str]) -> str:
 
 
 def complain(message: str) -> None:
-    """Print one line to stderr, whatever the message holds: it may quote the name of a file."""
+    """Print one line to stderr. The message may contain any characters, for example a file name."""
     text = " ".join(message.split())
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
     with suppress(OSError, ValueError):
@@ -222,13 +223,13 @@ def complain(message: str) -> None:
 
 @contextmanager
 def raise_on_signals() -> Iterator[None]:
-    """Let Ctrl-C and requests to end raise `Stopped`, so that all that is half-written is removed."""
+    """Raise `Stopped` on Ctrl-C and on termination requests, so that half-written files are removed."""
     last = -math.inf
 
     def stop(number: int, frame: FrameType | None) -> None:
         nonlocal last
         now = time.monotonic()
-        # Impatient repetition must not stop the removal of files.
+        # Repeated signals must not stop the removal of files.
         if now - last > GRACE:
             last = now
             raise Stopped(number)
@@ -237,7 +238,7 @@ def raise_on_signals() -> Iterator[None]:
     if threading.current_thread() is threading.main_thread():
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             number = getattr(signal, name, None)
-            # What is ignored stays ignored: nohup, and jobs in the background of a script.
+            # Signals that are ignored stay ignored: nohup, and background jobs of a script.
             if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
                 before[number] = signal.signal(number, stop)
     try:
@@ -249,7 +250,7 @@ def raise_on_signals() -> Iterator[None]:
 
 @contextmanager
 def silence_warnings() -> Iterator[None]:
-    """Keep warnings, which speak to programmers, off the terminal unless Python was asked for them."""
+    """Hide warnings for programmers on the terminal, unless Python was asked to show them."""
     with warnings.catch_warnings():
         if not sys.warnoptions:
             warnings.simplefilter("ignore")
@@ -285,9 +286,9 @@ def _show_bar() -> Iterator[Progress]:
 
 
 def _end_stopped(number: int) -> int:
-    """Return the exit code of a command that a signal ended; a broken pipe is no news to anybody."""
+    """Return the exit code of a command that a signal ended. A broken pipe is not reported."""
     if number == PIPE:
-        # What is still buffered has nowhere to go, and Python would complain of that at its end.
+        # Drop the buffered output, because Python would report at exit that it cannot be written.
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     else:
@@ -296,7 +297,7 @@ def _end_stopped(number: int) -> int:
 
 
 def _describe_usage(failure: Exception) -> str:
-    """Return what was wrong with the arguments, and where the right ones are listed."""
+    """Return the error in the arguments, and a hint to the help."""
     message = failure.format_message() if hasattr(failure, "format_message") else str(failure)
     wrong = getattr(failure, "option_name", None)
     if wrong and hasattr(failure, "possibilities"):
@@ -311,6 +312,6 @@ def _describe_usage(failure: Exception) -> str:
     if EXTRA_PLACES.search(message):
         message += "; put places in quotes, as in '20,20 104,24 110,100 14,112'"
     command = context.command_path if context is not None else "texrs"
-    # The command of a batch is not below that of texrs.
+    # The command of a batch is not a subcommand of texrs.
     command = command if command.startswith("texrs") else f"texrs {command}"
     return f"{message.rstrip('.')} ({command} --help lists what is allowed)"

@@ -49,21 +49,21 @@ ACTIONS: dict[str, tuple[Option, ...]] = {
     "splice": tuple(SPLICED),
     "matrix": (*MATRIX, *SPLICED),
 }
-"""What can be done with a database, and the options of each."""
+"""Actions on a database, and the options of each."""
 
 
 @take_options(PICTURED, SIMILAR)
 def analyse_command(
-    out: Annotated[str, to_write("out", "ENTRY.npz", "Entry to write.")],
+    out: Annotated[str, to_write("out", "ENTRY.npz", "File of the elements to write.")],
     given: dict[str, Any],
-    more: Annotated[list[str] | None, make_argument("X,Y", "More places of --background.")] = None,
-    stages: Annotated[str | None, to_write("stages", text="Folder for pictures of the points and the mask.")] = None,
+    more: Annotated[list[str] | None, make_argument("X,Y", "More places for --background.")] = None,
+    stages: Annotated[str | None, to_write("stages", text="Folder for images of the points and the mask.")] = None,
     page: Annotated[str | None, to_write("page")] = None,
     role: Roles = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Find the elements of a texture, and what belongs to them."""
+    """Find the elements of a texture, and the parts that belong to them."""
     start = time.monotonic()
     given["background"] = [*(given["background"] or ()), *(more or ())]
     options = PICTURED.read(given, which=lambda o: not o.file)
@@ -103,16 +103,18 @@ def analyse_command(
 
 @take_options(SPLICED, ANALYSED, KEPT, MATRIX)
 def database_command(
-    folder: Annotated[str, make_argument("DIR", "Folder of the database; made if it is not there.")],
+    folder: Annotated[str, make_argument("DIR", "Folder of the database, created if needed.")],
     action: Annotated[
         str,
-        make_argument("|".join(ACTIONS), "Add images, list or remove what is there, splice two, or all with all."),
+        make_argument("|".join(ACTIONS), "Add images, list or remove textures, splice two, or splice all pairs."),
     ],
     given: dict[str, Any],
-    items: Annotated[list[str] | None, make_argument("IMAGE|NAME", "Images to add; names for all else.")] = None,
+    items: Annotated[
+        list[str] | None, make_argument("IMAGE|NAME", "Images (for add) or texture names (for the other actions).")
+    ] = None,
     out: Annotated[str | None, to_write("out", text="Image file for splice and matrix.")] = None,
     each: Annotated[
-        str | None, make_option("DIR", "Folder for every result of matrix, at full size: A-on-B.png.")
+        str | None, make_option("DIR", "Folder for all results of matrix at full size: A-on-B.png.")
     ] = None,
     count: Threads = None,
     quiet: Quiet = False,
@@ -129,7 +131,7 @@ def database_command(
         add(folder, names, given, count, quiet=quiet)
         return
     if not os.path.isdir(folder):
-        raise FileError(f"{folder}: there is no such folder")
+        raise FileError(f"{folder}: the folder does not exist")
     textures = TextureDatabase(folder, log=complain)
     match action:
         case "list":
@@ -157,14 +159,14 @@ def write_splices(
     *,
     quiet: bool,
 ) -> None:
-    """Splice two textures of a database, or all with all: results are written as they are made."""
+    """Splice two textures of a database, or all pairs. Results are written as soon as they are ready."""
     if out is None:
         raise InvalidInput(f"--out: {action} needs the name of an image file")
     if action == "splice" and len(names) != 2:
         raise InvalidInput(f"NAME: splice needs two names, of elements and of a layout; got {len(names)}")
     records = {record.name: record for record in textures.list()}
     files = {name: os.path.join(textures.path, record.file) for name, record in records.items()}
-    # What is named is in the folder, whatever else has that name.
+    # Names refer to textures in the folder, even if files have the same names.
     running = RUNNING.get()
     if running is not None:
         running.files = {}
@@ -177,7 +179,7 @@ def write_splices(
     several = dict.fromkeys(("--rows", "--columns", "--cell"))
 
     def alone(a: str, b: str) -> _provenance.Record | None:
-        """Return how one of all is made."""
+        """Return the record of one of all results."""
         known = [files[n] for n in (a, b) if n in files]
         return _provenance.narrow([str(textures.path), "splice", a, b], several, files=known)
 
@@ -210,7 +212,7 @@ def write_splices(
 
 
 def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | None, *, quiet: bool) -> None:
-    """Add images to a database; what looks like a place is one between the elements."""
+    """Add images to a database. ``--place`` refers to the place between the elements."""
     given["background"] = [*(given["background"] or ()), *(i for i in items if re.fullmatch(PLACE, i))]
     images = [i for i in items if not re.fullmatch(PLACE, i)]
     values = ANALYSED.read(given)
@@ -237,7 +239,7 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
 
 
 def sign(path: str, image: str) -> None:
-    """Let an entry of a database say how it was made."""
+    """Store the command in an entry of a database."""
     made = _provenance.narrow([None, "add", image], {"--name": Path(path).stem, "--replace": None})
     with (
         _provenance.record(made and replace(made, force=True)),
@@ -247,7 +249,7 @@ def sign(path: str, image: str) -> None:
 
 
 def explain(entry: Any, *, quiet: bool) -> None:
-    """Print what was proposed, how sure that is, and what is doubtful."""
+    """Print the proposed layout, its confidence, and doubts about it."""
     sure = entry.report.get("confidence", {})
     for name in entry.report["proposed"]:
         value = {"box": show_box(entry.report["box"]), "layout": entry.layout}.get(name, "as drawn")

@@ -1,4 +1,4 @@
-"""Commands that need no picture: ``texrs samples`` and ``texrs demo``."""
+"""Commands that need no image: ``texrs samples`` and ``texrs demo``."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from texrs.errors import InvalidInput
 def demo_command(
     out: Annotated[str, to_write("out", "DIR", "Folder for index.html.")], count: Threads = None, quiet: Quiet = False
 ) -> None:
-    """Write a page that shows what texrs makes, on built-in examples."""
-    # Which needs all verbs.
+    """Write a page of results of texrs on built-in examples."""
+    # Import here, because this loads all verbs.
     from texrs.demo import page
 
     start = time.monotonic()
@@ -42,10 +42,10 @@ def demo_command(
 
 
 def samples_command(
-    names: Annotated[list[str] | None, make_argument("NAME", "Which; all by default.")] = None,
-    out: Annotated[str | None, to_write("out", "DIR", "Folder to write them to, as .png and .tif.")] = None,
-    size: Annotated[str | None, make_option("SIZE", "Of those that are generated: 256, 256x192, 64x64x64.")] = None,
-    seed: Annotated[int | None, make_option(None, "Of those that are generated.")] = None,
+    names: Annotated[list[str] | None, make_argument("NAME", "Names of samples. Default: all.")] = None,
+    out: Annotated[str | None, to_write("out", "DIR", "Folder for the samples, as .png and .tif.")] = None,
+    size: Annotated[str | None, make_option("SIZE", "Size of generated samples: 256, 256x192, 64x64x64.")] = None,
+    seed: Annotated[int | None, make_option(None, "Seed of generated samples.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """List the built-in examples, or write them to a folder."""

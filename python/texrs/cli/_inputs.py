@@ -1,4 +1,4 @@
-"""The inputs of a batch: files, folders with everything in them, and patterns. Whatever is not used is reported."""
+"""Inputs of a batch: files, folders with all subfolders, and patterns. Unused files are reported."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ __all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
 OF_VOLUMES = ("solid", "slice")
 """Commands that take volumes."""
 SHOWN = 8
-"""Names that a notice lists; it counts the others."""
+"""Maximum number of names in a notice. It counts the others."""
 FIELDS = re.compile(r"\{(input|name|folder|suffix|preset|seed|verb|parent(?:[2-9]|[1-9][0-9])?)\}")
-"""Words in braces that are filled in."""
+"""Words in braces that are replaced."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """An input of one job or more."""
+    """An input of one or several jobs."""
 
     text: str
-    """The argument of the command."""
+    """Argument of the command."""
     name: str
     suffix: str = ""
     """Suffix of the file; empty for a material."""
@@ -61,11 +61,11 @@ def find_sources(
     texts : sequence of str
         Files, folders, patterns, or ``sample:NAME``. Folders are searched with all folders in them.
     verb : str
-        The command that takes them.
+        Command that takes the inputs.
     stacked : bool
-        If True, files that are maps of one material are one input.
+        If True, the files of one material are one input.
     templates : sequence of str
-        Names of other files that jobs read, as ``masks/{name}.png``. Such files are not inputs.
+        Names of other files that jobs read, such as ``masks/{name}.png``. They are not inputs.
     out : str
         Folder of the results, which is not searched.
 
@@ -83,17 +83,17 @@ def find_sources(
 
 @dataclass(slots=True)
 class _Found:
-    """The files of all inputs."""
+    """Files of all inputs."""
 
     suffixes: tuple[str, ...]
     out: str
     files: dict[str, str] = field(default_factory=dict)
-    """The folder that was given or precedes a pattern, by file; empty for a file that was named."""
+    """Folder of each file that was given or precedes a pattern. Empty for a file that was named."""
     walked: set[str] = field(default_factory=set)
-    """Folders whose files are all known."""
+    """Folders whose files have all been found."""
 
     def add(self, text: str) -> bool:
-        """Add the files that a text stands for; return whether there are any."""
+        """Add the files that match a text. Return whether there are any."""
         before = len(self.files)
         if text.startswith(SAMPLE) or os.path.isfile(text) or io.is_store(text) or expand_braces(text):
             self.files.setdefault(text, "")
@@ -110,7 +110,7 @@ class _Found:
         return len(self.files) > before or any(p == text or p.startswith(text) for p in self.files)
 
     def _walk(self, folder: str, base: str) -> None:
-        """Add the files of a folder and of all folders in it, links to folders included."""
+        """Add the files of a folder and of all its subfolders, including linked folders."""
         several: list[str] = []
         seen: set[str] = set()
         for place, folders, names in os.walk(folder, followlinks=True):
@@ -125,9 +125,9 @@ class _Found:
         self._take(folder, several, base)
 
     def _take(self, text: str, paths: Sequence[str], base: str) -> None:
-        """Add the files whose format is read, and report the others."""
+        """Add the files in supported formats, and report the others."""
         read = [p for p in paths if p.lower().endswith(self.suffixes) or io.is_store(p)]
-        # The suffix of a pattern may be one that is not known; the content of the file counts.
+        # A pattern may have an unknown suffix, because the content of the file decides.
         read = read or ([] if os.path.isdir(text) else list(paths))
         taken = {*read, *(p for p in paths if os.path.basename(p).lower() in SYSTEM or p.lower().endswith(DOCUMENTS))}
         left = [p for p in paths if p not in taken]
@@ -139,13 +139,13 @@ class _Found:
             self.files.setdefault(path, base)
 
     def drop_used(self, templates: Iterable[str]) -> None:
-        """Drop the files that other inputs are done with."""
+        """Drop the files that belong to other inputs."""
         known = [list_known(_name(path, base)) for path, base in self.files.items()]
         used = {os.path.realpath(fill(t, each)) for t in templates if t != "{input}" for each in known}
         self.files = {path: base for path, base in self.files.items() if os.path.realpath(path) not in used}
 
     def make_sources(self, *, stacked: bool) -> Iterator[Source]:
-        """Return the inputs; files of one material are one."""
+        """Return the inputs. The files of one material are one input."""
         folders: dict[str, list[str]] = {}
         for path in self.files:
             plain = path.startswith(SAMPLE) or not os.path.isfile(path)
@@ -157,7 +157,7 @@ class _Found:
                 yield from self._group(folder, paths)
 
     def _group(self, folder: str, paths: Sequence[str]) -> Iterator[Source]:
-        """Return the inputs in a folder: the folder, if it is a material, or materials and images."""
+        """Return the inputs in a folder: the folder if it is a material, or its materials and images."""
         stems = {path: os.path.basename(path)[: -len(find_suffix(Path(path))) or None] for path in paths}
         roles = find_roles(stems)
         keys: dict[str, list[str]] = {}
@@ -169,14 +169,14 @@ class _Found:
             inside = os.path.normpath(folder or ".")
             above = os.path.dirname(os.path.relpath(inside, base)) if base != folder else ""
             name = os.path.basename(os.path.abspath(inside))
-            # A folder with other inputs in it is not read as a whole.
+            # A folder that contains other inputs is not read as a whole.
             deeper = any(path.startswith(os.path.join(folder, "")) for path in self.files if path not in paths)
             text = join_braces(paths) if deeper else folder
             yield Source(text, name, folder=above.removeprefix("."), maps=len(roles))
             return
         taken = {path: key for key, own in materials.items() for path in own}
         for path in paths:
-            # A file whose name goes on from that of a material belongs to it; the reader reports it.
+            # A file whose name continues the name of a material belongs to it. The reader reports it.
             starts = [k for k in materials if k and re.match(rf"{re.escape(k)}[_\-. ]", stems[path])]
             if path not in roles and starts:
                 taken[path] = max(starts, key=len)
@@ -207,13 +207,13 @@ def _name(path: str, base: str) -> Source:
 
 
 def find_roles(stems: Mapping[str, str]) -> dict[str, Role]:
-    """Return the roles that names say, by file; files without one are left out."""
+    """Return the roles in file names, by file. Files without a role are left out."""
     found, _ = guess_roles(list(stems.values()))
     return {path: found[stem] for path, stem in stems.items() if stem in found}
 
 
 def join_braces(paths: Sequence[str]) -> str:
-    """Return one text for some files of a folder, as ``in/rock_{albedo,normal}.png``."""
+    """Return one text for some files of a folder, such as ``in/rock_{albedo,normal}.png``."""
     start = paths[0][: _count_alike(paths)]
     rest = [p[len(start) :] for p in paths]
     end = rest[0][len(rest[0]) - _count_alike([r[::-1] for r in rest]) :]
@@ -224,7 +224,7 @@ def join_braces(paths: Sequence[str]) -> str:
 
 
 def _count_alike(texts: Sequence[str]) -> int:
-    """Return how many characters all texts begin with."""
+    """Return the length of the common beginning of all texts."""
     return sum(1 for _ in itertools.takewhile(lambda each: len(set(each)) == 1, zip(*texts, strict=False)))
 
 
@@ -232,7 +232,7 @@ def _count_alike(texts: Sequence[str]) -> int:
 
 
 def list_known(source: Source) -> dict[str, str]:
-    """Return what words in braces stand for: ``{parent}`` is the folder of the input, ``{parent2}`` the one above it."""
+    """Return the values of words in braces: ``{parent}`` is the folder of the input, ``{parent2}`` the one above it."""
     known = {"input": source.text, "name": source.name, "folder": source.folder or ".", "suffix": source.suffix}
     above = Path(os.path.abspath(source.text.removeprefix(SAMPLE))).parents
     names = [] if source.text.startswith(SAMPLE) else [p.name for p in above]
@@ -240,7 +240,7 @@ def list_known(source: Source) -> dict[str, str]:
 
 
 def fill(text: str, known: Mapping[str, str]) -> str:
-    """Return a text with the words in braces filled in; other braces stay."""
+    """Return a text with the words in braces replaced. Unknown braces stay."""
     filled = FIELDS.sub(lambda found: known.get(found[1], ""), text)
     return os.path.normpath(filled) if "{folder}" in text else filled
 

@@ -1,4 +1,7 @@
-"""Kinds of values: how each is written on the command line, and read. All that the signatures of the functions do not say."""
+"""Kinds of values: their text on the command line, and their conversion.
+
+The signatures of the functions contain the rest.
+"""
 
 from __future__ import annotations
 
@@ -53,37 +56,37 @@ class Kind:
     """A kind of value."""
 
     metavar: str | tuple[str, str]
-    """The form of the text; of pictures and of volumes where they differ."""
+    """Form of the text. Images and volumes may have different forms."""
     read: Callable[[Any, About], Any]
-    """Make the value of the text, or of the list of texts."""
+    """Convert the text or the list of texts to the value."""
     note: str | tuple[str, str] = ""
-    """What the form does not say."""
+    """Description beyond the form."""
     show: Callable[[Any], str] = str
-    """Make the text of a default."""
+    """Convert a default to its text."""
     file: bool = False
-    """Whether the text names a file, which is read when it is known that the result can be written."""
+    """If True, the text names a file, which is read after the check that the result can be written."""
     words: tuple[str, ...] = ()
-    """Texts that name no file, and are given to the function as they are."""
+    """Texts that are not file names, and are passed to the function unchanged."""
     many: bool = False
-    """Whether there may be any number of texts."""
+    """If True, any number of texts is allowed."""
     plain: bool = False
-    """Whether it is written in this way even where typer could read the type."""
+    """If True, this form is used even if typer could read the type."""
 
     @staticmethod
     def pick(text: str | tuple[str, str], axes: int) -> str:
-        """Return what is said of pictures, or of volumes."""
+        """Return the text for images, or the text for volumes."""
         return text if isinstance(text, str) else text[axes - 2]
 
 
 PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
 EXAMPLE = Kind("FILE|FOLDER", read_example, "A file, a folder of the maps of a material, or sample:NAME.", file=True)
 SOURCE = replace(EXAMPLE, read=lambda text, about: match_alpha(read_example(text, about), about.like))
-"""A picture of the same things as the first, which may have an alpha channel that this one lacks."""
+"""Image in register with the first one. It may have an alpha channel that the first one lacks."""
 UNKNOWN = replace(EXAMPLE, read=lambda text, about: read_example(text, about, finite=False))
-"""An image whose unknown pixels may have any value."""
+"""Image whose unknown pixels may have any value."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
 UNKNOWN_VOLUME = replace(VOLUME, read=lambda text, about: read_volume(text, finite=False))
-"""A volume whose unknown voxels may have any value."""
+"""Volume whose unknown voxels may have any value."""
 ENTRY = Kind(
     "FILE|FOLDER",
     read_entry,
@@ -104,7 +107,7 @@ ENTRIES = replace(
 )
 WHITE = "White is marked; of a layer, its opaque pixels."
 WORDS = f"{WHITE} FILE:invert marks the other pixels; FILE:threshold=0.2,grow=4 as the options of remove."
-"""What masks mark."""
+"""Description of masks."""
 MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WORDS, file=True)
 GROUNDS = replace(
     MASK,
@@ -122,9 +125,9 @@ CORNERS = Kind(
     many=True,
 )
 EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grounds, or {FOUND}.", many=True)
-"""Of each plane of a photograph."""
+"""One value for each plane of a photograph."""
 THING = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
-"""A mask that the function reads, as its other options say."""
+"""Mask that the function reads, as its other options describe."""
 FILLED = Kind(
     "FILE|alpha|nan|nodata|VALUE",
     read_hole,
@@ -215,4 +218,4 @@ KINDS = {
     "edit": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
     "steps": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
 }
-"""Of parameters whose type does not tell, by name: a name means the same everywhere."""
+"""Kinds of parameters by name, if their type is not enough: a name has the same meaning everywhere."""

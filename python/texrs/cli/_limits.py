@@ -1,4 +1,4 @@
-"""What every command may take: options, in force while it works."""
+"""Limits of every command: options that are in force while it works."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STRICT = Annotated[bool, typer.Option("--strict", help="Fail if a part of an inp
 
 
 def list_parameters(there: list[inspect.Parameter]) -> list[inspect.Parameter]:
-    """Return the options of limits that a command does not have itself."""
+    """Return the options of limits that a command does not define itself."""
     own = {p.name for p in there}
     made = []
     for name, (kind, metavar, text, usual) in OPTIONS.items():
@@ -48,7 +48,7 @@ def limit(
     strict: bool = False,
     quiet: bool = False,
 ) -> Iterator[None]:
-    """Run a command within its limits, and show what it ignores and assumes about its inputs."""
+    """Run a command within its limits, and show which parts of its inputs it ignores and what it assumes."""
     memory = None if memory_limit is None else parse_bytes(memory_limit)
     with ExitStack() as stack:
         with name_arguments(pixels="--pixel-limit", seconds="--time-limit", memory="--memory-limit"):

@@ -1,4 +1,4 @@
-"""The command that makes other maps of a result: ``texrs apply``."""
+"""The command that computes other maps of a result: ``texrs apply``."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ APPLIED = Options(
 def apply_command(
     source: Annotated[str, make_argument("MAP.npz", "A source map that --source-map wrote.")],
     maps: Annotated[list[str], make_argument("IMAGE", "Images in register with the exemplar.")],
-    out: Annotated[str, to_write("out", text="Image file or .zarr to write; a folder for several.")],
+    out: Annotated[str, to_write("out", text="Image file or .zarr to write. A folder for several images.")],
     given: dict[str, Any],
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Make the heights, normals or labels of a result through its source map, finished as the result was."""
+    """Compute the heights, normals or labels of a result through its source map, with the same finish as the result."""
     values = APPLIED.read(given, which=lambda o: not o.file)
     places = SourceMap.load(source)
     if given["finish_screening"] and places.axes != 2:
@@ -72,7 +72,7 @@ def apply_command(
         with _provenance.record(made):
             check_free(target)
     read = io.read if places.axes == 2 else io.read_volume
-    # All results or none take their names, at the end.
+    # Move all results to their names at the end, or none.
     with ExitStack() as stack, threads(count):
         for paths, target, made in zip(groups, targets, records, strict=True):
             images = [read(path) for path in paths]
@@ -101,10 +101,10 @@ def store_map(
     count: int | None,
     quiet: bool,
 ) -> None:
-    """Look a map up into a store, chunk by chunk, so that the result is never in memory as a whole."""
+    """Write a map to a store, chunk by chunk, so that the whole result is never in memory."""
     if finish.screening is not None or finish.light is not None or finish.fade is not None:
         raise InvalidInput(
-            f"--out: {out} is made in parts, and the seams of this result are blended, which takes all of it at once; "
+            f"--out: {out} is made in parts, but blending its seams needs the whole result; "
             "--screening 0 leaves them as they are, or write to a file"
         )
     read = io.read if places.axes == 2 else io.read_volume
@@ -129,7 +129,7 @@ def store_map(
 
 
 def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> RenderOptions:
-    """Return how results are finished: as the map says, but for what is said here."""
+    """Return the render options: those of the source map, except for given options."""
     known = places.finish or RenderOptions((True,) * places.axes)
     fields = {path[1]: value for path, value in values.items() if path[0] == "finish"}
     if "screening" in fields:
@@ -146,7 +146,7 @@ def make_map(
     values: Mapping[tuple[str, ...], Any],
     finish: RenderOptions,
 ) -> Array:
-    """Return what a source map makes of a map, by the options or else by its name."""
+    """Return the rendered map, by the options or else by its name."""
     packed = None if {("map_type",), ("green",)} & values.keys() else find_packed(path)
     if packed is not None:
         return look_up(places, [Map(image, packed, "linear") for image in images], finish, lambda share: None)
@@ -157,17 +157,17 @@ def make_map(
 def read_kind(
     path: str, images: Sequence[Array], places: SourceMap, values: Mapping[tuple[str, ...], Any]
 ) -> tuple[Kind, Green]:
-    """Return how a map is looked up: as the options say, else as its name does."""
+    """Return the interpretation of a map: as the options state, else by its name."""
     return choose_kind(path, images, places.axes, values.get(("map_type",)), values.get(("green",)))
 
 
 def fit(finish: RenderOptions, paths: Sequence[str], given: Mapping[str, Any]) -> RenderOptions:
-    """Return how maps are finished whose names may say that they are no colours, which alone are lit."""
+    """Return render options for maps that may not be colours by their names. Only colours have light."""
     return finish if given["finish_flatten_lighting"] is not None else choose_finish(finish, paths[0])
 
 
 def group(maps: Sequence[str], count: int) -> list[list[str]]:
-    """Return as many maps together as there were exemplars."""
+    """Return maps in groups of one for each exemplar."""
     if len(maps) % count:
         raise InvalidInput(
             f"IMAGE: the source map was made from {count} exemplars, so it needs {count} each; got {len(maps)}"
@@ -176,7 +176,7 @@ def group(maps: Sequence[str], count: int) -> list[list[str]]:
 
 
 def name_targets(groups: Sequence[Sequence[str]], out: str, inputs: Sequence[str]) -> list[str]:
-    """Return the names of what is written: the file itself, or in a folder files of the names of the maps."""
+    """Return the names of the outputs: the file itself, or files with the names of the maps in a folder."""
     if len(groups) == 1 and not Path(out).is_dir():
         return [out]
     if not Path(out).is_dir():

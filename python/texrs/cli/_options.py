@@ -1,7 +1,7 @@
-"""Options of a command, made from the signature and the docstring of the function that it stands for.
+"""Options of a command, generated from the signature and the docstring of its function.
 
-What a parameter is called, what it is by default, which words it allows and what it means is written once: at the function. The
-command line adds how a text becomes a value, once for all parameters of a kind (`texrs.cli._kinds`).
+Name, default, allowed words and meaning of a parameter are written once, at the function. The command line adds the
+conversion from text, once for all parameters of a kind (`texrs.cli._kinds`).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from texrs.errors import InvalidInput
 
 MISSING = inspect.Parameter.empty
 PLACES = re.compile("X,Y|csv|WIDTHx")
-"""Forms of texts that hold places or sizes."""
+"""Forms of texts that contain places or sizes."""
 LONGEST = 200
-"""Characters of a help text."""
+"""Maximum characters of a help text."""
 AMERICAN = {"color": "colour", "optimize": "optimise"}
 
 Path: TypeAlias = tuple[str, ...]
@@ -38,45 +38,45 @@ class Option:
     """An option or an argument of a command."""
 
     path: Path
-    """Whose value it is."""
+    """Path of the parameter."""
     flag: str
-    """What a user writes: ``--seed``; or the name of an argument, in capitals."""
+    """Text that users write: ``--seed``, or the name of an argument in capitals."""
     type: Any
-    """What typer reads."""
+    """Type that typer reads."""
     kind: Kind | None
-    """How the value is made of that; None where it is the value."""
+    """Kind that converts it to the value. None if no conversion is needed."""
     default: Any
-    """The function's, as it is written; `MISSING` where the command needs a value."""
+    """Default of the function as text. `MISSING` if the command needs a value."""
     required: bool
-    """Whether the function needs one."""
+    """Whether the function requires it."""
     info: Any
-    """What typer gets."""
+    """Option or argument object of typer."""
 
     @property
     def name(self) -> str:
-        """What the parameter of the command is called."""
+        """Name of the command's parameter."""
         return "_".join(self.path)
 
     @property
     def argument(self) -> bool:
-        """Whether its place says what it is."""
+        """Whether it is a positional argument."""
         return not self.flag.startswith("--")
 
     @property
     def file(self) -> bool:
-        """Whether the value stands in a file."""
+        """Whether the value is read from a file."""
         return self.kind is not None and self.kind.file
 
     def name_value(self, text: object) -> str:
-        """Return what errors call it: the file that was given, or the option."""
+        """Return its name in errors: the given file, or the option."""
         texts = text if isinstance(text, list) else [text]
         if self.kind is None or not self.kind.file or any(t is None or t in self.kind.words for t in texts):
             return self.flag
         return " ".join(map(str, texts))
 
     def make_parameter(self) -> inspect.Parameter:
-        """Return the parameter that makes typer take this option."""
-        # For typer a value that may be left out is one that may be None.
+        """Return the parameter that defines this option for typer."""
+        # Typer treats an optional value as one that may be None.
         annotation: Any = Annotated[self.type if self.default is MISSING else self.type | None, self.info]
         return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=self.default, annotation=annotation)
 
@@ -87,23 +87,24 @@ class Options:
     Parameters
     ----------
     function : callable
-        With types, and a docstring in the way of numpydoc. Parameters that are dataclasses give an option for each field.
+        Function with types and a numpydoc docstring. A parameter that is a dataclass gives an option for each field.
     arguments : mapping
-        Parameters whose place says what they are, and their kinds.
+        Positional parameters, and their kinds.
     kinds : mapping
-        Kinds of parameters that neither their type nor their name tells.
+        Kinds of parameters that neither type nor name determines.
     names : mapping
-        Other names of parameters; of one that is a dataclass, what comes before the names of its fields.
+        Other names of parameters. The name of a dataclass is the prefix of its fields.
     leave : mapping
-        Parameters that are no options, and why; fields are written ``parameter.field``.
+        Parameters without an option, and the reasons. Fields are written ``parameter.field``.
     makers : mapping
-        What makes the values of parameters of options of its own, where that is not the dataclass alone.
+        Functions that compute the values of parameters with several options, if the dataclass is not enough.
     only : collection of str
-        Parameters that are; all by default.
+        Parameters to include. By default all.
     optional : mapping
-        Parameters whose default is that of the command, and what is shown of it; if they are not given they are not read.
+        Parameters that default to a value of the command, and the text shown for it. The function does not get them if
+        they are not given.
     axes : {2, 3}
-        Of what the function makes.
+        Number of axes of the function's result.
 
     """
 
@@ -133,7 +134,7 @@ class Options:
         return iter(self.all)
 
     def name_values(self, given: Mapping[str, Any]) -> dict[str, str]:
-        """Return what errors call each parameter: the file that was given, or the option; of several, all that were given."""
+        """Return the name of each parameter in errors: the given file, or the option; for several, all given ones."""
         called = {option.path[-1]: option.name_value(given[option.name]) for option in reversed(self.all)}
         for name in self.groups:
             inside = [o for o in self if o.path[0] == name and len(o.path) == 2]
@@ -146,7 +147,7 @@ class Options:
     def read(
         self, given: Mapping[str, Any], about: About | None = None, *, which: Callable[[Option], bool] | None = None
     ) -> dict[Path, Any]:
-        """Return the values of what was given; for what was not the function's own default stands."""
+        """Return the values of the given options. Others keep the default of the function."""
         values = {}
         for option in self:
             text = given[option.name]
@@ -162,7 +163,7 @@ class Options:
         return values
 
     def call(self, values: Mapping[Path, Any]) -> dict[str, Any]:
-        """Return the arguments of the function: fields of a dataclass are brought together in one."""
+        """Return the arguments of the function. Fields of a dataclass are combined."""
         made = {path[0]: value for path, value in values.items() if len(path) == 1}
         for name, group in self.groups.items():
             fields = {path[1]: value for path, value in values.items() if len(path) == 2 and path[0] == name}
@@ -171,19 +172,19 @@ class Options:
                     given = next(o.flag for o in self if o.path == (name, next(iter(fields))))
                     raise InvalidInput(f"{given}: needs {option.flag} too")
             if fields:
-                # How many axes there are is the command's.
+                # The command determines the number of axes.
                 known = {"axes": self.axes} if "axes" in inspect.signature(group).parameters else {}
                 made[name] = group(**fields, **known)
         return made
 
     def _find(self, only: Collection[str]) -> Iterator[tuple[Path, inspect.Parameter, str]]:
-        """Return each parameter and field, and what its docstring says."""
+        """Return each parameter and field with its description."""
         texts = describe(self.function)
         for name, each in inspect.signature(self.function, eval_str=True).parameters.items():
             if each.kind is each.VAR_KEYWORD or name == "self" or name in self.leave or (only and name not in only):
                 continue
             group: Any = next((t for t in _split_union(each.annotation) if is_dataclass(t)), self.groups.get(name))
-            # A mask alone is an option as any other; where it is the hole, how it is read are options too.
+            # A mask by itself is an ordinary option. If it marks the hole, its reading options are added.
             if group is None or name in self._kinds or (group is Mask and f"{name}.marks" not in self._arguments):
                 yield (name,), each, texts.get(name, "")
                 continue
@@ -212,7 +213,7 @@ class Options:
         elif kind is not None and "default" in kind.words and name not in self.optional:
             default = "default"
         shown = self.optional.get(name) or default not in (None, MISSING)
-        # The command shows its own default: that of the function would be a second one.
+        # The command shows its own default, so drop the default of the function.
         stated = MISSING if self.optional.get(name) else parameter.default
         words = () if kind is None or kind.file else kind.pick(kind.metavar, self.axes).split("|")
         texts = (
@@ -234,7 +235,7 @@ class Options:
         return Option(path, flag, type_, kind, default, required, info)
 
     def _find_kind(self, path: Path, parameter: inspect.Parameter) -> tuple[Kind | None, Any]:
-        """Return the kind of a value and what typer reads: as this command says, as the type, or as the name."""
+        """Return the kind of a value and the type that typer reads: by command, type or name."""
         type_, named = _find_type(parameter.annotation, parameter.default), KINDS.get(path[-1])
         kind = self._kinds.get(".".join(path)) or (type_ if isinstance(type_, Kind) else None)
         if kind is None and named is not None and (named.plain or type_ is None):
@@ -245,12 +246,12 @@ class Options:
 
 
 def make_parameter(name: str, annotation: Any, default: Any = MISSING) -> inspect.Parameter:
-    """Return a parameter that only the command line has."""
+    """Return a parameter that exists only on the command line."""
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 def as_command(work: Callable[..., None], parameters: Iterable[inspect.Parameter]) -> Callable[..., None]:
-    """Return a function that typer sees with these parameters."""
+    """Return a function with these parameters for typer."""
 
     def command(**given: Any) -> None:
         work(**given)
@@ -262,9 +263,9 @@ def as_command(work: Callable[..., None], parameters: Iterable[inspect.Parameter
 
 
 def take_options(*several: Options) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Let a command take options of functions too, as ``given``, which `Options.read` reads.
+    """Add options of functions to a command, as ``given``, which `Options.read` reads.
 
-    They come where the command has ``given``, but for arguments, which are first.
+    They replace ``given`` in its signature. Arguments come first.
     """
     options: dict[str, list[Option]] = {}
     for option in (o for each in several for o in each):
@@ -293,7 +294,7 @@ def take_options(*several: Options) -> Callable[[Callable[..., None]], Callable[
 
 
 def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]], used: str) -> None:
-    """Check that no option is given that belongs to something else than what is used."""
+    """Refuse options that belong to something else than the requested one."""
     free = {option.name for option in owners.get(used, ())}
     for option in (o for each in owners.values() for o in each if o.name not in free):
         if given[option.name] not in (None, option.default):
@@ -305,12 +306,12 @@ def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]
 
 
 def _split_union(annotation: Any) -> tuple[Any, ...]:
-    """Return the types of a union, or the one that there is."""
+    """Return the types of a union, or the single type."""
     return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
 
 
 def _find_type(annotation: Any, default: Any) -> Any:
-    """Return the type that typer reads by itself, or the kind of values that are words; None for all others."""
+    """Return the type that typer reads, or the kind of a choice of words. None for all others."""
     parts = [part for part in _split_union(annotation) if part is not types.NoneType]
     if all(get_origin(part) is Literal for part in parts):
         return make_choice([word for part in parts for word in get_args(part)], optional=default is None)
@@ -321,7 +322,7 @@ def _find_type(annotation: Any, default: Any) -> Any:
 
 
 def make_choice(words: Sequence[str], make: Callable[[str], Any] | None = None, *, optional: bool = False) -> Kind:
-    """Return the kind of values that are one of some words; ``default`` may stand for None."""
+    """Return the kind of a choice of words. ``default`` may represent None."""
     allowed = ["default", *words] if optional else list(words)
     chosen = make or {word: word for word in words}.__getitem__
 
@@ -342,7 +343,7 @@ def make_choice(words: Sequence[str], make: Callable[[str], Any] | None = None, 
 
 
 def describe(function: Callable[..., Any]) -> dict[str, str]:
-    """Return what a docstring says of each parameter, or of each attribute of a class."""
+    """Return the description of each parameter, or of each attribute of a class, in a docstring."""
     found: dict[str, str] = {}
     names: list[str] = []
     section = ""
@@ -360,10 +361,10 @@ def describe(function: Callable[..., Any]) -> dict[str, str]:
 
 
 def _shorten(text: str, flags: Mapping[str, str], flag: str, default: Any, words: Collection[str]) -> str:
-    """Return the first sentence of a description, or two, or one for each word, in the words of the command line."""
-    # References are for readers of the documentation.
+    """Return the first sentence or two of a description, or one for each word, in the words of the command line."""
+    # References are for readers of the documentation only.
     text = re.sub(r"\s*\((?:see )?(?:`|section|Eq\.)[^)]*\)|\s*\[\d+\]_|[:;,] see `texrs[^`]*`", "", text)
-    # What None does is not what happens when the option is left out, unless it is the default, and cannot be asked for.
+    # Drop the description of None, unless it is the default: users cannot request it.
     beside = ("See ", "`texrs.") if default is None else ("See ", "`texrs.", "None")
     first, *further = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
     if "yes" in words:

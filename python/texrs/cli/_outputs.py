@@ -1,4 +1,4 @@
-"""What commands write, declared once and checked before any long work: never over what they read."""
+"""Outputs of commands, declared once and checked before any long work. They never replace inputs."""
 
 from __future__ import annotations
 
@@ -35,65 +35,70 @@ from texrs.synthesis import Synthesis
 NEGATIVE = re.compile(r"-[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)
 """A negative number, which click would take for an option."""
 SAMPLE = "sample:"
-"""What the name of a built-in exemplar starts with."""
+"""Prefix of the names of built-in exemplars."""
 LONGEST_PROBE = 2**17
-"""Longer than a side may be in any format that limits it."""
+"""Longer than a side may be in any format with a limit."""
 STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask|numbers)\.png|report\.json")
-"""Names of what is written to a folder of stages."""
+"""Names of files in a folder of stages."""
 
 MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "How it is done"
 """Groups of options in the help."""
 NO_MATERIALS = ("batch", "samples")
-"""Commands that read no folder of maps: a folder that is called as what they are given is none."""
+"""Commands that do not read folders of maps. They refuse a folder as an input."""
 MATTER = ("out", "folder", "size", "seed", "seeds", "options", "field", "wrap", "slant", "at")
-"""Options that matter most, the first three of which come first in the help of a command."""
+"""Most important options. The first three of them come first in the help of a command."""
 
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "out": (("--out", "-o"), "OUT", "File to write; its name says the format."),
+    "out": (("--out", "-o"), "OUT", "File to write. Its suffix selects the format."),
     "source_map": (("--source-map",), "OUT.npz", "File for the source map, for texrs apply."),
-    "stages": (("--stages",), "DIR", "Folder for pictures of the stages and report.json."),
+    "stages": (("--stages",), "DIR", "Folder for images of the stages and report.json."),
     "sheet": (("--sheet",), "OUT.png", "Contact sheet of all results."),
-    "preview": (("--preview",), "OUT.png", "Picture of a material under a light, tiled 2 x 2."),
-    "mipmaps": (("--mipmaps",), "DIR", "Folder for the maps of a material in halves of their size."),
-    "gltf": (("--gltf",), "OUT.glb", "A material on a plane and on a sphere, as glTF 2.0 in one file."),
-    "materialx": (("--materialx",), "DIR", "Folder for a material as MaterialX: material.mtlx and its maps."),
-    "page": (("--page",), "OUT.html", "Page that shows what was found, to be corrected by clicking."),
+    "preview": (("--preview",), "OUT.png", "Image of the lit material, tiled 2 x 2."),
+    "mipmaps": (("--mipmaps",), "DIR", "Folder for the mipmaps of a material."),
+    "gltf": (("--gltf",), "OUT.glb", "Material on a plane and on a sphere, as one glTF 2.0 file."),
+    "materialx": (("--materialx",), "DIR", "Folder for the material as MaterialX: material.mtlx and its maps."),
+    "page": (("--page",), "OUT.html", "HTML page of the elements, for corrections by clicking."),
 }
-"""All options that say what is written: what the shell calls them, what they are, and what they are for."""
+"""All options for outputs: their names, types and descriptions."""
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print neither progress nor notices.")]
 Threads = Annotated[
     int | None,
-    typer.Option("--threads", metavar="N", help="Threads, 1 to 1024; same bytes with any.", show_default="all cores"),
+    typer.Option(
+        "--threads",
+        metavar="N",
+        help="Number of threads, 1 to 1024. The result does not depend on it.",
+        show_default="all cores",
+    ),
 ]
 
 
 Force = Annotated[
     bool,
-    typer.Option("--force", help="Replace files even if another command, other arguments or somebody else made them."),
+    typer.Option("--force", help="Overwrite files that this command did not write."),
 ]
 
 
 def make_argument(metavar: str, text: str) -> Any:
-    """Return what tells typer of an argument."""
+    """Return typer's description of an argument."""
     return typer.Argument(metavar=metavar, help=text, show_default=False)
 
 
 def make_option(metavar: str | None, text: str) -> Any:
-    """Return what tells typer of an option that may be left out."""
+    """Return typer's description of an optional option."""
     return typer.Option(metavar=metavar, help=text, show_default=False)
 
 
 def to_write(name: str, metavar: str | None = None, text: str | None = None) -> Any:
-    """Return the option for one of the outputs, which a command may describe in its own way."""
+    """Return the option for one of the outputs. A command may give its own description."""
     flags, usual, purpose = OUTPUTS[name]
     return typer.Option(*flags, metavar=metavar or usual, help=text or purpose, show_default=False)
 
 
 class Command(TyperCommand):
-    """A command that never writes over what it reads: whatever names a file and is no output may be read."""
+    """A command that never writes over its inputs. Every file name that is not an output counts as an input."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """List the options in groups: what matters most, the rest, what belongs to one thing, other files, and the work."""
+        """List the options in groups: the most important ones, the rest, groups by subject, other files, and the work."""
         sections: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Arguments", MAIN, MORE)}
         last: dict[str, list[tuple[str, str]]] = {title: [] for title in (FILES, WORK)}
         options = [p for p in self.get_params(ctx) if p.param_type_name == "option"]
@@ -120,7 +125,7 @@ class Command(TyperCommand):
                     formatter.write_dl(entries)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take a negative number for an argument, as a value of pixels may be, where it does not follow an option."""
+        """Take a negative number for an argument, such as the value of pixels, unless it follows an option."""
         before = ["", *args]
         shielded = [
             f" {a}" if NEGATIVE.fullmatch(a) and b[:1] != "-" else a for b, a in zip(before, args, strict=False)
@@ -132,7 +137,7 @@ class Command(TyperCommand):
         return rest
 
     def invoke(self, ctx: Any) -> Any:
-        """Do the command, if no output is an input; what it writes says how it was made."""
+        """Run the command if no output is an input. Its files record the command."""
         outputs = {p.name for p in self.params if p.name in OUTPUTS and p.param_type_name == "option"}
         force = ctx.params.get("force", False)
         given = ctx.params.items()
@@ -146,17 +151,17 @@ class Command(TyperCommand):
 
 
 def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> None:
-    """Check that nothing is written beside the maps of a material that is read, where it would be taken for one of them."""
+    """Refuse outputs next to the maps of a material that is read, because they would count as its maps."""
     read = {os.path.realpath(text): text for text in inputs if os.path.isdir(text)}
     for name, value in outputs.items():
         if isinstance(value, str) and os.path.realpath(value) in read:
             raise InvalidInput(
-                f"{as_flag(name)}: {value} is read, and would hold other maps beside its own; write to another folder"
+                f"{as_flag(name)}: {value} is read, and would then contain other maps; write to another folder"
             )
 
 
 def list_files(texts: Iterable[str]) -> list[str]:
-    """Return what names may stand for: of folders the files in them."""
+    """Return the files of names. A folder gives the files in it."""
     return [file for text in texts for file in (_provenance.list_folder(text) or [split_tail(text)[0]])]
 
 
@@ -169,7 +174,10 @@ def find_texts(value: object) -> list[str]:
 
 
 def check_outputs(paths: Mapping[str, str | None]) -> None:
-    """Check what stands beside the result: other files than it, a name of a source map, a folder for the stages."""
+    """Check the other outputs next to the result.
+
+    They must be different files, with a valid name of a source map and a folder for the stages.
+    """
     seen: dict[str, str] = {}
     for option, path in paths.items():
         if path is not None:
@@ -192,13 +200,13 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
 
 
 def check_suffix(option: str, path: str, suffix: str = ".npz") -> None:
-    """Check that the name of a file says what it is: by default, of arrays."""
+    """Check that the suffix of a file name states a format, by default a format of arrays."""
     if Path(path).suffix.lower() != suffix:
         raise InvalidInput(f"{as_flag(option)}: needs a name that ends in {suffix}, got {path!r}")
 
 
 def check_folder(path: str) -> None:
-    """Check that a folder is there and can be written to, or can be made."""
+    """Check that a folder exists and can be written to, or can be created."""
     if not path or "\0" in path:
         raise FileError(f"{path!r}: is not the name of a folder")
     there = Path(path)
@@ -211,20 +219,20 @@ def check_folder(path: str) -> None:
 
 
 def check_stages(folder: str) -> None:
-    """Check that pictures of the stages can be written to a folder, and take the place of none but their like."""
+    """Check that images of the stages can be written to a folder, and replace only such images."""
     check_folder(folder)
     for file in list_stages(folder):
         check_free(file, "stages")
 
 
 def list_stages(folder: str) -> list[str]:
-    """Return what pictures of the stages may replace in a folder."""
+    """Return the files that images of the stages may replace in a folder."""
     there = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
     return [os.path.join(folder, name) for name in there if STAGE.fullmatch(name)]
 
 
 def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> None:
-    """Check that no output is an input, under whatever name, nor what the pictures of the stages would replace."""
+    """Check that no output is an input under any name, and that images of the stages do not replace inputs."""
     found = [(name, status) for name in inputs if (status := read_status(name)) is not None]
     for option, path in outputs.items():
         if path is None:
@@ -243,7 +251,7 @@ def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> Non
 
 
 class _Enough(Exception):
-    """What there was to try out worked."""
+    """The attempted write worked."""
 
 
 def check_output(
@@ -254,17 +262,17 @@ def check_output(
     option: str = "out",
     fills: bool = False,
 ) -> None:
-    """Try whether an image of the dtype and channels of ``like`` can be written; leave no trace of it.
+    """Check that an image with the dtype and channels of ``like`` can be written, without leaving a file.
 
-    Without ``like``, only whether a file can be. What is there must be the command's own, unless all may be replaced.
-    ``fills`` tells that a transparent image can become opaque.
+    Without ``like``, only check that a file can be written. An existing file must be the command's own, unless all may
+    be replaced. ``fills`` states that a transparent image can become opaque.
     """
     with suppress(_Enough), write_output(path, option) as temporary:
         if like is None:
             temporary.touch()
         else:
-            # As long as the result, which some formats limit, and with the value that .hdr may refuse; where a picture is
-            # not known anything may stand.
+            # Use the length of the result, because some formats limit it, and a value that .hdr may refuse. Unknown
+            # images may have any values.
             axes = len(size)
             longest = min(max(size), LONGEST_PROBE)
             least = np.nan_to_num(np.fmin.reduce(like, axis=None))
@@ -290,10 +298,10 @@ def write_output(
     suffix: str = "",
     made: _provenance.Record | None = None,
 ) -> Iterator[Path]:
-    """Return a temporary name that takes the place of ``path`` at the end; errors speak of ``path``.
+    """Return a temporary name that replaces ``path`` at the end. Errors name ``path``.
 
-    The file says how it was made: as the command was asked for, or as ``made`` has it. ``inside`` tells that the option names
-    its folder. ``like`` is what the picture that it was made from says of its colours.
+    The file records the command as it was called, or as ``made`` states. ``inside`` states that the option names its
+    folder. ``like`` describes the colours of the source image.
     """
     if find_suffix(Path(path)).lower() == STORE:
         raise FileError(f"{path}: stores of Zarr are written by texrs solid, synthesize, tiles and apply")
@@ -315,7 +323,7 @@ def write_output(
 
 @contextmanager
 def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.Record | None = None) -> Iterator[Path]:
-    """Return a temporary folder whose files go to the folder ``path`` at the end; each says how it was made."""
+    """Return a temporary folder whose files move to the folder ``path`` at the end. Each file records the command."""
     os.makedirs(path, exist_ok=True)
     sweep(os.path.realpath(path))
     temporary = Path(tempfile.mkdtemp(prefix=name_prefix(), dir=path))
@@ -338,7 +346,7 @@ def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.
 
 @contextmanager
 def name_arguments(**names: str) -> Iterator[None]:
-    """Name the file or the option where an error names the argument of a function.
+    """Name the file or the option in errors that name the argument of a function.
 
     Arguments that are not given have the option of their own name.
     """
@@ -351,24 +359,24 @@ def name_arguments(**names: str) -> Iterator[None]:
             raise
         called = dict.fromkeys(names.get(each, as_flag(each)) for each in several)
         said = say_places(rest) if set(several) & set(PLACED) else rest
-        # Other arguments may be in the text; a name of two words is not a word of its own.
+        # Other arguments may be in the text. A name of two words does not match one of them.
         for other in (name for name in names if "_" in name):
             said = re.sub(rf"\b{other}\b", names[other], said)
         raise type(error)(f"{', '.join(called)}:{said}") from None
 
 
 PLACING = ("nrrd", "nii", "nii.gz")
-"""Kinds of volumes that state where they lie."""
+"""Volume formats that store a position."""
 
 
 def find_volume(source: Any, axes: int) -> str | None:
-    """Return the file of the volume whose spacing, orientation, origin and units the result has; None if there is none."""
+    """Return the volume file whose spacing, orientation, origin and units the result keeps, or None."""
     there = axes == 3 and isinstance(source, str) and not source.startswith(SAMPLE)
     return source if there else None
 
 
 def read_kept_spacing(source: Any, out: str, axes: int) -> Sequence[float] | None:
-    """Return how far voxels of a file lie apart, as those of a result do, if the result can say so."""
+    """Return the voxel spacing of a file, which the result keeps if its format can store it."""
     suffix = find_suffix(Path(out)).lower()
     volume = find_volume(source, axes)
     return io.read_spacing(volume) if volume is not None and (suffix == RAW or keeps_spacing(suffix)) else None
@@ -384,15 +392,15 @@ def deliver(
     made: _provenance.Record | None = None,
     option: str = "out",
 ) -> None:
-    """Write a result and what was asked for beside it; its colours are those of a picture that says ``like`` of them.
+    """Write a result and its additional outputs. ``like`` describes its colours.
 
-    Voxels lie as those of the file ``volume``, with another spacing if that is given.
+    Voxels have the position of the file ``volume``, with another spacing if that is given.
     """
     out = paths["out"] or ""
     image, axes = np.asarray(result.image), result.source_map.axes
     suffix = find_suffix(Path(out))
     known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
-    # The result takes its name last, when all else is written.
+    # The result gets its name last, after all other files are written.
     with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
         if axes == 2:
             palette = None if like is None else like.palette
@@ -404,7 +412,7 @@ def deliver(
 
 
 def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[float] | None = None) -> None:
-    """Write a volume whose voxels lie as those of a file, as far as the format can state that."""
+    """Write a volume with the position of a file, as far as the format can store it."""
     stated = spacing or (None if volume is None else io.read_spacing(volume))
     suffix = find_suffix(path).lower()
     if stated is None or not holds_spacing(image, suffix):
@@ -425,7 +433,7 @@ def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[f
 def deliver_beside(
     result: Synthesis, paths: Mapping[str, str | None], suffix: str, made: _provenance.Record | None
 ) -> None:
-    """Write what was asked for beside a result: its map, and pictures of its stages."""
+    """Write the additional outputs of a result: its source map, and images of its stages."""
     if (source := paths.get("source_map")) is not None:
         with write_output(source, "source_map", suffix=suffix, made=made) as place:
             result.source_map.save(place)
@@ -435,7 +443,7 @@ def deliver_beside(
 
 
 def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str | None]:
-    """Return the names of what is written of one of several results: each ends in its seed."""
+    """Return the output names of one of several results. Each ends with its seed."""
     for option, path in paths.items():
         if path is not None and not Path(path).name:
             raise InvalidInput(f"{as_flag(option)}: needs a name that the seed of a variant can follow, got {path!r}")
@@ -447,7 +455,7 @@ def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str |
 
 
 def make_contact_sheet(images: Sequence[Array]) -> Array:
-    """Set images of one size into a grid, in their dtype."""
+    """Arrange images of one size in a grid, in their dtype."""
     columns = int(np.ceil(np.sqrt(len(images))))
     height, width = images[0].shape[:2]
     sheet = np.zeros((-(-len(images) // columns) * height, columns * width, *images[0].shape[2:]), images[0].dtype)
@@ -458,18 +466,18 @@ def make_contact_sheet(images: Sequence[Array]) -> Array:
 
 
 def shrink(image: Array, side: int = 256) -> Array:
-    """Return every n-th pixel, so that any dtype and any channels can be shown."""
+    """Return every n-th pixel, for images of any dtype and number of channels."""
     step = max(1, -(-max(image.shape[:2]) // side))
     small: Array = image[::step, ::step].copy()
     return small
 
 
 def describe(image: Array, axes: int) -> str:
-    """Return the width and the height, the channels and the dtype of an image; of a volume the depth too."""
+    """Return the width, height, channels and dtype of an image, and the depth of a volume."""
     channels = image.shape[axes] if image.ndim > axes else 1
     return f"{show_sides(image.shape[:axes])}, {channels} channel{'s'[: channels != 1]}, {image.dtype}"
 
 
 def show_sides(shape: Sequence[int]) -> str:
-    """Return sides as options take them: the width first."""
+    """Return sides in the order of options: the width first."""
     return " x ".join(map(str, reversed(shape)))

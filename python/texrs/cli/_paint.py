@@ -58,16 +58,18 @@ FOLLOWED = Options(
 @take_options(PAINTED, TEXTURE, FOLLOWED)
 def paint_command(
     out: Annotated[
-        str, to_write("out", "OUT.glb", "Mesh to write: .glb, .gltf, .obj with its .mtl; of corners also .ply.")
+        str, to_write("out", "OUT.glb", "Mesh to write: .glb, .gltf or .obj with .mtl; .ply for vertex colours.")
     ],
     given: dict[str, Any],
-    corners: Annotated[bool, typer.Option("--vertices", help="Colours of corners, without an atlas.")] = False,
-    bits: Annotated[int | None, make_option("8|16", "Of the pictures; 8 where all maps have these, else 16.")] = None,
+    corners: Annotated[bool, typer.Option("--vertices", help="Write colours of vertices instead of an atlas.")] = False,
+    bits: Annotated[
+        int | None, make_option("8|16", "Bits of the images. Default: 8 if all maps have 8, else 16.")
+    ] = None,
     role: Roles = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Paint a mesh with a texture of space, made from a volume."""
+    """Paint a mesh with a solid texture, made from a volume."""
     start, mesh = time.monotonic(), given["mesh"]
     if bits not in (None, 8, 16):
         raise InvalidInput(f"--bits: must be one of 8, 16; got {bits}")
@@ -80,7 +82,7 @@ def paint_command(
         raise InvalidInput("--directions, --field: one of them can be asked for")
     if ("along",) in values and ("directions",) not in values:
         raise InvalidInput("--along: needs --directions")
-    # The volume of a folder of maps states no spacing.
+    # The volume of a folder of maps has no spacing.
     whole = given["exemplar"] if not os.path.isdir(given["exemplar"]) else None
     spacing = values.get(("spacing",)) or read_stated_spacing(whole)
     values |= {("spacing",): spacing} if spacing else {}
@@ -97,7 +99,7 @@ def paint_command(
         texture = SolidTexture(**call)
         painted["atlas"] = None if corners else painted.get("atlas", given["atlas"])
         if followed:
-            # The field must turn the texture at the scale that the mesh shows it.
+            # The field must rotate the texture at the scale on the mesh.
             if "scale" not in painted:
                 painted["scale"] = find_scale(surface, texture, **painted)
             texture = SolidTexture(
@@ -106,7 +108,7 @@ def paint_command(
         made = texture_mesh(surface, texture, **painted, progress=progress)
     depth: Any = bits
     with TemporaryDirectory(prefix=name_prefix(), dir=folder) as beside:
-        # Files name each other, so they are written under their own names first.
+        # The files name each other, so they are written under their own names first.
         *others, last = reversed(made.save(Path(beside, os.path.basename(out)), depth=depth))
         targets = [os.path.join(folder, file.name) for file in others]
         for target in targets:

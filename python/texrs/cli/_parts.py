@@ -1,4 +1,4 @@
-"""Results that are larger than memory: ``texrs solid``, ``synthesize`` and ``tiles`` in chunks, by any workers."""
+"""Results larger than memory: ``texrs solid``, ``synthesize`` and ``tiles`` in chunks, by any workers."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ from texrs.papers.solid.window import PlaneTexture, SolidTexture
 __all__ = ["BEYOND", "OPTIONS", "Asked", "InParts", "is_stored", "make_options", "read_scheduler", "write_part"]
 
 OPTIONS: dict[str, tuple[Any, str, str]] = {
-    "origin": (str, "X,Y[,Z]", "A window of the texture without borders that begins there; any integers within 10^9."),
-    "chunks": (str, "WIDTHxHEIGHT", "In chunks of that size, for results that are larger than memory."),
-    "workers": (int, "N", "So many processes make the chunks."),
-    "scheduler": (str, "ADDRESS", "The workers of a cluster of Dask make the chunks."),
+    "origin": (str, "X,Y[,Z]", "First pixel or voxel of a window of the unbounded texture, integers within 10^9."),
+    "chunks": (str, "WIDTHxHEIGHT", "Chunk size, for results that are larger than memory."),
+    "workers": (int, "N", "Number of processes that compute the chunks."),
+    "scheduler": (str, "ADDRESS", "Address of a Dask cluster that computes the chunks."),
 }
-"""Options that ask for a part of a texture without borders."""
+"""Options that request a part of an unbounded texture."""
 TAKEN = ("exemplar", "field", "seed", "quality", "interpolation", "spacing", "memory_limit")
-"""Parameters that textures without borders have too."""
+"""Parameters that unbounded textures have too."""
 BEYOND = "to OUT.zarr, or with --chunks, it is made in parts"
-"""What an error says of results that are too large to be made at once."""
+"""Remedy in errors about results that are too large for memory."""
 PAUSE = 5.0
 """Seconds between two forecasts."""
 
 
 def make_options() -> list[inspect.Parameter]:
-    """Return the options of parts."""
+    """Return the options for parts."""
     made = []
     for name, (kind, metavar, text) in OPTIONS.items():
         info = typer.Option(metavar=metavar, help=text, show_default=False, rich_help_panel="Larger than memory")
@@ -59,16 +59,16 @@ def make_options() -> list[inspect.Parameter]:
 
 @dataclass(frozen=True, slots=True)
 class InParts(Verb):
-    """A verb whose result may be as large as a disk: then it is a part of the texture without borders."""
+    """A verb whose result may be as large as a disk. It is then a part of an unbounded texture."""
 
     def make_parameters(self) -> list[inspect.Parameter]:
-        """Return the verb's own, and those of parts."""
+        """Return the verb's own parameters, and the parameters for parts."""
         return [*Verb.make_parameters(self), *make_options()]
 
     def make(
         self, *, count: int | None, quiet: bool, notices: Notices, variants: int | None = None, **given: Any
     ) -> None:
-        """Do the command: at once, or in parts where that is asked for."""
+        """Run the command: at once, or in parts if requested."""
         said = {name: given.pop(name, None) for name in OPTIONS}
         out = str(given["out"])
         if not (is_stored(out) or out.lower().endswith(RAW)) and all(value is None for value in said.values()):
@@ -77,7 +77,7 @@ class InParts(Verb):
         self.run_parts(given, said, count=count, quiet=quiet)
 
     def run_parts(self, given: dict[str, Any], said: Mapping[str, Any], *, count: int | None, quiet: bool) -> None:
-        """Make a part of the texture without borders, chunk by chunk."""
+        """Compute a part of an unbounded texture, chunk by chunk."""
         axes, options = self.options.axes, self.options
         paths = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         for name, path in paths.items():
@@ -111,7 +111,7 @@ class InParts(Verb):
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What is said of a part, and of who makes it."""
+    """Description of a part, and of its workers."""
 
     origin: tuple[int, ...]
     chunks: tuple[int, ...] | None
@@ -125,14 +125,14 @@ class Asked:
 
 
 def read_scheduler(workers: int | None, scheduler: str | None) -> int | str | None:
-    """Return who does the work: so many processes, the workers of a cluster, or None, this process."""
+    """Return the scheduler: a number of processes, the workers of a cluster, or None for this process."""
     if workers is not None and scheduler is not None:
         raise InvalidInput("--workers, --scheduler: one of them can be asked for")
     return scheduler if workers is None else as_int(workers, "--workers", 1, 1024)
 
 
 def is_stored(out: str) -> bool:
-    """Return whether a name is that of a store of Zarr."""
+    """Return whether a name is the name of a Zarr store."""
     return out.lower().rstrip("/").endswith(".zarr")
 
 
@@ -146,7 +146,7 @@ def write_part(
     count: int | None,
     quiet: bool,
 ) -> None:
-    """Write a part of what has no borders, to a store or to a file; what an interrupted run has left is gone on with."""
+    """Write a part of an unbounded texture to a store or to a file. An interrupted run is continued."""
     start, running = time.monotonic(), _provenance.RUNNING.get()
     grid = Grid.of(sides, asked.chunks, whole.axes)
     with (
@@ -181,11 +181,11 @@ def write_file(
     count: int | None,
     watch: Progress,
 ) -> Stored:
-    """Fill the part file of a name, and let what it becomes say how it was made."""
+    """Fill the part file of a name. The final file records the command."""
     part = whole._read_part(asked.origin, grid.shape)
     check_suffix(out, whole.axes, part.reader.maps[part.base], grid.chunks)
     header = str(Path(out).with_suffix(HEADER)) if Path(out).suffix.lower() == RAW else None
-    # That it can be written, over nothing of somebody else's, is checked before the work.
+    # Permission to write and to replace was checked before the work.
     for name in filter(None, (out, header)):
         _outputs.check_output(name)
     filled = fill(part.reader, part.base, grid, out, scheduler=asked.scheduler, threads=count, progress=watch)
@@ -198,7 +198,7 @@ def write_file(
 
 
 class _Forecast:
-    """Says how fast it goes, and how long it will take."""
+    """Reports the speed and the remaining time."""
 
     def __init__(self, watch: Progress, total: int) -> None:
         self.watch, self.total, self.said, self.at = watch, total, "", -math.inf
@@ -220,7 +220,7 @@ def _list(said: Mapping[str, Any]) -> str:
 
 
 def _parse_origin(text: str | None, axes: int) -> tuple[int, ...]:
-    """Return (row, column) of ``X,Y``: the column comes first in the text, as the width does in sizes."""
+    """Return (row, column) of ``X,Y``: the column comes first in the text, like the width in sizes."""
     if text is None:
         return (0,) * axes
     wanted = ("X,Y, as in -40,1000", "X,Y,Z, as in 0,-40,1000")[axes - 2]

@@ -1,6 +1,6 @@
-"""Places on the command line: x comes first, as the width does in sizes, and y grows downwards.
+"""Places on the command line: x comes first, like the width in sizes, and y grows downwards.
 
-Functions take (row, column) and (plane, row, column), so every option that takes places turns their order here.
+Functions take (row, column) and (plane, row, column), so every option for places reverses the order here.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
 PLACED = ("corners", "background", "points", "box", "at", "point", "normal")
 """Arguments of functions that are places."""
 HEADERS = {"x": 0, "column": 0, "columns": 0, "col": 0, "y": 1, "row": 1, "rows": 1}
-"""Names of columns in a file of points, and which coordinate each is."""
+"""Names of columns in a file of points, and the coordinate of each."""
 _ROWS_FIRST: ContextVar[bool] = ContextVar("rows_first", default=False)
 
 
 @contextmanager
 def put_rows_first() -> Iterator[None]:
-    """Read places as row,column in a block: records that do not state an order mean this one."""
+    """Read places as row,column in a block. Records without a stated order use this order."""
     token = _ROWS_FIRST.set(True)
     try:
         yield
@@ -70,7 +70,7 @@ def parse_box(text: str, about: About) -> list[float]:
 
 
 def turn_centre(text: str) -> str:
-    """Return the words of a field with its centre (row, column) or (plane, row, column), as fields take it."""
+    """Return the words of a field with its centre as (row, column) or (plane, row, column)."""
 
     def swap(found: re.Match[str]) -> str:
         return found[1] + "x".join(reversed(re.split("[x×]", found[2])))
@@ -79,7 +79,7 @@ def turn_centre(text: str) -> str:
 
 
 def show_box(box: Sequence[float]) -> str:
-    """Return a box (row, column, height, width) as the option takes it."""
+    """Return the text of a box (row, column, height, width) for an option."""
     row, column, height, width = box
     return f"{column},{row},{width},{height}"
 
@@ -106,7 +106,7 @@ def _parse_finite(text: str, count: int, option: str, wanted: str) -> list[float
 
 
 def read_points(path: str, about: About) -> list[list[float]]:
-    """Read the points (row, column) of a file with two numbers a line; its first line may name them, as in ``x,y``."""
+    """Read points (row, column) from a file with two numbers a line. The first line may name them, such as ``x,y``."""
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:
@@ -142,7 +142,7 @@ def read_points(path: str, about: About) -> list[list[float]]:
 
 
 def say_places(message: str) -> str:
-    """Return what an error says of places with x first, as options take them.
+    """Return the text of an error with x first in places, as in options.
 
     Examples
     --------
@@ -169,7 +169,7 @@ def say_places(message: str) -> str:
 
 
 def check_corners(corners: Sequence[Sequence[float]], size: Sequence[int]) -> None:
-    """Check that four corners (row, column) go around a convex shape inside a picture."""
+    """Check that four corners (row, column) form a convex shape inside an image."""
     points = np.asarray(corners, np.float64)
     said = " ".join(f"{column:g},{row:g}" for row, column in points)
     reason = _find_fault(points, size)
@@ -183,8 +183,8 @@ def check_corners(corners: Sequence[Sequence[float]], size: Sequence[int]) -> No
 
 
 def _find_fault(points: np.ndarray, size: Sequence[int]) -> str:
-    """Return why four points are not the corners of a convex shape in a picture; nothing if they are."""
-    # Corners are pointed at by hand, so they may be on the border itself.
+    """Return the reason why four points are not the corners of a convex shape in an image, or nothing."""
+    # Corners are placed by hand, so they may be on the border itself.
     outside = ((points < -1) | (points > np.asarray(size[:2]))).any(axis=1)
     if outside.any():
         return f"{outside.sum()} of the four leave the picture"

@@ -1,9 +1,9 @@
-"""How what a command writes was made: known while it runs, said by each file, and asked before one is replaced.
+"""Provenance: the record of a command, stored in each file that it writes, and checked before a file is replaced.
 
-What is recorded is what the result depends on: the version, the verb, its arguments, the options that are not the default, the
-seed, and the SHA-256 of every file that was read. Names are relative to the folder of the file that says so, so that a folder
-can be moved with all that is in it. What does not change the result (threads, progress, the names of outputs) is left
-out, and so are dates: the same gives the same bytes.
+The record contains everything that the result depends on. This is the version, the verb, its arguments, the options
+that are not the default, the seed, and the SHA-256 of every input file. Names are relative to the folder of the
+output, so that a folder can be moved with its files. Options without an effect on the result (threads, progress, names
+of outputs) and dates are left out. The same command therefore gives the same bytes.
 """
 
 from __future__ import annotations
@@ -49,45 +49,45 @@ LEFT = (
     "workers",
     "scheduler",
 )
-"""Parameters of commands that change nothing in a result, or name one."""
+"""Parameters of commands without an effect on the result, and parameters that name outputs."""
 BRACES = re.compile(r"([^{}]*)\{([^{}/]*,[^{}/]*)\}([^{}/]*)")
 """Names of several files of a folder."""
 CHANGED = "changed while it was read"
-"""In place of the SHA-256 of such a file."""
+"""Marker in place of the SHA-256 of such a file."""
 
 
 @dataclass(slots=True)
 class Record:
-    """What a command was asked for."""
+    """Record of a command."""
 
     verb: str
     arguments: list[str | None]
-    """None stands for the folder that is written to."""
+    """None represents the output folder."""
     options: dict[str, Any]
-    """By flag: a text, a list of them, or True."""
+    """Options by flag: a text, a list of texts, or True."""
     seed: int | None
     files: dict[str, os.stat_result]
-    """What is read, as it was at the start."""
+    """Input files, as they were at the start."""
     places: dict[str, str]
-    """Where that lies, and the folder: names may be seen from another folder later."""
+    """Absolute paths of the inputs and of the folder, because names may be resolved from another folder later."""
     folder: str | None = None
-    """What is read may lie in it: a database."""
+    """Folder that may contain inputs: a database."""
     stacks: tuple[str, ...] = ()
-    """Folders of maps, of which all files are read."""
+    """Folders of maps. All their files are inputs."""
     placed: bool = False
-    """Whether places are among what was given; the record then states their order."""
+    """Whether the arguments contain places. The record then states their order."""
     force: bool = False
     """Whether any file may be replaced."""
     original: Mapping[str, str] = field(default_factory=dict)
-    """Names that stand for files elsewhere, when something is made again."""
+    """Names of files at other paths, if a result is made again."""
     checked: set[str] = field(default_factory=set)
-    """Outputs that may be written."""
+    """Outputs that have been checked."""
     hashes: dict[str, str] = field(default_factory=dict)
 
     def find_hash(self, name: str) -> str:
-        """Return the SHA-256 of a file that is read."""
+        """Return the SHA-256 of an input file."""
         if name not in self.hashes:
-            # Only now: what is refused needs none.
+            # Hash lazily: a rejected command never needs the hash.
             place = self.places[name]
             self.hashes[name] = hash_file(place)
             now, then = os.stat(place), self.files[name]
@@ -96,7 +96,7 @@ class Record:
         return self.hashes[name]
 
     def rename(self, text: Any, folder: str) -> Any:
-        """Return the name of a file as it is seen from a folder; any other text as it is."""
+        """Return the name of a file relative to a folder. Other texts are returned unchanged."""
         if isinstance(text, list):
             return [self.rename(t, folder) for t in text]
         if not isinstance(text, str):
@@ -110,11 +110,14 @@ class Record:
         real = self.places[text]
         try:
             return Path(os.path.relpath(real, folder)).as_posix()
-        except ValueError:  # On another drive of Windows.
+        except ValueError:  # The file is on another drive of Windows.
             return Path(real).as_posix()
 
     def tell(self, target: str, *, output: str = "out", inside: bool = False, suffix: str = "") -> str:
-        """Return as JSON how the file ``target`` is made: by which option, and whether that names the folder of it."""
+        """Return the record of the file ``target`` as JSON.
+
+        It contains the option that wrote the file, and whether the option names its folder.
+        """
         folder = os.path.dirname(os.path.realpath(target))
         said: dict[str, Any] = {
             "texrs": __version__,
@@ -132,12 +135,12 @@ class Record:
         if self.placed and not has_rows_first():
             said["places"] = "x,y"
         if suffix:
-            # What stands in a report or a map may depend on the format of the result.
+            # Reports and maps may depend on the format of the result.
             said["suffix"] = suffix
         return json.dumps(said)[:-1] + f", {BLANK}}}"
 
     def _find_used(self) -> set[str]:
-        """Return the names that this record speaks of; of a folder all that is known to be read in it."""
+        """Return the file names in this record. A folder gives all files known to be read in it."""
         texts = [*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))]
         folders = {Path(f) for f in (self.folder, *(s for s in self.stacks if s in texts)) if f is not None}
         inside = {n for n in self.files if Path(n).parent in folders}
@@ -146,9 +149,9 @@ class Record:
 
 
 RUNNING: ContextVar[Record | None] = ContextVar("record", default=None)
-"""Of the command that runs."""
+"""Record of the running command."""
 ORIGINAL: ContextVar[Mapping[str, str] | None] = ContextVar("original", default=None)
-"""What files are to be called that are read again."""
+"""Names of input files that are read again from other paths."""
 
 
 def as_flag(name: str) -> str:
@@ -157,7 +160,7 @@ def as_flag(name: str) -> str:
 
 
 def read_status(path: str) -> os.stat_result | None:
-    """Return the status of the regular file, or of the store of Zarr, that a path leads to, if there is one."""
+    """Return the status of the regular file or Zarr store at a path, if there is one."""
     with suppress(OSError, ValueError):
         status = os.stat(path)
         if stat.S_ISREG(status.st_mode) or io.is_store(path):
@@ -166,7 +169,7 @@ def read_status(path: str) -> os.stat_result | None:
 
 
 def expand_braces(text: str) -> list[str]:
-    """Return the files that a name such as ``in/rock_{albedo,normal}.png`` lists; none if it is not such a name."""
+    """Return the files in a name such as ``in/rock_{albedo,normal}.png``, or none for other names."""
     found = BRACES.fullmatch(text)
     if not found or os.path.lexists(text):
         return []
@@ -174,7 +177,7 @@ def expand_braces(text: str) -> list[str]:
 
 
 def list_folder(name: str) -> list[str]:
-    """Return the files in a folder, or those that braces list; none if a name is neither."""
+    """Return the files in a folder or in a name with braces, or none for other names."""
     if not name or "\0" in name or io.is_store(name):
         return []
     if not os.path.isdir(name):
@@ -183,11 +186,11 @@ def list_folder(name: str) -> list[str]:
 
 
 def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Record:
-    """Return what a command was asked for, of the values of its parameters."""
+    """Return the record of a command from the values of its parameters."""
     arguments: list[str | None] = []
     options: dict[str, Any] = {}
     names: list[str] = []
-    # The options of a batch may be places for any command.
+    # Options of a batch may contain places for any command.
     placed = command.name == "batch"
     for p in command.params:
         value = given.get(p.name)
@@ -204,17 +207,17 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
                 options[flag if value else max(p.secondary_opts, key=len)] = True
             else:
                 options[flag] = texts if isinstance(value, list | tuple) else texts[0]
-                # A word, as the x of --wrap, is no file even if there is one of that name.
+                # A word such as the x of --wrap is not a file, even if a file has this name.
                 names += texts if re.search("FILE|csv", p.metavar or "") else []
     shared = any(given.get(name) is not None for name in ("workers", "scheduler"))
     if shared and given.get("origin", "") is None and given.get("chunks") is None:
-        # Who makes it does not change the result, but that it is a part of what has no borders does.
+        # The scheduler does not change the result, but the use of an unbounded texture does.
         options["--origin"] = "0,0,0" if command.name == "solid" else "0,0"
     names = [split_tail(name)[0] for name in names]
     files = {name: status for name in names if (status := read_status(name)) is not None}
     stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
     said = [str(text).partition("=")[0] for text in given.get("role") or ()]
-    # Of a folder of maps what else lies there does not count; a batch takes all pictures.
+    # Other files in a folder of maps do not count. A batch takes all images.
     every = command.name == "batch"
     inside = [f for name in stacks for f in (list_folder(name) if every else list_maps(name, said))]
     files |= {f: status for f in inside if (status := read_status(f)) is not None}
@@ -227,7 +230,7 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
 
 
 def list_maps(folder: str, said: Sequence[str]) -> list[str]:
-    """Return the files in a folder that are maps of the material in it: by their names, their values, or an option."""
+    """Return the files in a folder that are maps of its material: by name, by content, or by an option."""
     parts = {f: split_suffix(os.path.basename(f)) for f in list_folder(folder)}
     stems = {f: stem for f, (stem, suffix) in parts.items() if suffix}
     known = {*said, *guess_roles(list(stems.values()))[0]}
@@ -240,7 +243,7 @@ def list_maps(folder: str, said: Sequence[str]) -> list[str]:
 
 @contextmanager
 def record(one: Record | None) -> Iterator[None]:
-    """Let what is written within say that it was made so."""
+    """Store this record in all files written in the block."""
     token = RUNNING.set(one)
     try:
         yield
@@ -254,7 +257,7 @@ def narrow(
     seed: int | None = None,
     files: Sequence[str] | None = None,
 ) -> Record | None:
-    """Return the record of a part of what runs: with other arguments, and options that differ (None: not given)."""
+    """Return the record of a part of the running command: with other arguments, and changed options (None: not given)."""
     whole = RUNNING.get()
     if whole is None:
         return None
@@ -265,7 +268,7 @@ def narrow(
 
 
 def add_inputs(*names: str) -> None:
-    """Let what is written say that these files were read too."""
+    """Add files to the inputs in the records of later outputs."""
     running = RUNNING.get()
     if running is not None:
         found = {name: status for name in names if (status := read_status(name)) is not None}
@@ -277,7 +280,7 @@ def add_inputs(*names: str) -> None:
 
 
 def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
-    """Check that nothing is lost when a file is written: what is there was made by the same verb from the same arguments."""
+    """Check that writing a file loses nothing: an existing file must come from the same verb and the same arguments."""
     running = RUNNING.get()
     if running is None or running.force:
         return
@@ -303,7 +306,7 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
 
 
 def _find_other(running: Record, path: str) -> str:
-    """Return why a file that is there is not this command's own."""
+    """Return why an existing file is not this command's own."""
     made = io.read_metadata(path).made
     if made is None:
         return "is there already, and no texrs command says that it made it"

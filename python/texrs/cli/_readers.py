@@ -1,4 +1,4 @@
-"""Values that stand in files, read as the option of the command line says."""
+"""Readers of values in files, according to the option of the command line."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from texrs.errors import FileError, InvalidInput
 from texrs.io._files import check_file
 
 VOLUMES = "a TIFF of several slices, .npy, .npz, .vti, .vtk, NRRD, NIfTI or Zarr"
-"""Files of volumes, as errors list them."""
+"""File formats of volumes, as errors list them."""
 
 
 def read_picture(text: str, *, finite: bool = True) -> Array:
-    """Read an image file, or make the built-in exemplar that ``sample:NAME`` names."""
+    """Read an image file, or make the built-in exemplar of ``sample:NAME``."""
     image: Array = samples.load(text.removeprefix(SAMPLE)).image if text.startswith(SAMPLE) else io.read(text)
     if finite:
         as_image(image, text)
@@ -39,7 +39,7 @@ def read_picture(text: str, *, finite: bool = True) -> Array:
 
 
 def match_alpha(image: Any, like: Array | None) -> Any:
-    """Return a picture with an alpha channel, all of it there, if that is all that it lacks; without one that says nothing."""
+    """Add an opaque alpha channel to an image, or remove one, so that it matches another image."""
     if not isinstance(image, np.ndarray):
         return image
     colours = [1 if a.ndim == 2 else a.shape[2] for a in (image, image if like is None else like)]
@@ -53,7 +53,7 @@ def match_alpha(image: Any, like: Array | None) -> Any:
 
 
 def read_example(text: str, about: About, *, finite: bool = True, single: bool = True) -> Any:
-    """Read a picture, or a material: a folder of maps, an EXR file of several layers, or a single map by its name."""
+    """Read an image or a material: a folder of maps, an EXR file of several layers, or a single map by its name."""
     from texrs.cli._stacks import is_stack
     from texrs.materials import Material
     from texrs.materials._single import read_single
@@ -72,14 +72,14 @@ def is_solid(sample: str) -> bool:
 
 
 def find_image(path: str) -> tuple[int, ...] | None:
-    """Return the shape of an image; None if a file is not one."""
+    """Return the shape of an image, or None if a file is not an image."""
     with suppress(FileError):
         return tuple(io.read(path).shape)
     return None
 
 
 def read_volume(text: str, *, finite: bool = True) -> Array:
-    """Read a volume, or make the built-in one that ``sample:NAME`` names."""
+    """Read a volume, or make the built-in one of ``sample:NAME``."""
     if text.startswith(SAMPLE):
         volume: Array = samples.load(text.removeprefix(SAMPLE)).image
         if volume.ndim != 4:
@@ -99,21 +99,21 @@ def read_volume(text: str, *, finite: bool = True) -> Array:
 
 
 def read_array(path: str, axes: int) -> Array:
-    """Read a picture or a volume, which may hold anything."""
+    """Read an image or a volume with any values."""
     array: Array = io.read_volume(path) if axes == 3 else io.read(path)
     return array
 
 
 def fit_volume(given: Array, path: str, about: About) -> Array:
-    """Return the values of a volume at the voxels of the result, if both state a spacing and the voxels differ.
+    """Return the values of a volume at the voxels of the result, if both have a spacing and the voxels differ.
 
-    Both begin at the same corner. The nearest voxel counts, so that no value is changed.
+    Both begin at the same corner. The nearest voxel is used, so that no value changes.
     """
     stated = read_stated_spacing(path) if about.axes == 3 and about.spacing is not None and about.size else None
     if stated is None or about.spacing is None or given.shape[:3] == about.size or np.allclose(stated, about.spacing):
         return given
     for axis, (side, mine, theirs) in enumerate(zip(about.size, about.spacing, stated, strict=True)):
-        # Less than a voxel is lost by rounding.
+        # Rounding loses less than a voxel.
         if abs(side * mine - given.shape[axis] * theirs) > max(mine, theirs):
             spans = [
                 show_extent(each)
@@ -127,24 +127,24 @@ def fit_volume(given: Array, path: str, about: About) -> Array:
 
 
 def show_extent(sides: Iterable[tuple[int, float]]) -> str:
-    """Return how far voxels extend along x, y and z."""
+    """Return the extent of the voxels along x, y and z."""
     return " x ".join(f"{count * step:g}" for count, step in reversed(list(sides)))
 
 
 def read_values(path: str, about: About) -> Array:
-    """Read values like those of the exemplar: of one channel a file may keep the axis or not."""
+    """Read values like those of the exemplar. A file of one channel may have a channel axis or not."""
     given = fit_volume(read_array(path, about.axes), path, about)
     return given[..., np.newaxis] if about.like is not None and given.ndim < about.like.ndim else given
 
 
 def read_numbers(path: str, about: About) -> Array:
-    """Read a number for each point: of several channels the mean."""
+    """Read a number for each point, the mean of several channels."""
     given = fit_volume(read_array(path, about.axes), path, about)
     return given if given.ndim == about.axes else np.asarray(given.mean(axis=-1))
 
 
 def read_density(text: str, about: About) -> Any:
-    """Return numbers, or shares that a picture shows: all of an integer's range is 0 to 1."""
+    """Read numbers, or shares from an image: the full range of an integer is 0 to 1."""
     if re.fullmatch(r"[-+.:0-9eE]+", text.strip()):
         return parse_numbers(text, about.option, "numbers such as 0.3 or 0.3:0.1, or a file")
     given = np.asarray(read_array(text, about.axes))
@@ -153,7 +153,7 @@ def read_density(text: str, about: About) -> Any:
 
 
 def read_mask(path: str, axes: int = 2) -> Array:
-    """Read a mask of any size, as `texrs.Mask` and the words after its name describe, and report how much it marks."""
+    """Read a mask of any size, according to `texrs.Mask` and the words after its name, and report the marked share."""
     mask = make_mask(path)
     path = name_file(mask.marks)
     marked = mark(mask, path, ("planes", "rows", "columns")[3 - axes :])
@@ -179,7 +179,7 @@ def read_hole(text: str, about: About) -> Any:
 
 
 def read_scale_map(path: str, encoding: str = "log2") -> Floats:
-    """Read a scale map, with its kind where the file says it: floats are scales, grey levels are decoded."""
+    """Read a scale map, with its kind if the file states it. Floats are scales, and grey levels are decoded."""
     from texrs import scale_maps
     from texrs.scale_maps._kinds import keep_kind, parse_kind
 
@@ -197,7 +197,10 @@ def read_scale_map(path: str, encoding: str = "log2") -> Floats:
 
 
 def read_target(text: str) -> Any:
-    """Read what an output is to show: a scale map, normals, texture coordinates, or Jacobians; of a plane the words stay."""
+    """Read the target of an output: a scale map, normals, texture coordinates, or Jacobians.
+
+    The words of a plane stay text.
+    """
     if text.lower().startswith(PLANE):
         return text
     try:
@@ -218,7 +221,7 @@ def read_target(text: str) -> Any:
 
 
 def read_field(text: str, about: About) -> Any:
-    """Return the field that words describe, or that of the frames or directions in a file, over an output of a size."""
+    """Return a field from words, or from frames or directions in a file, over an output of a size."""
     from texrs import fields
 
     with name_arguments(field=about.option or "--field"):
@@ -227,12 +230,12 @@ def read_field(text: str, about: About) -> Any:
 
 
 def read_stated_spacing(text: str | None) -> tuple[float, float, float] | None:
-    """Return the distances between the voxels of a file, if it states them."""
+    """Return the voxel spacing of a file if the file states it."""
     return None if text is None or text.startswith(SAMPLE) else io.read_spacing(text)
 
 
 def read_direction(text: str, about: About) -> Any:
-    """Read degrees, one number or a picture of them, or a field: its words, or frames in a file."""
+    """Read degrees (a number or an image of numbers), or a field: its words, or frames in a file."""
     try:
         return float(text)
     except ValueError:
@@ -242,14 +245,17 @@ def read_direction(text: str, about: About) -> Any:
 
 
 def read_entry(text: str, about: About, *, single: bool = True) -> Any:
-    """Read analysed elements, or a picture, which is analysed by whoever takes it."""
+    """Read analysed elements, or an image, which the verb analyses."""
     from texrs import elements
 
     return elements.load(text) if text.lower().endswith(".npz") else read_example(text, about, single=single)
 
 
 def read_layout(text: str, about: About) -> Any:
-    """Read analysed elements or a picture, as `read_entry` does, or make a layout of JSON; its labels may be a picture."""
+    """Read analysed elements or an image, as `read_entry` does, or make a layout from JSON.
+
+    Its labels may be an image.
+    """
     if not text.lower().endswith(".json") and not text.lstrip().startswith("{"):
         return read_entry(text, about)
     from texrs import layouts
@@ -261,7 +267,7 @@ def read_layout(text: str, about: About) -> Any:
 
 
 def read_labels(path: str, about: About) -> Array:
-    """Read the labels of elements: a picture of them, or those of an entry."""
+    """Read the labels of elements: an image of labels, or the labels of an entry."""
     from texrs import elements
 
     return elements.load(path).labels if path.lower().endswith(".npz") else io.read(path)

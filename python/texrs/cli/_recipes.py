@@ -1,4 +1,4 @@
-"""What a batch is to do: recipes, what they say, and the commands that come of them."""
+"""Recipes of a batch, their contents, and their commands."""
 
 from __future__ import annotations
 
@@ -34,27 +34,27 @@ __all__ = [
 
 KEPT = tuple(s for s in WRITTEN_IMAGES if s not in (".gif", ".npz"))
 KEPT_VOLUMES = tuple(s for s in WRITTEN_VOLUMES if s != ".npz")
-"""Formats of inputs that results have too; of others the results are .png, or .npy."""
+"""Formats of inputs that results keep. Other results are .png or .npy."""
 LOSSY = (".jpg", ".jpeg", ".webp", ".avif", ".jxl")
 EXACT = ("scale-map",)
-"""Commands whose results are measurements, which no lossy format may change."""
+"""Commands whose results are measurements, which a lossy format must not change."""
 NAMED = (*READ_IMAGES, *READ_VOLUMES, ".csv", ".json", ".npz")
-"""An argument with such a suffix is the name of a file."""
+"""Suffixes of arguments that are file names."""
 KEYS = ("verb", "inputs", "arguments", "out", "seeds", "options", "presets", "sheet")
-"""What a recipe may say."""
+"""Keys of a recipe."""
 MOST = 2**16
-"""Results of a batch."""
+"""Maximum number of results of a batch."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What is to be done."""
+    """Description of a batch."""
 
     verb: str
     inputs: list[str]
     """Files, folders, patterns, or ``sample:NAME``."""
     arguments: list[str]
-    """Arguments of the verb; ``{input}`` is one of the inputs."""
+    """Arguments of the verb. ``{input}`` is one of the inputs."""
     out: str
     seeds: list[int]
     options: dict[str, Any]
@@ -70,14 +70,14 @@ class Job:
     out: str
     words: list[str]
     maps: int = 0
-    """Number of maps of a material that it reads; 0 for a file."""
+    """Number of maps of its material; 0 for a file."""
 
 
 def read_recipe(path: str) -> dict[str, Any]:
-    """Return what a recipe says."""
+    """Return the contents of a recipe."""
     try:
         content = Path(path).read_bytes()
-        # Editors of Windows put a mark before the text, and some write UTF-16.
+        # Windows editors put a byte order mark before the text, and some write UTF-16.
         wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         return tomllib.loads(content.decode("utf-16" if wide else "utf-8-sig"))
     except OSError as error:
@@ -87,7 +87,7 @@ def read_recipe(path: str) -> dict[str, Any]:
 
 
 def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
-    """Return a recipe whose parts have the right types."""
+    """Return a recipe after checking the types of its parts."""
     for key in said:
         if key not in KEYS:
             raise InvalidInput(f"{where}: unknown key {key!r}; must be one of {', '.join(KEYS)}")
@@ -120,7 +120,7 @@ def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
 
 
 def place_input(arguments: list[str]) -> list[str]:
-    """Return the arguments of a command; the input is the first, unless one of them is or holds it."""
+    """Return the arguments of a command. The input is the first, unless another one is or contains it."""
     return arguments if any("{input}" in text for text in arguments) else ["{input}", *arguments]
 
 
@@ -152,7 +152,7 @@ def parse_seeds(value: Any, where: str) -> list[int]:
 
 
 def parse_options(texts: Sequence[str]) -> dict[str, Any]:
-    """Return the options of texts such as ``size=512``; without a value a flag is set."""
+    """Return the options in texts such as ``size=512``. A name without a value sets a flag."""
     return {(parts := text.partition("="))[0].lstrip("-"): parts[2] if parts[1] else True for text in texts}
 
 
@@ -168,7 +168,7 @@ def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
         out=base if base == recipe.out and not Path(base).suffix else os.path.dirname(base),
     ):
         every[source] = list(expand(recipe, source))
-    # The results of an earlier run are not inputs, if they are among the inputs.
+    # Results of an earlier run are not inputs, even if the input patterns match them.
     flags = {flag for names, _, _ in OUTPUTS.values() for flag in names}
     made: dict[str, Source] = {}
     for source, jobs in every.items():
@@ -205,14 +205,14 @@ def list_files(recipe: Recipe, parameters: Sequence[Any]) -> list[str]:
 
 
 def names_file(parameter: Any) -> bool:
-    """Return whether an option or an argument of a command may be the name of a file to read."""
+    """Return whether an option or an argument of a command may name an input file."""
     if parameter.param_type_name == "argument":
         return True
     return parameter.name not in OUTPUTS and re.search("FILE|csv", parameter.metavar or "") is not None
 
 
 def check_files(jobs: Sequence[tuple[Job, Any]], parameters: Sequence[Any]) -> None:
-    """Check that every other file that the jobs read is there; name all that are missing."""
+    """Check that all other input files of the jobs exist. Name all missing ones."""
     missing = {}
     for job, context in jobs:
         for p in parameters:
@@ -231,7 +231,7 @@ def check_files(jobs: Sequence[tuple[Job, Any]], parameters: Sequence[Any]) -> N
 
 
 def place_arguments(recipe: Recipe, parameters: Sequence[Any]) -> Recipe:
-    """Return a recipe whose options that are arguments of the command, as ``mask`` of inpaint, are in their place."""
+    """Return a recipe with options as arguments if the command has them so, such as ``mask`` of inpaint."""
     options, arguments = dict(recipe.options), list(recipe.arguments)
     flags = {flag.lstrip("-") for p in parameters for flag in p.opts if p.param_type_name == "option"}
     for place, p in enumerate(q for q in parameters if q.param_type_name == "argument"):
@@ -261,9 +261,9 @@ def expand(recipe: Recipe, source: Source) -> Iterator[Job]:
 
 
 def choose_suffix(verb: str, source: Source) -> str:
-    """Return the suffix of a result: that of the input, if the result can be written so."""
+    """Return the suffix of a result: the suffix of the input, if the result can be written in this format."""
     if source.maps:
-        # The maps of a material are written to a folder of their own.
+        # The maps of a material are written to their own folder.
         return ""
     suffix = source.suffix.lower()
     if verb == "analyse":
@@ -273,7 +273,7 @@ def choose_suffix(verb: str, source: Source) -> str:
 
 
 def check_results(jobs: Sequence[Job]) -> None:
-    """Check that no result takes the place of an input."""
+    """Check that no result replaces an input."""
     files = {file: None for job in jobs for file in (expand_braces(job.source) or [job.source])}
     read = {(s.st_dev, s.st_ino): file for file in files if (s := read_status(file)) is not None}
     for job in jobs:

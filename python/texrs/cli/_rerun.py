@@ -1,4 +1,4 @@
-"""Commands about files that are there: ``texrs info`` says what one holds, ``texrs rerun`` makes it again."""
+"""Commands about existing files: ``texrs info`` describes a file, ``texrs rerun`` makes it again."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from texrs.source_map import SourceMap
 PLACED_FLAGS = {"--at", "--background", "--box", "--corners", "--oblique", "--points"}
 """Options that took row,column before records stated an order."""
 SHORT = 16
-"""Digits of a SHA-256 that are shown."""
+"""Number of displayed digits of a SHA-256."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How a file says that it was made."""
+    """Record in a file of how it was made."""
 
     path: str
     text: str
@@ -52,17 +52,17 @@ class Recipe:
     arguments: list[str | None]
     options: dict[str, Any]
     inputs: dict[str, str]
-    """SHA-256 by name, as seen from the folder of the file."""
+    """SHA-256 by name, relative to the folder of the file."""
     output: str
     file: str | None
-    """Its name in the folder that is written, where it is a folder."""
+    """Name within the output folder, if the output is a folder."""
     suffix: str
     rows_first: bool
-    """Whether places in it are row,column: it does not say x,y."""
+    """Whether its places are row,column: the record does not state x,y."""
 
     @classmethod
     def read(cls, path: str) -> Recipe | None:
-        """Return what a file says; None where it says nothing."""
+        """Return the record in a file, or None."""
         text = io.read_metadata(path).made
         if text is None:
             return None
@@ -82,13 +82,13 @@ class Recipe:
                 said.get("places") != "x,y",
             )
         except (KeyError, TypeError, AttributeError, ValueError):
-            raise FileError(f"{path}: what it says of how it was made is damaged") from None
+            raise FileError(f"{path}: its record of the command is damaged") from None
         if one.file is not None and os.path.basename(str(one.file)) != one.file:
-            raise FileError(f"{path}: what it says of how it was made is damaged")
+            raise FileError(f"{path}: its record of the command is damaged")
         return one
 
     def make_command(self, names: Mapping[str, str], folder: str) -> list[str]:
-        """Return the command that makes the file in a folder, of files that are called otherwise now."""
+        """Return the command that makes the file in a folder, with the present names of its inputs."""
         target = folder if self.file is not None else os.path.join(folder, os.path.basename(self.path))
 
         def find(text: str) -> str:
@@ -102,12 +102,12 @@ class Recipe:
         if None in self.arguments:
             return words
         if self.output not in ("--out", "--sheet"):
-            # The command writes its result too.
+            # The command also writes its result.
             words += ["--out", os.path.join(folder, f"result{self.suffix or '.npz'}")]
         return [*words, self.output, target]
 
     def show(self) -> str:
-        """Return the command as one types it."""
+        """Return the command as typed in a shell."""
         words = ["texrs", self.verb, *("FOLDER" if a is None else a for a in self.arguments)]
         for flag, value in self.options.items():
             for text in value if isinstance(value, list) else [value]:
@@ -115,11 +115,11 @@ class Recipe:
         return shlex.join(words)
 
     def find_inputs(self) -> dict[str, str]:
-        """Return where each file lies now that was read; say all that is missing or has changed."""
+        """Return the present path of each input file. Report all missing or changed ones."""
         folder = os.path.dirname(os.path.realpath(self.path))
         found, wrong = {}, []
         for name, sha in self.inputs.items():
-            # Beside the result, as it was; where the command is given; in the same folder.
+            # Search relative to the result, relative to the current folder, and next to the result.
             places = (os.path.join(folder, name), name, os.path.join(folder, os.path.basename(name)))
             there = [os.path.normpath(p) for p in places if os.path.isfile(p) or io.is_store(p)]
             same = next((p for p in there if hash_file(p) == sha), None)
@@ -135,7 +135,7 @@ class Recipe:
         if wrong:
             raise InvalidInput(f"{self.path}: cannot be made again: {'; '.join(wrong)}")
         for text in (*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))):
-            # Of a folder of maps all files are known.
+            # All files of a folder of maps are recorded.
             inside = [found[name] for name in self.inputs if isinstance(text, str) and os.path.dirname(name) == text]
             if inside and text not in found:
                 found[str(text)] = os.path.dirname(inside[0])
@@ -150,8 +150,10 @@ class Recipe:
 
 def rerun_command(
     context: typer.Context,
-    output: Annotated[str, make_argument("OUTPUT", "A file that texrs wrote, or a folder of what one command made.")],
-    out: Annotated[str | None, to_write("out", text="Where to write it; by default it is only compared.")] = None,
+    output: Annotated[str, make_argument("OUTPUT", "A file that texrs wrote, or a folder that one command wrote.")],
+    out: Annotated[
+        str | None, to_write("out", text="Path to write to. By default the result is only compared.")
+    ] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
@@ -190,7 +192,7 @@ def rerun_command(
 
 
 def read_recipes(output: str) -> list[Recipe]:
-    """Return how a file was made, or each file of a folder, which one command made."""
+    """Return the record of a file, or of each file of a folder, which one command wrote."""
     if not os.path.isdir(output):
         recipe = Recipe.read(output)
         if recipe is None:
@@ -198,7 +200,7 @@ def read_recipes(output: str) -> list[Recipe]:
             raise InvalidInput(f"{output}: does not say how it was made" if there else f"{output}: is not there")
         return [recipe]
     inside = {entry.path for entry in os.scandir(output) if entry.is_file()}
-    # What says how another file was made is no file of its own.
+    # The record of another file is not a file of its own.
     files = sorted(file for file in inside if not (file.endswith(".json") and file.removesuffix(".json") in inside))
     known = [recipe for file in files if (recipe := Recipe.read(file)) is not None and recipe.file is not None]
     if not known:
@@ -209,7 +211,7 @@ def read_recipes(output: str) -> list[Recipe]:
 
 
 def check_same(path: str, recipe: Recipe) -> None:
-    """Check that nothing is lost when a file is written to ``path``."""
+    """Check that writing a file to ``path`` loses nothing."""
     if os.path.lexists(path) and not (os.path.isfile(path) and os.path.getsize(path) == 0):
         made = io.read_metadata(path).made if os.path.isfile(path) else None
         if made is None or json.loads(made) != json.loads(recipe.text) or not is_unchanged(path, made):
@@ -217,7 +219,7 @@ def check_same(path: str, recipe: Recipe) -> None:
 
 
 def compare(recipe: Recipe, made: str) -> None:
-    """Say whether the file that was made is the one that is there."""
+    """Report whether the new file equals the existing one."""
     now, then = hash_file(made), hash_file(recipe.path)
     again = io.read_metadata(made).made
     if now == then and again is not None and json.loads(again) == json.loads(recipe.text):
@@ -236,7 +238,7 @@ def compare(recipe: Recipe, made: str) -> None:
 def info_command(
     file: Annotated[str, make_argument("FILE", "Any file that texrs reads or writes, or a folder of maps.")],
 ) -> None:
-    """Print what a file holds, and how texrs made it."""
+    """Print the contents of a file, and how texrs made it."""
     if io.is_store(file):
         say(describe_store(file))
         return
@@ -270,7 +272,7 @@ def info_command(
 
 
 def describe_file(file: str, recipe: Recipe | None) -> list[str]:
-    """Return lines about what a file holds, whatever it is."""
+    """Return lines about the contents of any file."""
     if not os.path.isfile(file):
         io.read(file)
     suffix = Path(file).suffix.lower()
@@ -307,7 +309,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
 
 
 def describe_folder(folder: str) -> list[str]:
-    """Return lines about the maps of a folder, or about the volume whose slices it contains."""
+    """Return lines about the maps of a folder, or about the volume in its slices."""
     try:
         return describe_material(folder, "map")
     except FileError as error:
@@ -319,20 +321,20 @@ def describe_folder(folder: str) -> list[str]:
 
 
 def describe_volume(path: str, volume: Array) -> str:
-    """Return a line about a volume: its sides, its values and the spacing that the file states."""
+    """Return a line about a volume: its sides, its values and its stated spacing."""
     spacing = io.read_spacing(path)
     steps = "" if spacing is None else f", voxels of {' x '.join(f'{s:g}' for s in reversed(spacing))}"
     return f"volume: {describe(volume, 3)}, {volume.min()} to {volume.max()}{steps}"
 
 
 def describe_store(path: str) -> str:
-    """Return a line about the array of a Zarr store; sides from planes to columns."""
+    """Return a line about the array of a Zarr store, with sides from planes to columns."""
     array, _ = io.read_vectors(path)
     return f"store: {' x '.join(map(str, array.shape))} of {array.dtype}, {array.min()} to {array.max()}"
 
 
 def describe_material(path: str, what: str) -> list[str]:
-    """Return lines about the maps of a folder, or the layers of a file. Notices name all others."""
+    """Return lines about the maps of a folder or the layers of a file. Notices name all other files."""
     shown = Material.read(path)
     first = f"material: {show_sides(shown.shape)}, {len(shown)} {what}{'s'[: len(shown) != 1]}"
     return [first, *(describe_layer(name, each) for name, each in shown.items())]
@@ -350,7 +352,7 @@ def describe_scene(file: str) -> str:
         pictures = ", ".join(image["name"] for image in scene["images"])
         return f"scene: glTF {scene['asset']['version']}, {shapes}, textures {pictures}"
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise FileError(f"{file}: is no binary glTF file, or is damaged") from None
+        raise FileError(f"{file}: not a binary glTF file, or damaged") from None
 
 
 def describe_document(file: str) -> str:
@@ -364,7 +366,7 @@ def describe_document(file: str) -> str:
 
 
 def describe_layer(name: str, each: Map) -> str:
-    """Return the name of a map, its role, how it encodes light, and its samples."""
+    """Return the name, the role, the encoding and the samples of a map."""
     space = "sRGB" if each.space == "srgb" else each.space
     return (
         f"{name}: {each.role.value}, {space}, {each.channels} channel{'s'[: each.channels != 1]}, {each.pixels.dtype}"
@@ -393,7 +395,7 @@ def describe_elements(file: str) -> list[str]:
 
 
 def describe_arrays(file: str) -> list[str]:
-    """Return a line an array; a single one with two axes, or with three, is a picture."""
+    """Return a line for each array. A single one with two or three axes is described as an image."""
     arrays = io.read_headers(file)
     if len(arrays) == 1 or "image" in arrays:
         raise FileError(f"{file}: holds one array")

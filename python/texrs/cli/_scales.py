@@ -25,7 +25,7 @@ from texrs.errors import InvalidInput
 from texrs.scale_maps._kinds import describe_kind, find_kind
 
 FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
-"""Formats that keep the scales themselves; pictures of 8 bits keep them encoded."""
+"""Formats that store scales as floats. 8-bit images store them encoded."""
 ANGLES = Options(scale_maps.from_angles, only=("slant", "tilt", "fov"), optional={"slant": "", "tilt": "90"})
 MASKS = Options(scale_maps.from_mask, only=("measure", "window", "trend", "foreshortened"))
 FOUND = Options(scale_maps.auto_mask, only=("min_feature_size",))
@@ -44,11 +44,9 @@ def scale_map_command(
     image: Annotated[str, make_argument("IMAGE", "The texture: an image file, or sample:NAME.")],
     out: Annotated[str, to_write("out")],
     given: dict[str, Any],
-    mask: Annotated[str | None, make_option("FILE", f"Measure in a mask of the elements. {WORDS}")] = None,
-    auto: Annotated[bool, typer.Option("--auto", help="Measure in a mask that is found in the image.")] = False,
-    scale_map: Annotated[
-        str | None, make_option("FILE", "A map made before, to edit or to bring to another size.")
-    ] = None,
+    mask: Annotated[str | None, make_option("FILE", f"Mask of the elements, for the measurement. {WORDS}")] = None,
+    auto: Annotated[bool, typer.Option("--auto", help="Find the mask of the elements in the image.")] = False,
+    scale_map: Annotated[str | None, make_option("FILE", "An existing scale map, to edit or to resize.")] = None,
     hole: Annotated[
         str | None,
         make_option(
@@ -59,7 +57,7 @@ def scale_map_command(
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Make a scale map: how large the elements of a picture are at each place."""
+    """Make a scale map: the apparent size of the elements at each pixel of an image."""
     start = time.monotonic()
     origins = {"--mask": mask, "--auto": auto or None, "--slant": given["slant"], "--scale-map": scale_map}
     chosen = [option for option, value in origins.items() if value is not None]
@@ -127,13 +125,13 @@ def scale_map_command(
 
 
 def find_fov(image: str) -> dict[str, float]:
-    """Return the angle of view that a photograph states, as an argument."""
+    """Return the angle of view in the metadata of a photograph, as an argument."""
     fov = None if image.startswith(_outputs.SAMPLE) else io.read_fov(image)
     return {} if fov is None else {"fov": fov}
 
 
 def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
-    """Return the mask, if it is as large as the picture."""
+    """Return the mask if it has the size of the image."""
     if mask.shape[:2] != pixels.shape[:2]:
         sizes = (_outputs.show_sides(a.shape[:2]) for a in (pixels, mask))
         raise InvalidInput("{}: needs the size of the image, {}; got {}".format(option, *sizes))
@@ -141,7 +139,7 @@ def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
 
 
 def save(shown: dict[str, Array], report: dict[str, Any], folder: Path) -> None:
-    """Write the pictures of the stages, and a report."""
+    """Write the images of the stages, and a report."""
     for number, (name, picture) in enumerate(shown.items(), start=1):
         io.write(os.path.join(folder, f"{number:02d}-{name}.png"), preview(picture))
     with io.atomic(os.path.join(folder, "report.json")) as temporary:

@@ -31,11 +31,11 @@ from texrs.volume.pictures import as_steps, check_cube, check_turntable
 from texrs.volume.transparent import check_transfer, parse_transfer
 
 _AXES = {"plane": 0, "row": 1, "column": 2, "z": 0, "y": 1, "x": 2}
-"""Names of axes: those of arrays, and those of places."""
+"""Names of axes: of arrays, and of places."""
 
 
 def parse_at(text: str, about: About) -> tuple[int, int] | list[float]:
-    """Return an axis and a place of ``z=30``, or (plane, row, column) of ``10,20,30``."""
+    """Return an axis and a position of ``z=30``, or (plane, row, column) of ``10,20,30``."""
     axis, equals, number = (p.strip() for p in text.partition("="))
     try:
         if equals and axis in _AXES:
@@ -96,14 +96,18 @@ def slice_command(
     volume: Annotated[str, make_argument("VOLUME", "The volume: a file, or sample:NAME.")],
     out: Annotated[str, to_write("out", text="Image file to write, or a page (.html) with sliders.")],
     given: dict[str, Any],
-    as_cube: Annotated[bool, typer.Option("--cube", help="A block of the material, on a transparent ground.")] = False,
-    as_clear: Annotated[bool, typer.Option("--transparent", help="The block seen through.")] = False,
-    as_turntable: Annotated[bool, typer.Option("--turntable", help="The block turning, as an animated GIF.")] = False,
-    labels: Annotated[bool, typer.Option("--labels", help="The volume holds labels: each is given a colour.")] = False,
+    as_cube: Annotated[
+        bool, typer.Option("--cube", help="Draw a block of the material on a transparent background.")
+    ] = False,
+    as_clear: Annotated[bool, typer.Option("--transparent", help="Draw the block as transparent.")] = False,
+    as_turntable: Annotated[
+        bool, typer.Option("--turntable", help="Draw the rotating block as an animated GIF.")
+    ] = False,
+    labels: Annotated[bool, typer.Option("--labels", help="Draw each label of the volume in its own colour.")] = False,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Show a volume: slices along its axes, a cut in any direction, a cube, seen through, or a turntable."""
+    """Show a volume: slices along its axes, an oblique slice, a block, a transparent view, or a turntable."""
     start = time.monotonic()
     asked = {
         "--at": given["at"],
@@ -163,7 +167,7 @@ def slice_command(
 
 
 def check_view(used: Options, options: dict[str, Any]) -> None:
-    """Check what the volume is to look like before it is read, which may take long."""
+    """Check the requested view before the volume is read, which may take long."""
     asked = {name: value for name, value in options.items() if name != "interpolation"}
     if used is BLOCK:
         check_cube(**asked)
@@ -180,7 +184,7 @@ def check_view(used: Options, options: dict[str, Any]) -> None:
 
 
 def place_in_cubes(options: dict[str, Any], length: Sequence[int], sides: Sequence[int]) -> None:
-    """Change places among voxels into places among cubes."""
+    """Convert places among voxels to places among cubes."""
     place = options.get("at")
     if isinstance(place, tuple):
         axis, number = place
@@ -194,7 +198,7 @@ def place_in_cubes(options: dict[str, Any], length: Sequence[int], sides: Sequen
 
 
 def draw(voxels: Array, used: Options, options: dict[str, Any]) -> Array:
-    """Return the picture that was asked for."""
+    """Return the requested image."""
     if used is BLOCK:
         return render_block(voxels, **options)
     if used is CLEAR:

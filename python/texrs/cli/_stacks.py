@@ -1,4 +1,4 @@
-"""Materials on the command line: folders of maps, or layers of an EXR file, that are read and written as a whole."""
+"""Materials on the command line: folders of maps, or layers of an EXR file, read and written as a whole."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SHOWN = ("preview", "mipmaps", "gltf", "materialx")
 
 
 def _option(type_: Any, flag: str, metavar: str, text: str, default: str | bool = False) -> Any:
-    """Return what typer reads of an option that only materials have."""
+    """Return typer's description of an option that only materials have."""
     return Annotated[
         type_ | None, typer.Option(flag, metavar=metavar, help=text, show_default=default, rich_help_panel=PANEL)
     ]
@@ -44,7 +44,7 @@ Roles = Annotated[
     typer.Option(
         "--role",
         metavar="MAP=ROLE",
-        help="What a map is for whose name does not say it; the option may be repeated.",
+        help="Role of a map whose name does not state it. The option may be repeated.",
         show_default=False,
         rich_help_panel=PANEL,
     ),
@@ -58,28 +58,30 @@ OPTIONS: dict[str, Any] = {
         "Bits of each map of a material: integers of 8 or 16, floats of 32.",
         "as each map has",
     ),
-    "format": _option(str, "--format", "png|tif|exr", "Of the maps of a material.", "png, or what holds the map"),
+    "format": _option(
+        str, "--format", "png|tif|exr", "File format of the maps of a material.", "png, or what holds the map"
+    ),
     "pack": _option(
         str,
         "--pack",
         "orm|none",
-        "Occlusion, roughness and metallic as one map, or as maps of their own.",
+        "Packing of occlusion, roughness and metallic: one map, or separate maps.",
         "as they came",
     ),
     "convention": _option(
         str,
         "--convention",
         "NAME",
-        f"Names, packings and direction of y of the maps: {', '.join(CONVENTIONS)}.",
+        f"Convention for names, packing and y direction of the maps: {', '.join(CONVENTIONS)}.",
         "those that came in",
     ),
 }
-"""How materials are read and written, as options of a command."""
+"""Options for reading and writing materials."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """How materials are read and written."""
+    """Description of how materials are read and written."""
 
     roles: Mapping[str, str]
     depth: int | None
@@ -89,7 +91,7 @@ class Stack:
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Stack:
-        """Take the options out of what a command was given, and check them."""
+        """Take the options out of the arguments of a command, and check them."""
         roles, depth, suffix, pack, convention = (given.pop(name, None) for name in OPTIONS)
         said = read_roles(roles)
         if depth not in (None, *DEPTHS):
@@ -122,7 +124,7 @@ class Stack:
                 raise InvalidInput(f"{flag}: is for materials, which are folders of maps or EXR files of layers")
 
     def check_outputs(self, material: Material, paths: Mapping[str, str | None], read: Sequence[str]) -> None:
-        """Check before the work that all can be written, over nothing that is read or somebody else's."""
+        """Check before the work that all files can be written, and replace neither inputs nor other files."""
         out = paths["out"] or ""
         if Path(out).suffix.lower() == LAYERED:
             if self.suffix or self.depth or self.pack or self.convention:
@@ -132,7 +134,7 @@ class Stack:
                 )
             _outputs.check_output(out)
             return
-        # `texrs rerun` gives a name with .npz to results that it does not need.
+        # `texrs rerun` passes a name with .npz for results that it does not need.
         if split_suffix(out)[1] not in ("", ".npz") and not os.path.isdir(out):
             raise InvalidInput(f"--out: must be a folder or one {LAYERED} file for the maps of a material, got {out!r}")
         _outputs.check_folder(out)
@@ -143,20 +145,20 @@ class Stack:
             file = f"{each.file or name}{self.suffix or choose_suffix(each, self.depth, material.axes)}"
             _outputs.check_apart(read, {"out": os.path.join(out, file)})
             check_free(os.path.join(out, file))
-            # Tried beside what is there, in the folder or where it will be made.
+            # Try to write next to the existing files, in the folder or where it will be created.
             _outputs.check_output(
                 str(there / f".texrs-{file}"), convert(name, each, self.depth, material.axes).pixels, material.shape
             )
 
     def save(self, material: Material, folder: Path, *, mipmaps: bool = False) -> list[Path]:
-        """Write the maps, or also those in halves of their size, to a folder."""
+        """Write the maps to a folder, also at half sizes if requested."""
         depth: Any = self.depth
         pack: Any = self.pack
         how = {"pack": pack, "convention": self.convention, "mipmaps": mipmaps}
         return material.save(folder, depth=depth, suffix=self.suffix, **how)
 
     def save_smaller(self, material: Material, folder: Path) -> None:
-        """Write the maps in halves of their size alone."""
+        """Write only the maps at half sizes."""
         for file in self.save(material, folder, mipmaps=True):
             if file.parent == folder:
                 file.unlink()
@@ -173,10 +175,10 @@ class Stack:
         made: _provenance.Record | None = None,
         option: str = "out",
     ) -> None:
-        """Write the maps, and what was asked for beside them."""
+        """Write the maps, and the additional outputs."""
         material, out = result.material, paths["out"] or ""
         assert material is not None
-        # A folder is made again as one.
+        # A folder is replaced as a whole.
         _outputs.deliver_beside(result, paths, Path(out).suffix or "/", made)
         if Path(out).suffix.lower() == LAYERED:
             with _outputs.write_output(out, option, inside=option != "out", made=made) as place:
@@ -188,7 +190,7 @@ class Stack:
             with _outputs.write_output(shown, "preview", made=made) as place:
                 io.write(place, material.preview())
         if (solid := paths.get("gltf")) is not None:
-            # The material in it is called as the file, which a temporary name is not.
+            # The material in the file has the name of the file, not its temporary name.
             with _outputs.write_output(solid, "gltf", made=made) as place, TemporaryDirectory() as beside:
                 material.save_gltf(file := Path(beside, Path(solid).name))
                 shutil.copyfile(file, place)
@@ -201,7 +203,7 @@ class Stack:
 
 
 def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
-    """Return what maps are said to be for."""
+    """Return the given roles of maps."""
     said = {}
     for text in texts or ():
         name, equals, role = text.partition("=")
@@ -212,7 +214,7 @@ def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
 
 
 def is_stack(text: str) -> bool:
-    """Return whether a name is that of a folder, of several files, or of an EXR file of several layers."""
+    """Return whether a name is a folder, several files, or an EXR file of several layers."""
     if os.path.isdir(text):
         return not io.is_store(text)
     if expand_braces(text):
@@ -220,7 +222,7 @@ def is_stack(text: str) -> bool:
     if Path(text).suffix.lower() != LAYERED or not os.path.isfile(text):
         return False
     with suppress(Exception):
-        # Layers have names in front of those of their channels.
+        # Names of channels in layers begin with the name of the layer.
         if any("." in name for name in list_exr_channels(Path(text))):
             return True
     with suppress(FileError), collect(show=lambda line: None):

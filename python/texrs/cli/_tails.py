@@ -1,4 +1,4 @@
-"""Words after the name of a file: the size and type of samples without a header, or how a mask is read."""
+"""Words after a file name: the size and type of samples without a header, or the reading of a mask."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ __all__ = ["make_mask", "split_tail"]
 
 WORD = r"(?:invert|threshold=[^,:]+|grow=[^,:]+)"
 MASKED = re.compile(rf"(?P<path>.+):(?P<words>{WORD}(?:,{WORD})*)")
-"""A mask that is read in another way, as ``mask.png:invert,grow=3``."""
+"""Form of a mask with reading options, such as ``mask.png:invert,grow=3``."""
 
 
 def split_tail(text: str) -> tuple[str, str]:
-    """Return the name of a file, and the words after it with their colon.
+    """Return a file name, and the words after it with their colon.
 
     Examples
     --------
@@ -36,7 +36,7 @@ def split_tail(text: str) -> tuple[str, str]:
 
 
 def make_mask(text: str) -> Mask:
-    """Return the mask in a file, as the words after its name ask for."""
+    """Return the mask in a file, according to the words after its name."""
     path, tail = split_tail(text)
     given: dict[str, Any] = {}
     for word in tail[1:].split(",") if tail else ():

@@ -1,4 +1,4 @@
-"""Values that are written on the command line: sizes, axes, numbers, points, edits."""
+"""Values as text on the command line: sizes, axes, numbers, points, edits."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 
 FOUND = "found"
-"""Stands for what is not said of a plane."""
+"""Word for parts of a plane that are not given."""
 PLANE = "plane:"
-"""Before the words that say how a plane lies."""
+"""Prefix of the words that describe a plane."""
 
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What the text of an option may be understood by."""
+    """Context for the text of an option."""
 
     option: str = ""
-    """What errors call it."""
+    """Name in errors."""
     axes: int = 2
     first: str = ""
-    """Text of the first argument: usually the name of the example."""
+    """Text of the first argument, usually the name of the example."""
     size: tuple[int, ...] = ()
-    """Of the result, once it is known."""
+    """Size of the result, once it is known."""
     like: Array | None = None
-    """The exemplar, once it is read."""
+    """Exemplar, once it is read."""
     spacing: tuple[float, ...] | None = None
-    """Distances between the voxels of the exemplar, z first, if they are stated."""
+    """Spacing of the exemplar's voxels, z first, if it is stated."""
     roles: Mapping[str, str] = field(default_factory=dict)
-    """What maps of materials are for."""
+    """Roles of the maps of materials."""
 
 
 def parse_size(text: str, option: str = "--size", *, axes: int = 2, limit: int | None = None) -> tuple[int, ...]:
-    """Return (rows, columns) of ``1024x512``, which is the width and the height, or of ``512`` a square.
+    """Return (rows, columns) of ``1024x512``, which is the width and the height, or of ``512`` for a square.
 
-    With three axes the depth comes last in the text, and the planes first in what is returned.
+    With three axes the depth comes last in the text, and the planes come first in the result.
     """
     parts = re.split(r"[x×]", text.strip().lower())
     if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
@@ -75,7 +75,7 @@ def show_axes(wrap: bool | Sequence[bool]) -> str:
 def parse_numbers(
     text: str, option: str, wanted: str, *, counts: Sequence[int] = (), between: str = ":"
 ) -> list[float]:
-    """Return finite numbers with a sign between them."""
+    """Return finite numbers that are separated by a character."""
     try:
         numbers = [float(p) for p in text.split(between)]
     except ValueError:
@@ -86,20 +86,20 @@ def parse_numbers(
 
 
 def parse_spacing(text: str, about: About) -> tuple[float, ...]:
-    """Return (z, y, x) of ``0.7x0.7x1.6``, the width, height and depth of a voxel; of one number, a cube."""
+    """Return (z, y, x) of ``0.7x0.7x1.6``, the width, height and depth of a voxel. One number gives a cube."""
     wanted = "WIDTHxHEIGHTxDEPTH of a voxel, as in 0.7x0.7x1.6, or one number"
     numbers = parse_numbers(text.lower().replace("×", "x"), about.option, wanted, counts=(1, about.axes), between="x")
     return tuple(numbers[::-1]) if len(numbers) > 1 else tuple(numbers) * about.axes
 
 
 def parse_range(text: str, about: About) -> tuple[float, float]:
-    """Return the least and the largest of ``0.8:1.2``; of ``1``, it for both."""
+    """Return the minimum and the maximum of ``0.8:1.2``. ``1`` gives both."""
     numbers = parse_numbers(text, about.option, "LEAST:LARGEST, as in 0.8:1.2", counts=(1, 2))
     return numbers[0], numbers[-1]
 
 
 def parse_sizes(text: str, about: About) -> str | bool | list[float]:
-    """Return auto, or the answer of yes or no, or numbers."""
+    """Return auto, a bool for yes or no, or numbers."""
     word = text.strip().lower()
     if word in ("auto", "yes", "no"):
         return "auto" if word == "auto" else word == "yes"
@@ -107,7 +107,7 @@ def parse_sizes(text: str, about: About) -> str | bool | list[float]:
 
 
 def parse_bytes(text: str, option: str = "--memory-limit") -> int:
-    """Return ``900M`` or ``16G`` as a number of bytes, in powers of 1024."""
+    """Return the number of bytes of ``900M`` or ``16G``, in powers of 1024."""
     found = re.fullmatch(r"([0-9]{1,18})([kmgt]?)(i?b)?", text.strip().lower())
     if not found or int(found[1]) == 0:
         raise InvalidInput(f"{option}: needs a number of bytes, as in 900M or 16G; got {text!r}")
@@ -115,7 +115,7 @@ def parse_bytes(text: str, option: str = "--memory-limit") -> int:
 
 
 def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
-    """Return a number for each plane, or None for one that is to be found."""
+    """Return a number for each plane, or None for a plane whose number will be found."""
     found: list[float | None] = []
     for text in texts:
         word = text.strip().lower()
@@ -126,16 +126,16 @@ def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
 
 
 def read_steps(text: str, about: About) -> Any:
-    """Return an edit: names with commas between them, JSON, or a file of JSON."""
+    """Return an edit: comma-separated names, JSON, or a JSON file."""
     if not text.lower().endswith(".json") and not text.lstrip().startswith(("[", "{")):
         return [word.strip() for word in text.split(",")]
     found = read_json(text, about.option)
-    # A report holds its edit beside other things.
+    # A report contains its edit among other keys.
     return found["edit"] if isinstance(found, dict) and "edit" in found else found
 
 
 def read_json(text: str, option: str) -> Any:
-    """Return what JSON says, or a file of it."""
+    """Read JSON, or a JSON file."""
     where = option
     if text.lower().endswith(".json"):
         where = text
@@ -150,7 +150,7 @@ def read_json(text: str, option: str) -> Any:
 
 
 def read_corrections(text: str, about: About) -> Any:
-    """Return a list of corrections: JSON, or a file of it."""
+    """Return a list of corrections: JSON, or a JSON file."""
     if not (text.lower().endswith(".json") or text.lstrip().startswith("[")):
         raise InvalidInput(f"{about.option}: needs a file of JSON, or a list of steps as JSON; got {text!r}")
     return read_steps(text, about)

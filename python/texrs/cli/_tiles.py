@@ -1,4 +1,4 @@
-"""The command of designs without an end: ``texrs tiles``."""
+"""The command of unbounded designs: ``texrs tiles``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from texrs.materials._single import SingleMap
 from texrs.papers.design import design_variants
 
 CELLS = 256
-"""Of the index texture along each side."""
+"""Cells of the index texture along each side."""
 TILED = Options(CornerTiles, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
 DESIGNED = Options(
     design_variants,
@@ -41,37 +41,40 @@ PANEL = "Larger than memory"
 def tiles_command(
     out: Annotated[
         str,
-        to_write("out", "DIR|OUT", "Folder for the atlas, its index and shaders; or a window: a picture, or a .zarr."),
+        to_write("out", "DIR|OUT", "Folder for the atlas, its index and shaders; or an image or .zarr of a window."),
     ],
     given: dict[str, Any],
     size: Annotated[
-        str | None, make_option("WIDTHxHEIGHT", "Of a window, which is written instead of the tiles.")
+        str | None, make_option("WIDTHxHEIGHT", "Size of a window to write instead of the tile set.")
     ] = None,
-    origin: Annotated[str | None, make_option("X,Y[,Z]", "Where a window begins; any integers within 10^15.")] = None,
+    origin: Annotated[str | None, make_option("X,Y[,Z]", "First pixel of the window, integers within 10^15.")] = None,
     index: Annotated[
-        str | None, make_option("WIDTHxHEIGHT", f"Cells of the index texture, {CELLS} a side by default.")
+        str | None, make_option("WIDTHxHEIGHT", f"Cells of the index texture. Default: {CELLS} a side.")
     ] = None,
     chunks: Annotated[
         str | None,
-        typer.Option(
-            metavar="WIDTHxHEIGHT", help="A window in chunks of that size.", show_default=False, rich_help_panel=PANEL
-        ),
+        typer.Option(metavar="WIDTHxHEIGHT", help="Chunk size of a window.", show_default=False, rich_help_panel=PANEL),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(metavar="N", help="So many processes make the chunks.", show_default=False, rich_help_panel=PANEL),
+        typer.Option(
+            metavar="N", help="Number of processes that compute the chunks.", show_default=False, rich_help_panel=PANEL
+        ),
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="The workers of a cluster of Dask do.", show_default=False, rich_help_panel=PANEL
+            metavar="ADDRESS",
+            help="Address of a Dask cluster that computes the chunks.",
+            show_default=False,
+            rich_help_panel=PANEL,
         ),
     ] = None,
     role: Roles = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Cut corner tiles from designs: an endless texture, of which any window is looked up."""
+    """Cut corner tiles from designs: an unbounded texture with any window on request."""
     start = time.monotonic()
     said = {"origin": origin, "chunks": chunks, "workers": workers, "scheduler": scheduler}
     asked, windowed = Asked.read(said, 2), size is not None
@@ -83,7 +86,7 @@ def tiles_command(
     sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(index or str(CELLS), "--index")
     parts = is_stored(out) or chunks is not None or asked.scheduler is not None
     if windowed and not parts:
-        # Before the tiles are cut.
+        # Check this before the tiles are cut.
         as_size(sides, "--size", way=BEYOND)
     stack = Stack.take(dict.fromkeys(("depth", "format", "pack")) | {"role": role})
     values = TILED.read(given, which=lambda o: not o.file) | DESIGNED.read(given)
@@ -111,7 +114,7 @@ def tiles_command(
         tiles = CornerTiles(**call, progress=progress)
     note(f"made {tiles!r}, in {time.monotonic() - start:.1f} s", quiet=quiet)
     if not windowed:
-        # What the command wrote before is its own: each name is asked for in `write_folder`.
+        # Earlier files of this command may be replaced: `write_folder` checks each name.
         with _outputs.write_folder(out, "out") as place:
             files = tiles.save(place, sides)
         note(f"wrote {out}: {', '.join(file.name for file in files)}", quiet=quiet)

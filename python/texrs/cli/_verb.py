@@ -1,4 +1,4 @@
-"""A command that makes one thing of another: a verb of the library, between reading its inputs and writing what it made."""
+"""A command for a verb of the library: it reads the inputs, calls the verb and writes the result."""
 
 from __future__ import annotations
 
@@ -34,13 +34,15 @@ from texrs.materials._single import SingleMap
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
-    help="Make so many, OUT-SEED each, and OUT as their contact sheet.", show_default="one, in OUT", metavar="N"
+    help="Number of variants, written as OUT-SEED, with OUT as their contact sheet.",
+    show_default="one, in OUT",
+    metavar="N",
 )
 PALETTE = Annotated[
     bool | None,
     typer.Option(
         "--palette/--no-palette",
-        help="Look up the nearest pixel and correct no seams, so that the result has only the colours of the input.",
+        help="Use only the colours of the input: nearest pixels, without seam correction.",
         show_default="if the input is indexed or has few colours",
     ),
 ]
@@ -48,27 +50,33 @@ PALETTE = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Verb:
-    """A function that makes a `Synthesis`, as a command."""
+    """A function that returns a `Synthesis`, as a command."""
 
     options: Options
     times: int = 1
-    """How large the result is, of the sides of the first input, where no size is given."""
+    """Default size of the result, in sides of the first input."""
     shape: str = ""
-    """The file whose shape the result has, where one is given and no size is."""
+    """File whose shape the result has if it is given and no size is."""
     several: Callable[..., Iterable[Synthesis]] | None = None
-    """The function that makes ``count`` of them."""
+    """Function that makes ``count`` results."""
     says: Callable[[Synthesis], str] = lambda result: ""
-    """What else is to be said of the result."""
+    """Additional text about the result."""
     scaled: bool = True
-    """Whether a pixel of the result is as large as one of the first input."""
+    """Whether a pixel of the result has the size of one of the first input."""
     fills: bool = False
-    """Whether it fills pixels of the first input and keeps the others in place. A transparent input can then become opaque."""
+    """If True, it fills pixels of the first input and keeps the others in place.
+
+    A transparent input can then become opaque.
+    """
     keeps: bool = False
-    """If True, pixels stay in place if the size stays. A georeference is then written only to a result of the same size."""
+    """If True, pixels stay in place if the size stays.
+
+    A georeference is then written only to a result of the same size.
+    """
     beyond: str = ""
-    """What makes larger ones."""
+    """Method for larger results."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
-    """Values that the texts of the options tell, where they are not given."""
+    """Values that the texts of the options determine if they are not given."""
 
     def make_command(self) -> Callable[..., None]:
         """Return the function of the command."""
@@ -81,7 +89,7 @@ class Verb:
         parameters += [o.make_parameter() for o in self.options if not o.argument]
         if self.several is not None:
             parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
-        # Materials are pictures.
+        # Materials are images.
         stacked = self.options.axes == 2
         for name in ("source_map", "stages", *(SHOWN if stacked else ())):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
@@ -93,20 +101,20 @@ class Verb:
     def run(
         self, *, count: int | None, quiet: bool, variants: int | None = None, palette: bool | None = None, **given: Any
     ) -> None:
-        """Do the command; what is too large is told how it is made."""
+        """Run the command. Errors about size name the method for larger results."""
         try:
             with collect() as notices, ask(palette):
                 self.make(count=count, quiet=quiet, variants=variants, notices=notices, **given)
         except LimitExceeded as error:
             if not self.beyond or not str(error).startswith(("size:", "--size:")):
                 raise
-            # How Python makes it does not help here.
+            # The Python method does not help on the command line.
             raise LimitExceeded(f"{str(error).partition('; texrs.')[0]}; {self.beyond}") from None
 
     def make(
         self, *, count: int | None, quiet: bool, notices: Notices, variants: int | None = None, **given: Any
     ) -> None:
-        """Do the command: what can be checked is checked before any file is read, and before the work."""
+        """Run the command. Everything possible is checked before files are read, and before the work."""
         start, options = time.monotonic(), self.options
         stack = Stack.take(given)
         paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
@@ -183,7 +191,10 @@ class Verb:
         note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
     def find_material(self, values: Mapping[tuple[str, ...], Any]) -> Material | None:
-        """Return the material that the result is one of, if there is one; of others only what they look like counts."""
+        """Return the material that the result belongs to, if there is one.
+
+        Other inputs are only a reference of appearance.
+        """
         names = getattr(self.options.function, "takes", ())
         several = (value for path, value in values.items() if path[0] in names)
         every = (each for value in several for each in (value if isinstance(value, list) else [value]))
@@ -193,11 +204,11 @@ class Verb:
         """Return the pixels of the first input."""
         first = values[next(o.path for o in self.options if o.argument)]
         first = first[0] if isinstance(first, list) else first
-        # Analysed elements hold theirs, and materials have one that shows them.
+        # Analysed elements contain their image, and materials have one that represents them.
         return np.asarray(first.base if isinstance(first, Material) else getattr(first, "image", first))
 
     def read_colours(self, given: Mapping[str, Any], out: str) -> io.Metadata:
-        """Return what the first input says of its colours, which are those of the result, and of its pixels."""
+        """Return the colour description of the first input, which the result keeps, and its pixels."""
         first = given[next(o.name for o in self.options if o.argument)]
         name = first[0] if isinstance(first, list) else first
         notes = io.read_metadata(name) if os.path.isfile(name) else io.Metadata()
@@ -211,7 +222,7 @@ class Verb:
         return replace(notes, made=None, density=notes.density if self.scaled else None)
 
     def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
-        """Return about how large the result will be."""
+        """Return the approximate size of the result."""
         if ("size",) in values:
             return tuple(values["size",])
         if (self.shape,) in values and not isinstance(values[self.shape,], str):

@@ -1,4 +1,4 @@
-"""Commands that make one thing of another: each is a verb, the kinds of its inputs, and what its options cannot be made of."""
+"""Commands for verbs: each is a verb, the kinds of its inputs, and the options that need special treatment."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemp
 
 
 def make_verb(name: str) -> Verb:
-    """Return the verb of a name; its function is imported now."""
+    """Return the verb of a name. Its function is imported now."""
     match name:
         case "inpaint":
             from texrs.inpainting import inpaint
@@ -141,33 +141,33 @@ def make_verb(name: str) -> Verb:
 
 @dataclass(frozen=True, slots=True)
 class Filling(Verb):
-    """A verb for pictures that takes volumes too."""
+    """A verb for images that also takes volumes."""
 
     deep: Verb | None = None
 
     def run(self, **given: Any) -> None:
-        """Fill a volume if the hole is one, else a picture."""
+        """Fill a volume if the mask is one, else an image."""
         texts = [given["mask_marks"], given["image"]]
         named = next(text for text in texts if text is not None and text not in FILLED.words)
         deep = None
-        # A file that cannot be read is refused later, by its reader.
+        # The reader refuses an unreadable file later.
         with suppress(FileError):
             deep = self.deep if not named.startswith(_outputs.SAMPLE) and holds_volume(named) else None
         Verb.run(deep or self, **given)
 
 
 def count_moved(result: Synthesis) -> str:
-    """Return how many elements moved."""
+    """Return the number of elements that moved."""
     return f", {len(result.report['matches'])} elements moved"
 
 
 def tell_filled(result: Synthesis) -> str:
-    """Return the share of the image that is filled."""
+    """Return the filled share of the image."""
     return f", {100 * result.report['filled']:.3g} % filled"
 
 
 def tell_sizes(result: Synthesis) -> str:
-    """Return of what sizes were measured, and how surely."""
+    """Return the source and the confidence of the measured sizes."""
     found = result.report["measured"]
     if found is None:
         return ""
@@ -180,7 +180,7 @@ def tell_sizes(result: Synthesis) -> str:
 
 
 def read_cameras(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the angle of view that an exemplar states, and where the y of a target's normals grows, by its name."""
+    """Return the angle of view of an exemplar, and the y direction of a target's normals by its name."""
     found = read_exemplar_camera(given)
     target = given["target"] or ""
     if not target.startswith(PLANE) and (role := guess_role(Path(target).stem)) is not None and role.down:
@@ -191,26 +191,26 @@ def read_cameras(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
 
 
 def read_exemplar_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the angle of view that an exemplar states."""
+    """Return the angle of view of an exemplar from its metadata."""
     said = (given["scale_map"] or "").startswith(PLANE)
     fovs = [] if said else list(read_camera({"image": given["exemplar"]}).values())
     return {("fov",): fovs[0]} if fovs else {}
 
 
 def read_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the angle of view that the photograph states."""
+    """Return the angle of view of the photograph from its metadata."""
     fov = None if given["image"].startswith(_outputs.SAMPLE) else io.read_fov(given["image"])
     return {} if fov is None else {("view", "fov"): fov}
 
 
 def read_voxels(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the distances between voxels that the volume states."""
+    """Return the voxel spacing of the volume."""
     spacing = read_stated_spacing(given["exemplar_image"])
     return {} if spacing is None else {("spacing",): spacing}
 
 
 def say_planes(result: Synthesis) -> str:
-    """Return how the planes lie that were followed."""
+    """Return the planes that were followed."""
     said = []
     for each in result.report.get("planes", [result.report]):
         plane = each["plane"]
@@ -229,13 +229,13 @@ def make_views(
     fov: list[float | None] | float | None = None,
     ground: list[Array | None] | None = None,
 ) -> Any:
-    """Return what is said of each plane: of one for each ground, or of the only one."""
+    """Return the description of each plane: one for each ground, or the only one."""
     from texrs.planes import PlaneView
 
     given = {"corners": corners, "slant": slant, "tilt": tilt, "fov": fov, "ground": ground}
     several = {n: value if isinstance(value, list) else [value] for n, value in given.items() if value is not None}
     count = len(several.get("ground", [None]))
-    # One camera sees all of them.
+    # All planes have the same camera.
     several |= {"fov": several["fov"] * count} if len(several.get("fov", [])) == 1 else {}
     for name, values in several.items():
         if len(values) != count:

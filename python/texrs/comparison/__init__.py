@@ -86,7 +86,7 @@ def compare(
     size : int, optional
         Pixels a side of the larger textures, at least ``side``; by default half as many again.
     seed : int
-        Of all methods that have one.
+        Seed of all methods that have one.
     programs : mapping of str to path, optional
         Programs that are not found by their usual name: ``"embark"`` and ``"resynthesizer"``.
     timed : bool
