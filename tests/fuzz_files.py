@@ -78,8 +78,6 @@ def make_files(folder: Path) -> Iterator[tuple[Path, list[Reader]]]:
         "palette.png": make.palette_png(np.arange(64).reshape(8, 8) % 4, np.eye(4, 3) * 255),
         "packbits.tif": make.pillow(image, "TIFF", compression="packbits"),
         "deflate.tif": make.pillow(image, "TIFF", compression="tiff_adobe_deflate"),
-        "v.vtk": b"# vtk DataFile Version 3.0\nv\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 3 2\nSPACING 1 1 1\n"
-        b"ORIGIN 0 0 0\nPOINT_DATA 24\nSCALARS s unsigned_char 1\nLOOKUP_TABLE default\n" + b"7 " * 24,
     }.items():
         (folder / name).write_bytes(content)
         yield folder / name, either

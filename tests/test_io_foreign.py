@@ -1,4 +1,4 @@
-"""Volumes and vectors of other programs: Zarr stores, and VTK's image data and structured points in every encoding."""
+"""Volumes and vectors of other programs: Zarr stores, and VTK's image data in every encoding."""
 
 import base64
 import lzma
@@ -182,36 +182,7 @@ def test_image_data(tmp_path: Path, form: str, packer: str | None, end: str, hea
     assert_array_equal(vectors, FLOW)
 
 
-def make_points(form: str, cells: bool, kind: str) -> bytes:
-    """Return a legacy file of structured points."""
-
-    def spell(data: np.ndarray) -> bytes:
-        if form == "BINARY":
-            return data.astype(data.dtype.newbyteorder(">")).tobytes() + b"\n"
-        return " ".join(map(str, data.ravel().tolist())).encode() + b"\n"
-
-    sides = [n + cells for n in VOLUME.shape[::-1]]
-    head = f"# vtk DataFile Version 4.2\na flow\n{form}\nDATASET STRUCTURED_POINTS\n"
-    head += f"DIMENSIONS {sides[0]} {sides[1]} {sides[2]}\nSPACING 1 1 1\nORIGIN 0 0 0\n"
-    head += f"{'CELL' if cells else 'POINT'}_DATA {VOLUME.size}\n"
-    if kind == "field":
-        return head.encode() + f"FIELD FieldData 1\nflow 3 {VOLUME.size} float\n".encode() + spell(FLOW)
-    both = b"SCALARS density unsigned_short\nLOOKUP_TABLE default\n" + spell(VOLUME)
-    return head.encode() + both + b"METADATA\nINFORMATION 0\n\nVECTORS flow float\n" + spell(FLOW)
-
-
-@pytest.mark.parametrize("form", ["ASCII", "BINARY"])
-@pytest.mark.parametrize("cells", [False, True])
-@pytest.mark.parametrize("kind", ["both", "field"])
-def test_structured_points(tmp_path: Path, form: str, cells: bool, kind: str) -> None:
-    path = tmp_path / "a.vtk"
-    path.write_bytes(make_points(form, cells, kind))
-    assert_array_equal(io.read_volume(path), VOLUME if kind == "both" else FLOW)
-    assert_array_equal(io.read_vectors(path)[0], FLOW)
-
-
 GOOD = make_image_data("appended", "vtkZLibDataCompressor", "LittleEndian", "UInt32", False)
-POINTS = make_points("BINARY", False, "both")
 
 
 @pytest.mark.parametrize(
@@ -220,18 +191,11 @@ POINTS = make_points("BINARY", False, "both")
         ("a.vti", GOOD.replace(b"ZLib", b"LZ4", 1), "is compressed by vtkLZ4DataCompressor; zlib and LZMA are read"),
         ("a.vti", GOOD.replace(b'Scalars="density" Vectors="flow"', b""), "needs a single array, has density, flow"),
         ("a.vti", GOOD.replace(b"UInt16", b"String", 1), "samples of type 'String'"),
-        ("a.vti", GOOD.replace(b"<Piece", b"<Part"), "reading failed|no image data"),
+        ("a.vti", GOOD.replace(b"<Piece", b"<Part"), "reading failed|not image data"),
         ("a.vti", GOOD[:-3000], "reading failed|is cut off"),
         ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="0 9', 1), "is cut off"),
         ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="9 6', 1), "holds no voxels"),
-        ("a.vti", b'<?xml version="1.0"?><svg/>', "no image data"),
-        ("a.vtk", POINTS.replace(b"STRUCTURED_POINTS", b"UNSTRUCTURED_GRID"), "holds UNSTRUCTURED_GRID"),
-        ("a.vtk", POINTS.replace(b"BINARY", b"EITHER"), "neither ASCII nor BINARY"),
-        ("a.vtk", POINTS[:400], "is cut off"),
-        ("a.vtk", POINTS[:40], "is cut off"),
-        ("a.vtk", POINTS.replace(b"unsigned_short", b"string"), "samples of type 'string'"),
-        ("a.vtk", POINTS.replace(b"DIMENSIONS 7", b"DIMENSIONS -7"), "holds no voxels"),
-        ("a.vtk", POINTS.replace(b"DIMENSIONS 7", b"DIMENSIONS 70000000"), "more than the limit"),
+        ("a.vti", b'<?xml version="1.0"?><svg/>', "not image data"),
     ],
 )
 def test_damaged_grids(tmp_path: Path, name: str, content: bytes, words: str) -> None:
@@ -247,15 +211,13 @@ WOUND = np.stack([0 * Z, X, -Y], axis=-1)
 """Around the axis of planes, as (plane, row, column)."""
 
 
-@pytest.mark.parametrize(
-    "suffix", [".npy", ".npz", ".zarr", ".tif", ".nrrd", ".nii", ".vti", ".vtk", "array", "frames.npy"]
-)
+@pytest.mark.parametrize("suffix", [".npy", ".npz", ".zarr", ".tif", ".nrrd", ".nii", ".vti", "array", "frames.npy"])
 def test_fields_in_files(tmp_path: Path, suffix: str) -> None:
     """A field of vectors is the same from whatever holds it; what belongs to viewers has its components as x, y, z."""
     path = tmp_path / f"flow{suffix}"
     wanted = fields.from_directions(WOUND.astype(np.float32))
     there = WOUND.astype(np.float32)
-    if suffix in (".nrrd", ".nii", ".vti", ".vtk"):
+    if suffix in (".nrrd", ".nii", ".vti"):
         there = np.ascontiguousarray(there[..., ::-1])
     if suffix == "array":
         assert fields.as_field(WOUND, 3) == fields.from_directions(WOUND)
@@ -265,10 +227,6 @@ def test_fields_in_files(tmp_path: Path, suffix: str) -> None:
     elif suffix == "frames.npy":
         np.save(path, wanted.lattice(Z.shape, jacobians=False))
         wanted = fields.from_array(np.load(path))
-    elif suffix == ".vtk":
-        head = "# vtk DataFile Version 3.0\nflow\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 12\n"
-        text = f"{head}POINT_DATA {Z.size}\nVECTORS flow float\n".encode()
-        path.write_bytes(text + there.astype(">f4").tobytes())
     else:
         io.write_volume(path, there)
     assert fields.read(path) == wanted

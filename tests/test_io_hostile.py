@@ -91,7 +91,9 @@ def test_corrupt_files(files, name, tmp_path, capfd):
     assert sentences
     assert all(s.startswith(str(path)) and "\n" not in s for s in sentences)
     said = capfd.readouterr()
-    assert (said.out, said.err) == ("", "")
+    # The package OpenEXR prints its own lines about a damaged file.
+    lines = [] if name.endswith(".exr") else said.err.splitlines()
+    assert (said.out, lines) == ("", [])
 
 
 @pytest.mark.parametrize(
@@ -108,7 +110,7 @@ def test_corrupt_files(files, name, tmp_path, capfd):
         (b"\0\0\0\x20ftypavif", "cut off|decoding failed"),
         (b"BM", "cut off, corrupt"),
         (b"II*\0", "corrupt"),
-        (b"v/1\x01", "cannot be decoded"),
+        (b"v/1\x01", "reading failed"),
         (b"#?RADIANCE\n", "cut off|cannot be decoded"),
         (b"RIFF\0\0\0\0WEBP", "cut off|cannot be decoded"),
         (b"PK\x03\x04", "reading the archive failed"),

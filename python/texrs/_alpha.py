@@ -103,7 +103,10 @@ def adapt(array: Array, path: Path, multiplied: bool | None) -> Array:
         If True, the colours are already multiplied by alpha. None leaves all values unchanged.
 
     """
-    pixels, wanted = np.asarray(array), path.suffix.lower() == ".exr"
-    if multiplied in (None, wanted) or pixels.dtype.kind != "f" or not has_alpha(pixels):
+    wanted = path.suffix.lower() == ".exr"
+    if multiplied in (None, wanted):
+        return array
+    pixels = np.asarray(array)
+    if pixels.dtype.kind != "f" or not has_alpha(pixels):
         return array
     return multiply(pixels, "output") if wanted else divide(pixels, "output")

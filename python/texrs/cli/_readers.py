@@ -25,7 +25,7 @@ from texrs.cli._texts import PLANE, About, parse_numbers, read_json
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import check_file
 
-VOLUMES = "a TIFF of several slices, .npy, .npz, .vti, .vtk, NRRD, NIfTI or Zarr"
+VOLUMES = "a TIFF of several slices, .npy, .npz, .vti, NRRD, NIfTI or Zarr"
 """File formats of volumes, as errors list them."""
 
 

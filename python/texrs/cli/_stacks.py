@@ -18,7 +18,7 @@ from texrs._notices import collect
 from texrs.cli import _outputs, _provenance
 from texrs.cli._provenance import check_free, expand_braces
 from texrs.errors import FileError, InvalidInput
-from texrs.io._tags import list_exr_channels
+from texrs.io._layers import list_channels
 from texrs.materials import Material
 from texrs.materials._conventions import CONVENTIONS, as_convention
 from texrs.materials._converting import convert
@@ -223,7 +223,7 @@ def is_stack(text: str) -> bool:
         return False
     with suppress(Exception):
         # Names of channels in layers begin with the name of the layer.
-        if any("." in name for name in list_exr_channels(Path(text))):
+        if any("." in name for name in list_channels(Path(text))):
             return True
     with suppress(FileError), collect(show=lambda line: None):
         io.read(text)

@@ -40,7 +40,7 @@ def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = 
     Parameters
     ----------
     path : path_like
-        .npy, .npz, .zarr, .nrrd, .nii, .vti, .vtk or .tif: directions (..., 2) or (..., 3), or frames (..., A, A). In the
+        .npy, .npz, .zarr, .nrrd, .nii, .vti or .tif: directions (..., 2) or (..., 3), or frames (..., A, A). In the
         formats of ParaView, Slicer and the like components are x, y, z; in the others as the axes of arrays, unless
         ``order`` says otherwise.
     extent : sequence of int, optional

@@ -1,7 +1,7 @@
-"""Images and volumes on disk: read with the dtype of the file, written so that they come back.
+"""Images and volumes in files: read with the dtype of the file, and written without loss.
 
 ===================== =========================================== ========== ====================
-Suffix                dtypes                                      Channels   Loses
+Suffix                dtypes                                      Channels   Loss
 ===================== =========================================== ========== ====================
 ``.png``              bool, uint8, uint16                         1, 2, 3, 4 nothing
 ``.tif`` ``.tiff``    bool, (u)int8/16/32, float16/32/64          1 to 64    nothing
@@ -23,33 +23,33 @@ Suffix                dtypes                                      Channels   Los
 ``.zarr`` (e)         bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
 ===================== =========================================== ========== ====================
 
-(a) Of the largest channel of each pixel, with which the three share an exponent.
+(a) The three channels of a pixel have one exponent, and the largest of them has 8 bits.
 
 (b) AVIF needs Pillow 11.3 or newer, JPEG XL a plugin: ``pip install pillow-jxl-plugin``.
 
-(c) Volumes alone; needs the extra: ``pip install texrs[vol]``.
+(c) Only volumes; needs the extra: ``pip install texrs[vol]``.
 
-(d) Volumes alone, for ParaView; read in every encoding that VTK writes.
+(d) Only volumes, for ParaView; read in every encoding that VTK writes.
 
-(e) A folder: OME-Zarr of one level; needs the extra: ``pip install texrs[dask]``. Any arrays and OME-Zarr images are read, and
-VTK's structured points (``.vtk``); textures without borders write stores of any size (`texrs.SolidTexture.to_zarr`).
+(e) A folder: OME-Zarr of one level; needs the extra: ``pip install texrs[dask]``. Any arrays and OME-Zarr images are read;
+textures without borders write stores of any size (`texrs.SolidTexture.to_zarr`).
 
-PSD is read also: its flattened picture, 8 bits a channel. Pillow decodes JPEG, GIF, BMP, TGA, DDS, PSD, AVIF and JPEG XL, and
-layouts of DDS from BC1 to BC7. The package tifffile reads TIFF. Some compressed TIFF files need the extra: ``pip install
-texrs[tiff]``. CMYK becomes sRGB by the profile of the file. Frames and pages that are not read are reported.
+PSD is also read: its flattened image, 8 bits a channel. The package OpenEXR reads and writes EXR, and tifffile TIFF. Pillow
+reads and writes WebP, JPEG, GIF, BMP, TGA, DDS, AVIF and JPEG XL, and reads PSD and layouts of DDS from BC1 to BC7. Some
+compressed TIFF files need the extra: ``pip install texrs[tiff]``. CMYK becomes sRGB by the profile of the file. Frames and
+pages that are not read are reported.
 
-Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last five, which also keep
-the distances between voxels (`read_spacing`). What is (plane, row, column) here is z, y, x there, and x runs fastest
+Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last five formats, which also keep
+the distances between voxels (`read_spacing`). The axes plane, row and column are z, y and x there, and x runs fastest
 in the file. Volumes larger than memory are written slab by slab (`write_slabs`), surfaces as
-``.stl`` (`write_surface`). A dtype that a format cannot hold is refused, never converted; bool is written as 0 and 255 (to
-``.npy`` and ``.npz`` as it is). An alpha channel that is opaque is left out where the format has none. A single channel is read
-without a channel axis (from ``.npy`` and ``.npz`` as it was written). ``.npz`` files have the key ``image``.
+``.stl`` (`write_surface`). A dtype that a format cannot hold is an error and is never converted. Bool is written as 0 and
+255, to ``.npy`` and ``.npz`` as bool. An opaque alpha channel is left out if the format has none. A single channel is read
+without a channel axis, from ``.npy`` and ``.npz`` as it was written. ``.npz`` files have the key ``image``.
 
-Files are recognised by their content when read, TGA by its suffix, and by their suffix when written. Headers are
-compared with the limit before memory is used. What a file says beside its values, as ICC profiles, densities and
-how texrs made it, is read by `read_metadata` and written by `write_metadata`. All files are written to a temporary name and
-renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExceeded` or
-`~texrs.errors.InvalidInput`.
+The content of a file decides its format when it is read (the suffix does for TGA), and the suffix when it is written. Headers
+are compared with the limit before memory is used. `read_metadata` reads metadata, such as ICC profiles, densities and the record
+of how texrs made a file, and `write_metadata` writes them. All files are written to a temporary name and renamed. Errors are
+`texrs.errors.FileError`, `~texrs.errors.LimitExceeded` and `~texrs.errors.InvalidInput`.
 """
 
 from __future__ import annotations
@@ -63,15 +63,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from texrs import _alpha, _notices
+from texrs import _alpha
 from texrs._checks import as_instance, as_items, as_limit, try_array
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import (
-    _descriptions,
+    _chunks,
     _files,
     _image_io,
+    _layers,
     _npy,
     _origins,
     _pillow,
@@ -81,6 +82,7 @@ from texrs.io import (
     _stores,
     _tiff,
     _volumes,
+    _vtk,
 )
 from texrs.io._annotation import read_metadata, write_metadata
 from texrs.io._files import atomic, find_suffix
@@ -112,9 +114,8 @@ __all__ = [
     "write_volume",
 ]
 
-
 FILM = 36.0
-"""Millimetres of the longer side of the film by which focal lengths are stated."""
+"""Millimetres of the longer side of the film that focal lengths in Exif refer to."""
 
 
 def __dir__() -> list[str]:
@@ -127,22 +128,22 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     Parameters
     ----------
     path : path_like
-        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, .npy, .npz or the folder of a Zarr store,
-        whichever its content says it is (TGA: its suffix). The first frame of an animation.
+        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, .npy, .npz or the folder of a Zarr store.
+        The content decides the format (for TGA the suffix). The first frame of an animation is read.
     limit : int, optional
-        Pixels that the image may have, and a sixteenth of the bytes; by default those that `texrs.limits` allows.
+        Maximum number of pixels, and a sixteenth of the maximum number of bytes. Default: as `texrs.limits` allows.
 
     Returns
     -------
     ndarray
-        Shape (H, W) or (H, W, C); the dtype is that of the file. Palettes are applied, and samples of less than 8 bit
-        spread to 8. CMYK is converted to sRGB. The Exif orientation of JPEG, TIFF, PNG, WebP and AVIF is obeyed.
+        Shape (H, W) or (H, W, C) with the dtype of the file. Palettes are applied, and samples of fewer than 8 bits are
+        spread to 8. CMYK is converted to sRGB. The image is turned upright by the Exif orientation of the file.
 
     Raises
     ------
     FileError
-        Missing, not readable, empty, cut off, corrupt, or not an image of a kind that is read; or a
-        stack of images, for which there is `read_volume`.
+        The file is missing, not readable, empty, cut off, corrupt, of another kind, or a stack of images, which
+        `read_volume` reads.
     LimitExceeded
         More pixels or more memory than the limit.
 
@@ -170,21 +171,20 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
         return _stores.read_store(name, limit, 2)
     if kind in VOLUMES:
         raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
+    if kind == "exr":
+        return _origins.mark(_layers.read_image(name, limit), name, False)
     file = _files.load(name, limit)
     if kind in _pillow.DECODED:
         array = _pillow.read(name, kind, file, limit)
     else:
         with _files.translate_errors(name, "decoding"):
             array = _files.turn_upright(*_image_io.decode(name, file, limit))
-            rest = _image_io.list_rest(name, array) if kind == "exr" else []
-        if rest:
-            _notices.ignore(f"{name}: {', '.join(rest)} not used: these channels are not part of the picture")
     _pillow.ignore_frames(name, kind, file)
     return _origins.mark(array, name, kind == "gif" or _pillow.is_indexed(name, kind, file))
 
 
 def read_fov(path: PathLike) -> float | None:
-    """Return the angle of view of a photograph, as its Exif states it.
+    """Return the angle of view that the Exif of a photograph states.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def read_fov(path: PathLike) -> float | None:
     Returns
     -------
     float or None
-        Degrees that the longer side spans, of the whole picture that the camera took; None where the file does not say.
+        Angle of the longer side of the image that the camera took, in degrees; None if the file does not state it.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def read_fov(path: PathLike) -> float | None:
 
 
 def read_description(path: PathLike) -> str | None:
-    """Return what a file says of itself in words.
+    """Return the description in a file.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def read_description(path: PathLike) -> str | None:
     Returns
     -------
     str or None
-        None where the file does not say anything.
+        Text, or None if the file does not have a description.
 
     Raises
     ------
@@ -245,38 +245,38 @@ def read_description(path: PathLike) -> str | None:
     'nothing but black'
 
     """
-    return _descriptions.read(_files.as_path(path))
+    return _pillow.read_description(_files.as_path(path))
 
 
 def read_volume(
     path: PathLike, *, shape: Sequence[int] | None = None, dtype: DTypeLike | None = None, limit: int | None = None
 ) -> Array:
-    """Return the volume of a file, or of a folder of slices.
+    """Return the volume in a file, or in a folder of slices.
 
     Parameters
     ----------
     path : path_like
-        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, .vtk, NRRD or NIfTI (these with the extra
-        ``vol``), or the folder of a Zarr store (extra ``dask``), whichever its content says it is. A NIfTI file that
-        scales its samples gives float32. Of OME-Zarr the finest level is read; a path inside the store names another.
-        Or a folder of numbered slices (``scan_1.tif`` to ``scan_48.tif``), in the order of their numbers. Or samples without
+        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, NRRD or NIfTI (these with the extra
+        ``vol``), or the folder of a Zarr store (extra ``dask``). The content decides the format. A NIfTI file that
+        scales its samples gives float32. The finest level of OME-Zarr is read; a path inside the store names another.
+        A folder of numbered slices (``scan_1.tif`` to ``scan_48.tif``) is read in the order of the numbers. Samples without
         a header: ``scan.raw:96x96x48:uint16`` states the width, height, depth, type and, with ``:big``, the byte order.
     shape : sequence of int, optional
         (D, H, W) or (D, H, W, C) of a file without a header, if its name does not state it. Default: None.
     dtype : dtype, optional
         Type of the samples of a file without a header, such as "uint16" or ">i2". Default: None.
     limit : int, optional
-        Voxels that the volume may have, and a sixteenth of the bytes; by default those that `texrs.limits` allows.
+        Maximum number of voxels, and a sixteenth of the maximum number of bytes. Default: as `texrs.limits` allows.
 
     Returns
     -------
     ndarray
-        Shape (D, H, W) or (D, H, W, C); the dtype is that of the file.
+        Shape (D, H, W) or (D, H, W, C) with the dtype of the file.
 
     Raises
     ------
     FileError
-        Missing, not readable, empty, cut off, corrupt, or not a volume; slices that are missing or differ in shape or type.
+        The file is missing, not readable, empty, cut off, corrupt or not a volume; or slices are missing or differ.
     LimitExceeded
         More voxels or more memory than the limit.
 
@@ -300,7 +300,7 @@ def read_volume(
     if kind not in READERS:
         raise FileError(
             f"{name}: is a {kind} file, which holds one image; "
-            "volumes are .npy, .npz, .vti, .vtk, NRRD, NIfTI, Zarr, .raw, TIFF or folders of numbered slices"
+            "volumes are .npy, .npz, .vti, NRRD, NIfTI, Zarr, .raw, TIFF or folders of numbered slices"
         )
     return READERS[kind](name, limit)
 
@@ -318,13 +318,13 @@ def write(
     Parameters
     ----------
     path : path_like
-        Its suffix says the format; see the table of `texrs.io` for what each can hold.
+        The suffix decides the format; the table of `texrs.io` lists what each format can hold.
     array : array_like
         Shape (H, W) or (H, W, C).
     overwrite : bool
-        Whether a file that exists may be replaced.
+        If True, a file that exists is replaced. Default: True.
     description : str, optional
-        What the file is to say of itself, in letters of ASCII: PNG and TIFF keep it (`read_description`), the others do not.
+        Description in ASCII, which only PNG and TIFF keep (`read_description`). Default: None.
     notes : Metadata, optional
         Metadata that `write_metadata` cannot write. TIFF files keep the georeference. Colours are multiplied by alpha in EXR
         files and divided by it in other files, if ``multiplied`` does not say that they already are. Default: None.
@@ -332,9 +332,9 @@ def write(
     Raises
     ------
     InvalidInput
-        Not an image, or not one that the format can hold; the message names the formats that can.
+        The array is not an image that the format can hold; the message names formats that can.
     FileError
-        The suffix is not known, or the file cannot be written. A former file is as it was.
+        The suffix is not known, or the file cannot be written. A former file is unchanged.
 
     Examples
     --------
@@ -367,25 +367,25 @@ def write_volume(
     Parameters
     ----------
     path : path_like
-        With the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz (these three with the extra ``vol``), .vti, or .zarr
-        (extra ``dask``): a folder, OME-Zarr of one level.
+        File with the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz (these three with the extra ``vol``) or .vti; or
+        folder with the suffix .zarr (extra ``dask``): OME-Zarr of one level.
     array : array_like
         Shape (D, H, W) or (D, H, W, C).
     overwrite : bool
-        Whether a file that exists may be replaced.
+        If True, a file that exists is replaced. Default: True.
     spacing : sequence of 3 float, optional
-        From plane to plane, from row to row and from column to column, in whatever unit. The last five formats keep it, and
-        .tif of uint8, uint16 or float32 as ImageJ does; `read_spacing` reads it. Default: that of ``like``, or 1.
+        Distances between planes, rows and columns, in any unit. The last five formats keep it, and .tif of uint8, uint16
+        or float32 as ImageJ does; `read_spacing` reads it. Default: that of ``like``, or 1.
     like : path_like, optional
-        Volume whose spacing goes through. From NRRD to NRRD, NIfTI to NIfTI and ImageJ to ImageJ its orientation, origin and
-        units go through also. Default: None.
+        Volume whose spacing is copied. Its orientation, origin and units are also copied from NRRD to NRRD, from NIfTI
+        to NIfTI and from ImageJ to ImageJ. Default: None.
 
     Raises
     ------
     InvalidInput
-        Not a volume, or not one that the format can hold; the message names the formats that can.
+        The array is not a volume that the format can hold; the message names formats that can.
     FileError
-        The suffix is not known, or the file cannot be written. A former file is as it was.
+        The suffix is not known, or the file cannot be written. A former file is unchanged.
 
     Examples
     --------
@@ -402,25 +402,25 @@ def write_volume(
 
 
 def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *, overwrite: bool = True) -> None:
-    """Write a volume that is made slab by slab, whole or not at all: no more than a slab is in memory.
+    """Write a volume slab by slab, whole or not at all, with one slab in memory.
 
     Parameters
     ----------
     path : path_like
-        With the suffix .npy, .tif or .tiff.
+        File with the suffix .npy, .tif or .tiff.
     slabs : iterable of array_like
         Shapes (d, H, W) or (d, H, W, C), of one dtype, that follow each other along the planes.
     shape : sequence of int
-        Of the whole volume, with the channels where there are any.
+        Shape of the whole volume, (D, H, W) or (D, H, W, C).
     overwrite : bool
-        Whether a file that exists may be replaced.
+        If True, a file that exists is replaced. Default: True.
 
     Raises
     ------
     InvalidInput
-        Slabs that do not make up the volume, or not one that the format can hold.
+        The slabs do not form the volume, or the format cannot hold it.
     FileError
-        Another suffix, or the file cannot be written. A former file is as it was, also if making a slab fails.
+        Another suffix, or the file cannot be written. A former file is unchanged, also if making a slab fails.
 
     Examples
     --------
@@ -439,7 +439,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
         raise FileError(f"{target}: the suffix {suffix!r} is not one that slabs are written to: .npy, .tif, .tiff")
     sides = _slabs.as_shape(shape)
     with atomic(target, overwrite=overwrite) as temporary:
-        # What a slab's maker raises is its own affair and passes as it is.
+        # Errors of the function that makes the slabs are raised as they are.
         parts = _slabs.check((check(slab, suffix, 3) for slab in as_items(slabs, "slabs")), sides)
         first = next(parts)
         whole = chain((first,), parts)
@@ -456,20 +456,20 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
     Parameters
     ----------
     path : path_like
-        With the suffix .stl; binary.
+        File with the suffix .stl, which becomes binary.
     vertices : (N, 3) array_like
-        Corners, as x, y, z.
+        Corners: x, y, z.
     faces : (M, 3) array_like
-        Three corners each, counter-clockwise as seen from outside.
+        Indices of the corners of each triangle, counter-clockwise if seen from outside.
     overwrite : bool
-        Whether a file that exists may be replaced.
+        If True, a file that exists is replaced. Default: True.
 
     Raises
     ------
     InvalidInput
-        Not triangles, or of corners that are not there.
+        The faces are not triangles, or an index is out of range.
     FileError
-        Another suffix, or the file cannot be written. A former file is as it was.
+        Another suffix, or the file cannot be written. A former file is unchanged.
 
     Examples
     --------
@@ -519,48 +519,43 @@ def _write(
         _stores.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
         return
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
-        if suffix == ".npy":
-            _npy.write_npy(temporary, array)
-            return
-        if suffix == ".npz":
-            _npy.write_npz(temporary, array)
-            return
-        if array.dtype == np.bool_:
+        if array.dtype == np.bool_ and suffix not in (".npy", ".npz"):
             array = array.astype(np.uint8) * np.uint8(255)
-        if suffix in (".tif", ".tiff"):
-            planes = array if axes == 3 else array[np.newaxis]
-            planes = planes if planes.ndim == 4 else planes[..., np.newaxis]
-            if spacing is not None:
-                if not _tiff.keeps_spacing(planes.dtype, planes.shape[3]):
+        flat = array[..., 0] if array.ndim > axes and array.shape[-1] == 1 else array
+        match suffix:
+            case ".npy":
+                _npy.write_npy(temporary, array)
+            case ".npz":
+                _npy.write_npz(temporary, array)
+            case ".tif" | ".tiff":
+                channels = flat.shape[axes] if flat.ndim > axes else 1
+                planes = flat.reshape(-1, *flat.shape[axes - 2 : axes], channels)
+                if spacing is None:
+                    _tiff.write_tiff(temporary, planes, channels, planes.nbytes, description, tags)
+                elif _tiff.keeps_spacing(planes.dtype, channels):
+                    _tiff.write_imagej(temporary, planes, steps, read_unit(like))
+                else:
                     raise InvalidInput(
-                        f"spacing: .tif keeps it for uint8, uint16 and float32, and for uint8 with 3 channels; "
-                        f"got {array.dtype} with {planes.shape[3]} channels"
+                        "spacing: .tif keeps it for uint8, uint16 and float32, and for uint8 with 3 channels; "
+                        f"got {array.dtype} with {channels} channels"
                     )
-                _tiff.write_imagej(temporary, planes, steps, read_unit(like))
-                return
-            _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes, description, tags)
-            return
-        if axes == 3:
-            volume = array[..., 0] if array.ndim == 4 and array.shape[3] == 1 else array
-            if suffix == ".nrrd":
-                _volumes.write_nrrd(temporary, volume, steps, _find_header(like, "nrrd"))
-            elif suffix == ".vti":
-                _volumes.write_vti(temporary, volume, steps)
-            else:
+            case ".nrrd":
+                _volumes.write_nrrd(temporary, flat, steps, _find_header(like, "nrrd"))
+            case ".vti":
+                _vtk.write_vti(temporary, flat, steps)
+            case ".nii" | ".nii.gz":
                 header = _find_header(like, "nii", "nii.gz")
-                _volumes.write_nifti(temporary, volume, steps, header, compressed=suffix == ".nii.gz")
-            return
-        if array.ndim == 3 and array.shape[2] == 1:
-            array = array[..., 0]
-        if suffix in _pillow.SAVED and suffix != ".png":
-            file = _pillow.encode(target, array, suffix)
-        else:
-            file = _image_io.encode(target, array, suffix[1:])
-            if suffix == ".png" and description is not None:
-                file = _descriptions.describe_png(file, description)
-        temporary.write_bytes(file)
+                _volumes.write_nifti(temporary, flat, steps, header, compressed=suffix == ".nii.gz")
+            case ".exr":
+                _layers.write_image(temporary, flat)
+            case ".png" | ".hdr":
+                file = _image_io.encode(target, flat, suffix[1:])
+                described = suffix == ".png" and description is not None
+                temporary.write_bytes(_chunks.describe_png(file, description or "") if described else file)
+            case _:
+                temporary.write_bytes(_pillow.encode(target, flat, suffix))
 
 
 def _find_header(like: Path | None, *kinds: str) -> Any:
-    """Return what the header of a volume states, if it is of one of the kinds."""
+    """Return the header of a volume if it has one of the formats."""
     return _volumes.read_header(like) if like is not None and detect_kind(like) in kinds else None

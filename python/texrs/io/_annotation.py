@@ -1,97 +1,75 @@
-"""What files say beside their values, read and written, whatever their format."""
+"""Metadata of files, read and written, whatever their format."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import re
+import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 from texrs._checks import as_instance
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
-from texrs.io import _chunks, _files, _pillow, _tags, _texts
+from texrs.io import _chunks, _files, _layers, _pillow, _texts, _tiff
 from texrs.io._formats import detect_kind
 from texrs.io._notes import Metadata
 from texrs.io._stores import is_store
 
-BLOCK = 2**20
 DIGEST = re.compile(r'"content": "[0-9a-f]{64}"')
-"""Where a record says what the rest of its file holds."""
+"""The part of a record that contains the digest of the rest of its file."""
 BLANK = f'"content": "{"0" * 64}"'
 MOST_JPEG = 65_533
-"""Bytes of a comment of JPEG."""
+"""Maximum number of bytes of a comment of JPEG."""
 
 _READERS: dict[str, Callable[[Path], dict[str, object]]] = {
-    "png": _chunks.read_png,
-    "jpeg": _chunks.read_jpeg,
-    "webp": _chunks.read_webp,
-    "bmp": _chunks.read_bmp,
-    "gif": _chunks.read_gif,
-    "tiff": _tags.read_tiff,
-    "exr": _tags.read_exr,
+    "tiff": _tiff.read_notes,
+    "exr": _layers.read_notes,
     "npz": _texts.read_npz,
     "html": _texts.read_html,
     "json": _texts.read_json,
-    **{kind: partial(_pillow.read_notes, kind=kind) for kind in ("psd", "avif", "jxl")},
+    **{kind: partial(_pillow.read_notes, kind=kind) for kind in ("png", *_pillow.DECODED)},
 }
 _WRITERS: dict[str, Callable[[Path, Metadata], None]] = {
     "png": _chunks.write_png,
-    "jpeg": _chunks.write_jpeg,
-    "webp": _chunks.write_webp,
-    "bmp": _chunks.write_bmp,
-    "gif": _chunks.write_gif,
-    "tiff": _tags.write_tiff,
-    "exr": _tags.write_exr,
+    "jpeg": lambda path, notes: _chunks.write_jpeg(path, notes, _read_record(path, "jpeg")),
+    "gif": lambda path, notes: _chunks.write_gif(path, notes, _read_record(path, "gif")),
+    "webp": partial(_pillow.write_notes, kind="webp"),
+    "bmp": partial(_pillow.write_notes, kind="bmp"),
+    "tiff": _tiff.write_notes,
+    "exr": _layers.write_notes,
     "npz": _texts.write_npz,
     "html": _texts.write_html,
     "json": _texts.write_json,
 }
-_FINDERS: dict[str, Callable[[Path], tuple[int, int] | None]] = {
-    "png": _chunks.find_png,
-    "jpeg": _chunks.find_jpeg,
-    "gif": _chunks.find_gif,
-    "tiff": _tags.find_tiff,
-    "exr": _tags.find_exr,
-    "html": _texts.find_html,
+_VERBATIM = ("png", "jpeg", "gif", "tiff", "exr")
+"""Kinds of files that contain a record as it is."""
+_DIGESTS: dict[str, Callable[[Path], str]] = {
+    "npz": _texts.digest_npz,
+    "html": _texts.digest_html,
+    "json": _texts.digest_json,
 }
-_DIGESTS: dict[str, Callable[[Path], str]] = {"npz": _texts.digest_npz, "json": _texts.digest_json}
-_SIDECAR = ("webp", "bmp", "")
-"""Kinds of files that have no place for how they were made; a file beside them says it."""
-_IN_PLACE = ("tiff", "exr")
-_SUFFIXES = {
-    ".png": "png",
-    ".jpg": "jpeg",
-    ".jpeg": "jpeg",
-    ".webp": "webp",
-    ".bmp": "bmp",
-    ".gif": "gif",
-    ".tif": "tiff",
-    ".tiff": "tiff",
-    ".exr": "exr",
-    ".npz": "npz",
-    ".html": "html",
-    ".json": "json",
-}
+_SUFFIXES = {f".{kind}": kind for kind in _WRITERS} | {".jpg": "jpeg", ".tif": "tiff"}
 
 
 def read_metadata(path: PathLike) -> Metadata:
-    """Return what a file says beside its values.
+    """Return the metadata of a file.
 
     Parameters
     ----------
     path : path_like
-        Any file. Of one that is no picture, or damaged, nothing is known.
+        Any file. A damaged file, or one of another kind, gives empty metadata.
 
     Returns
     -------
     texrs.io.Metadata
-        How its colours and its pixels are to be understood, and how texrs made it, where that is so: from the file, or
-        from the file of the same name and ``.json`` beside it.
+        The meaning of colours and pixels, and the record of how texrs made the file. The record is in the file, or in a file
+        with the same name and ``.json`` after it.
 
     Raises
     ------
@@ -115,11 +93,9 @@ def read_metadata(path: PathLike) -> Metadata:
     kind = _find_kind(name)
     found: dict[str, object] = {}
     if kind in _READERS:
-        # Whatever a file holds, nothing depends on what it says of itself.
+        # No result depends on the metadata, so that damaged ones do not matter.
         with suppress(Exception):
-            found = _READERS[kind](name)
-    with suppress(Exception):
-        found |= {"multiplied": True} if kind == "exr" and "A" in _tags.list_exr_channels(name) else {}
+            found = {key: value for key, value in _READERS[kind](name).items() if value is not None}
     with suppress(Exception):
         if (colours := _pillow.read_palette(name, kind)) is not None:
             found["palette"] = colours.tobytes()
@@ -130,27 +106,27 @@ def read_metadata(path: PathLike) -> Metadata:
 
 
 def write_metadata(path: PathLike, notes: Metadata, beside: PathLike | None = None) -> Path | None:
-    """Let a file say something beside its values; what its format has no place for is left out.
+    """Write metadata into a file, as far as its format can hold them.
 
     Parameters
     ----------
     path : path_like
-        A file that was just written: it is changed where it lies.
+        File that was just written; it is changed in place.
     notes : Metadata
-        What it is to say. ``"content": "000...0"`` in ``made``, of 64 zeros, becomes the SHA-256 of all else in the file.
+        Metadata. ``"content": "000...0"`` in ``made``, with 64 zeros, becomes the SHA-256 of the rest of the file.
     beside : path_like, optional
-        The name that the file is to have, where ``path`` is a temporary one: a file of that name and ``.json`` takes
-        ``made`` where the format cannot.
+        Final name of the file if ``path`` is temporary. If the format cannot hold ``made``, a file of this name with
+        ``.json`` after it does. Default: ``path``.
 
     Returns
     -------
     pathlib.Path or None
-        The file beside it, if there is one.
+        The file that ends in ``.json``, if one was written.
 
     Raises
     ------
     FileError
-        The file is not of the kind that its suffix says, or cannot be written.
+        The content does not fit the suffix, or the file cannot be written.
 
     Examples
     --------
@@ -167,66 +143,85 @@ def write_metadata(path: PathLike, notes: Metadata, beside: PathLike | None = No
     """
     name = _files.as_path(path)
     kind = _SUFFIXES.get(name.suffix.lower(), "")
-    made = as_instance(notes, "notes", Metadata).made
-    apart = (
-        kind in _SIDECAR
-        or (kind == "exr" and not _tags.takes_exr(name))
-        or (kind == "jpeg" and len((made or "").encode()) > MOST_JPEG)
-    )
-    with _files.translate_errors(name, "writing what it says of itself"):
-        # Of a table of tags what is said moves what lies around it, so it is said first, and filled in.
-        notes = replace(notes, palette=None)
-        first = notes if kind in _IN_PLACE and not apart else replace(notes, made=None)
-        kind = "" if apart and kind == "exr" else kind
-        if kind in _WRITERS and first != Metadata():
-            _WRITERS[kind](name, first)
+    notes = replace(as_instance(notes, "notes", Metadata), palette=None, multiplied=False)
+    made = notes.made
+    apart = needs_sidecar(name) or (kind == "jpeg" and len((made or "").encode()) > MOST_JPEG)
+    with _files.translate_errors(name, "writing its metadata"):
+        if made is not None and kind in _DIGESTS:
+            made = _fill_in(name, made)
+        inside = replace(notes, made=None if apart else made)
+        if kind in _WRITERS and inside != Metadata():
+            _WRITERS[kind](name, inside)
         if made is None:
             return None
-        made = made.replace(BLANK, f'"content": "{digest(name)}"') if BLANK in made else made
         if not apart:
-            _WRITERS[kind](name, Metadata(made=made))
+            # The place of the record is a part of the rest of such a file: write zeros first, then the digest.
+            if BLANK in made:
+                _replace_record(name, kind, made, _fill_in(name, made))
             return None
+        made = _fill_in(name, made)
     there = name_sidecar(_files.as_path(beside if beside is not None else path))
     with _files.atomic(there) as temporary:
         temporary.write_text(_texts.dump({"texrs": made}), encoding="utf-8")
     return there
 
 
+def _fill_in(path: Path, made: str) -> str:
+    """Return a record with the digest of the rest of its file."""
+    return made.replace(BLANK, f'"content": "{digest(path)}"') if BLANK in made else made
+
+
+def _read_record(path: Path, kind: str) -> bytes:
+    """Return the bytes of the record in a file; empty if there is none."""
+    with suppress(Exception):
+        return _chunks.encode_record(kind, str(_READERS[kind](path).get("made") or ""))
+    return b""
+
+
+def _replace_record(path: Path, kind: str, former: str, made: str) -> None:
+    """Write a record over one of the same length."""
+    record = _chunks.encode_record(kind, made)
+    with path.open("r+b") as file:
+        with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+            file.seek(data.find(_chunks.encode_record(kind, former)))
+        file.write(record)
+        if kind == "png":
+            file.write(zlib.crc32(b"iTXt" + _chunks.KEYWORD + record).to_bytes(4, "big"))
+
+
 def needs_sidecar(path: Path) -> bool:
-    """Return whether files of a suffix have no place for how they were made."""
-    return _SUFFIXES.get(path.suffix.lower(), "") in _SIDECAR
+    """Return whether files with a suffix cannot hold a record."""
+    return _SUFFIXES.get(path.suffix.lower(), "") not in (*_VERBATIM, *_DIGESTS)
 
 
 def name_sidecar(path: Path) -> Path:
-    """Return the name of the file that says how one was made that has no place for it."""
+    """Return the name of the file that holds the record of a file that cannot."""
     return path.with_name(path.name + ".json")
 
 
 def is_unchanged(path: PathLike, made: str) -> bool:
-    """Return whether a file is as it was when it was said how it was made."""
+    """Return whether a file has not changed since its record was written."""
     stated = DIGEST.search(made)
     return stated is not None and stated[0] == f'"content": "{digest(_files.as_path(path))}"'
 
 
 def digest(path: Path) -> str:
-    """Return the SHA-256 of a file but for what it says of how it was made."""
+    """Return the SHA-256 of a file without its record."""
     kind = _find_kind(path)
     if kind in _DIGESTS:
         return _DIGESTS[kind](path)
-    span = _FINDERS[kind](path) if kind in _FINDERS else None
-    begin, end = span or (0, 0)
-    whole = hashlib.sha256()
-    with path.open("rb") as file:
-        while part := file.read(min(BLOCK, begin - file.tell())):
-            whole.update(part)
-        file.seek(end)
-        while part := file.read(BLOCK):
-            whole.update(part)
+    record = _read_record(path, kind) if kind in _VERBATIM else b""
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data, memoryview(data) as view:
+        begin = max(data.find(record), 0)
+        # The checksum of a chunk of PNG follows its text.
+        end = begin + len(record) + 4 * (kind == "png") if begin else 0
+        whole = hashlib.sha256(view[:begin])
+        whole.update(view[end:])
     return whole.hexdigest()
 
 
 def hash_file(path: PathLike) -> str:
-    """Return the SHA-256 of a file, or of a store, that of the names and the contents of all its files."""
+    """Return the SHA-256 of a file, or of the names and contents of all files of a store."""
     if is_store(path):
         files = sorted(p for p in _files.as_path(path).rglob("*") if p.is_file())
         lines = [f"{hash_file(p)} {p.relative_to(path).as_posix()}" for p in files]
@@ -236,7 +231,7 @@ def hash_file(path: PathLike) -> str:
 
 
 def _find_kind(path: Path) -> str:
-    """Return the kind of a file by its content, or where that says nothing by its suffix."""
+    """Return the format of a file by its content, or else by its suffix."""
     suffix = path.suffix.lower()
     try:
         return detect_kind(path)

@@ -1,4 +1,4 @@
-"""What pictures say beside their pixels, in formats that are rows of chunks: PNG, JPEG, WebP, GIF; and BMP."""
+"""Metadata that are put into PNG, JPEG and GIF files without encoding their pixels again; Pillow reads them."""
 
 from __future__ import annotations
 
@@ -6,263 +6,101 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from texrs import _rust
-from texrs.io import _tags
-from texrs.io._notes import Metadata
+from texrs.io._notes import INCH, Metadata
 
-KEYWORD = b"texrs"
-MOST = 2**24
-"""Bytes that a profile may have."""
-INCH = 0.0254
-_PNG_START = b"\x89PNG\r\n\x1a\n"
-_COLOURS = (b"iCCP", b"sRGB", b"gAMA", b"cHRM")
-_ICC = b"ICC_PROFILE\0"
+KEYWORD = b"texrs\0\0\0\0\0"
+"""Keyword of a text of PNG, and the fields after it: not compressed, no language, no translation."""
+_START, _HEADER = 8, 33
+"""Bytes of the signature of PNG, and up to the end of its header."""
+_COLOURS = frozenset({b"iCCP", b"sRGB", b"gAMA", b"cHRM"})
+"""Chunks of PNG that depend on each other."""
 _PART = 65_519
-"""Bytes of a profile that one segment of JPEG can hold."""
+"""Maximum number of bytes of a profile in a segment of JPEG."""
 
 
-# --- PNG -------------------------------------------------------------------------------------------------------------
+def encode_record(kind: str, made: str) -> bytes:
+    """Return the bytes of a record as a file of a kind contains them."""
+    text = made.encode()
+    if kind != "gif":
+        return text
+    return b"".join(bytes((len(text[i : i + 255]),)) + text[i : i + 255] for i in range(0, len(text), 255))
 
 
-def _walk_png(data: bytes) -> Iterator[tuple[bytes, int, int]]:
-    """Return the kind of each chunk, and from where to where it goes, with its length and its sum."""
-    at = len(_PNG_START)
+def _frame(kind: bytes, body: bytes) -> bytes:
+    """Return a chunk of PNG."""
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def _walk(data: bytes) -> Iterator[bytes]:
+    """Return the chunks of a PNG file."""
+    at = _START
     while at + 12 <= len(data):
         end = at + 12 + int.from_bytes(data[at : at + 4], "big")
-        if end > len(data):
-            return
-        yield data[at + 4 : at + 8], at, end
+        yield data[at:end]
         at = end
 
 
-def read_png(path: Path) -> dict[str, Any]:
-    """Return what a PNG file says."""
-    data, turned = path.read_bytes(), False
-    found: dict[str, Any] = {}
-    for kind, start, end in _walk_png(data):
-        body = data[start + 8 : end - 4]
-        match kind:
-            case b"iCCP":
-                packed = body[body.index(b"\0") + 2 :]
-                found["profile"] = zlib.decompressobj().decompress(packed, MOST)
-            case b"sRGB":
-                found["srgb"] = True
-            case b"gAMA":
-                found["gamma"] = int.from_bytes(body, "big") / 100_000
-            case b"cHRM":
-                found["primaries"] = tuple(n / 100_000 for n in struct.unpack(">8I", body))
-            case b"pHYs" if body[8] == 1 and int.from_bytes(body[:4], "big") and int.from_bytes(body[4:8], "big"):
-                found["density"] = (float(int.from_bytes(body[4:8], "big")), float(int.from_bytes(body[:4], "big")))
-            case b"eXIf":
-                turned = _rust.exif_orientation(body) > 4
-            case b"iTXt" if body.startswith(KEYWORD + b"\0"):
-                found["made"] = body[len(KEYWORD) + 5 :].decode("utf-8")
-    return turn(found, turned)
+def describe_png(file: bytes, text: str) -> bytes:
+    """Return a PNG file with a description."""
+    return file[:_HEADER] + _frame(b"tEXt", b"Description\0" + text.encode("latin-1")) + file[_HEADER:]
 
 
 def write_png(path: Path, notes: Metadata) -> None:
-    """Put what is to be said after the header, in place of what was said of the same."""
-    data, new = path.read_bytes(), []
+    """Put chunks after the header, and remove those that they replace."""
+    new = []
+    if notes.made is not None:
+        new.append((b"iTXt", KEYWORD + notes.made.encode()))
     if notes.profile is not None:
         new.append((b"iCCP", b"ICC profile\0\0" + zlib.compress(notes.profile, 9)))
     elif notes.srgb:
         new.append((b"sRGB", b"\0"))
     if notes.gamma is not None:
-        new.append((b"gAMA", round(notes.gamma * 100_000).to_bytes(4, "big")))
+        new.append((b"gAMA", struct.pack(">I", round(notes.gamma * 100_000))))
     if notes.primaries is not None:
         new.append((b"cHRM", struct.pack(">8I", *(round(n * 100_000) for n in notes.primaries))))
     if notes.density is not None:
         down, across = (min(max(round(d), 1), 2**31 - 1) for d in notes.density)
         new.append((b"pHYs", struct.pack(">IIB", across, down, 1)))
+    kinds = {kind for kind, _ in new}
+    former = kinds - {b"iTXt"} | (_COLOURS if kinds & _COLOURS else frozenset())
+    data = path.read_bytes()
+    kept = [
+        chunk
+        for chunk in _walk(data)
+        if chunk[4:8] not in former and not (notes.made is not None and chunk[4:].startswith(b"iTXt" + KEYWORD))
+    ]
+    path.write_bytes(b"".join([data[:_START], kept[0], *(_frame(*chunk) for chunk in new), *kept[1:]]))
+
+
+def write_jpeg(path: Path, notes: Metadata, former: bytes) -> None:
+    """Put segments after the first, in place of the former record, and the density into the first."""
+    data = path.read_bytes()
+    if former and notes.made is not None:
+        at = data.index(former)
+        data = data[: at - 4] + data[at + len(former) :]
+    first = 4 + int.from_bytes(data[4:6], "big")
+    head, new = data[:first], []
+    if notes.density is not None and head[6:11] == b"JFIF\0":
+        down, across = (min(max(round(d * INCH), 1), 65_535) for d in notes.density)
+        head = head[:13] + struct.pack(">BHH", 1, across, down) + head[18:]
     if notes.made is not None:
-        new.append((b"iTXt", KEYWORD + b"\0\0\0\0\0" + notes.made.encode()))
-    kinds = {kind for kind, _ in new} - {b"iTXt"} | (set(_COLOURS) if {k for k, _ in new} & set(_COLOURS) else set())
-    parts = [_PNG_START]
-    for kind, start, end in _walk_png(data):
-        ours = kind == b"iTXt" and notes.made is not None and data[start + 8 :].startswith(KEYWORD + b"\0")
-        if kind not in kinds and not ours:
-            parts.append(data[start:end])
-        if kind == b"IHDR":
-            for name, body in new:
-                sum_ = zlib.crc32(name + body)
-                parts.append(struct.pack(">I", len(body)) + name + body + struct.pack(">I", sum_))
-    path.write_bytes(b"".join(parts))
+        new.append(b"\xff\xfe" + struct.pack(">H", len(notes.made.encode()) + 2) + notes.made.encode())
+    profile = notes.profile or b""
+    count = -(-len(profile) // _PART)
+    for i in range(count if count < 256 else 0):
+        part = b"ICC_PROFILE\0" + bytes((i + 1, count)) + profile[i * _PART : (i + 1) * _PART]
+        new.append(b"\xff\xe2" + struct.pack(">H", len(part) + 2) + part)
+    path.write_bytes(b"".join([head, *new, data[first:]]))
 
 
-def find_png(path: Path) -> tuple[int, int] | None:
-    """Return where the chunk lies that says how the file was made."""
-    data = path.read_bytes()
-    mark = KEYWORD + b"\0"
-    ours = ((s, e) for kind, s, e in _walk_png(data) if kind == b"iTXt" and data[s + 8 : s + 8 + len(mark)] == mark)
-    return next(ours, None)
-
-
-# --- JPEG ------------------------------------------------------------------------------------------------------------
-
-
-def _walk_jpeg(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Return the marker of each segment before the pixels, and from where to where it goes."""
-    at = 2
-    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != 0xDA:
-        if data[at + 1] == 0xFF:  # Fill byte.
-            at += 1
-            continue
-        end = at + 2 + int.from_bytes(data[at + 2 : at + 4], "big")
-        yield data[at + 1], at, end
-        at = end
-
-
-def read_jpeg(path: Path) -> dict[str, Any]:
-    """Return what a JPEG file says; of its Exif block the resolution and the colour space."""
-    data, turned = path.read_bytes(), False
-    found: dict[str, Any] = {}
-    parts: dict[int, bytes] = {}
-    for marker, start, end in _walk_jpeg(data):
-        body = data[start + 4 : end]
-        if marker == 0xE0 and body.startswith(b"JFIF\0") and body[7] in (1, 2):
-            across, down = (int.from_bytes(body[i : i + 2], "big") for i in (8, 10))
-            if across and down:
-                unit = INCH if body[7] == 1 else 0.01
-                found["density"] = (down / unit, across / unit)
-        elif marker == 0xE1 and body.startswith(b"Exif\0\0"):
-            turned = _rust.exif_orientation(body[6:]) > 4
-            found = _tags.read_exif(body[6:]) | found
-        elif marker == 0xE2 and body.startswith(_ICC):
-            parts[body[12]] = body[14:]
-        elif marker == 0xFE and body.startswith(b'{"texrs"'):
-            found["made"] = body.decode("utf-8")
-    if parts:
-        found["profile"] = b"".join(part for _, part in sorted(parts.items()))
-    return turn(found, turned)
-
-
-def write_jpeg(path: Path, notes: Metadata) -> None:
-    """Put segments after the first, and the density into it."""
-    data, new = path.read_bytes(), []
-    if notes.profile is not None:
-        count = -(-len(notes.profile) // _PART)
-        for i in range(count if count < 256 else 0):
-            part = notes.profile[i * _PART : (i + 1) * _PART]
-            new.append((0xE2, _ICC + bytes((i + 1, count)) + part))
-    if notes.made is not None:
-        new.append((0xFE, notes.made.encode()))
-    parts, at = [data[:2]], 2
-    segments = list(_walk_jpeg(data))
-    for i, (marker, start, end) in enumerate(segments):
-        segment, at = data[start:end], end
-        jfif = marker == 0xE0 and segment[4:9] == b"JFIF\0"
-        if jfif and notes.density is not None:
-            down, across = (min(max(round(d * INCH), 1), 65_535) for d in notes.density)
-            segment = segment[:11] + struct.pack(">BHH", 1, across, down) + segment[16:]
-        if marker == 0xFE and notes.made is not None and segment[4:].startswith(b'{"texrs"'):
-            segment = b""
-        parts.append(segment)
-        if i == 0:
-            parts += [bytes((0xFF, m)) + struct.pack(">H", len(body) + 2) + body for m, body in new]
-    path.write_bytes(b"".join([*parts, data[at:]]))
-
-
-def find_jpeg(path: Path) -> tuple[int, int] | None:
-    """Return where the comment lies that says how the file was made."""
-    data = path.read_bytes()
-    ours = ((s, e) for m, s, e in _walk_jpeg(data) if m == 0xFE and data[s + 4 : s + 12] == b'{"texrs"')
-    return next(ours, None)
-
-
-# --- WebP, BMP, GIF --------------------------------------------------------------------------------------------------
-
-
-def _walk_webp(data: bytes) -> Iterator[tuple[bytes, int, int]]:
-    at = 12
-    while at + 8 <= len(data):
-        length = int.from_bytes(data[at + 4 : at + 8], "little")
-        end = at + 8 + length + length % 2
-        yield data[at : at + 4], at, end
-        at = end
-
-
-def read_webp(path: Path) -> dict[str, Any]:
-    """Return what a WebP file says."""
-    data, turned = path.read_bytes(), False
-    found: dict[str, Any] = {}
-    for kind, start, _ in _walk_webp(data):
-        length = int.from_bytes(data[start + 4 : start + 8], "little")
-        body = data[start + 8 : start + 8 + length]
-        if kind == b"ICCP":
-            found["profile"] = body
-        elif kind == b"EXIF":
-            exif = body.removeprefix(b"Exif\0\0")
-            turned = _rust.exif_orientation(exif) > 4
-            found |= _tags.read_exif(exif)
-    return turn(found, turned)
-
-
-def write_webp(path: Path, notes: Metadata) -> None:
-    """Make a simple file of one chunk an extended one with a profile."""
-    data = path.read_bytes()
-    if notes.profile is None or data[12:16] != b"VP8L":
-        return
-    bits = int.from_bytes(data[21:25], "little")
-    width, height, alpha = bits & 0x3FFF, bits >> 14 & 0x3FFF, bits >> 28 & 1
-    header = bytes((0x20 | 0x10 * alpha, 0, 0, 0)) + width.to_bytes(3, "little") + height.to_bytes(3, "little")
-    profile = notes.profile + b"\0" * (len(notes.profile) % 2)
-    chunks = [b"VP8X" + struct.pack("<I", 10) + header, b"ICCP" + struct.pack("<I", len(notes.profile)) + profile]
-    body = b"WEBP" + b"".join(chunks) + data[12:]
-    path.write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
-
-
-def read_bmp(path: Path) -> dict[str, Any]:
-    """Return the density of a BMP file."""
-    data = path.read_bytes()[:54]
-    across, down = struct.unpack("<ii", data[38:46])
-    return {"density": (float(down), float(across))} if data[14] >= 40 and across > 0 and down > 0 else {}
-
-
-def write_bmp(path: Path, notes: Metadata) -> None:
-    """Put the density into the header."""
-    if notes.density is not None:
-        data = path.read_bytes()
-        down, across = (min(max(round(d), 1), 2**31 - 1) for d in notes.density)
-        path.write_bytes(data[:38] + struct.pack("<ii", across, down) + data[46:])
-
-
-_GIF_MARK = b"!\xfe\x05texrs"
-
-
-def read_gif(path: Path) -> dict[str, Any]:
-    """Return how a GIF file was made."""
-    span = find_gif(path)
-    if span is None:
-        return {}
-    data, text = path.read_bytes()[span[0] + len(_GIF_MARK) : span[1] - 1], b""
-    while data:
-        text, data = text + data[1 : data[0] + 1], data[data[0] + 1 :]
-    return {"made": text.decode("utf-8")}
-
-
-def write_gif(path: Path, notes: Metadata) -> None:
-    """Put a comment before the end."""
+def write_gif(path: Path, notes: Metadata, former: bytes) -> None:
+    """Put a comment after the palette, in place of the former record."""
     if notes.made is None:
         return
-    data, span = path.read_bytes(), find_gif(path)
-    if span is not None:
-        data = data[: span[0]] + data[span[1] :]
-    text = notes.made.encode()
-    blocks = b"".join(bytes((len(t := text[i : i + 255]),)) + t for i in range(0, len(text), 255))
-    path.write_bytes(data[:-1] + _GIF_MARK + blocks + b"\0" + data[-1:])
-
-
-def find_gif(path: Path) -> tuple[int, int] | None:
-    """Return where the comment lies that says how the file was made: at the end."""
     data = path.read_bytes()
-    start = data.rfind(_GIF_MARK)
-    return None if start < 0 else (start, len(data) - 1)
-
-
-def turn(found: dict[str, Any], turned: bool) -> dict[str, Any]:
-    """Return the notes of a picture whose rows become columns when it is turned upright."""
-    if turned and "density" in found:
-        found["density"] = found["density"][::-1]
-    return found
+    if former:
+        at = data.index(former)
+        data = data[: at - 2] + data[at + len(former) + 1 :]
+    first = 13 + (3 << (data[10] & 7) + 1 if data[10] & 0x80 else 0)
+    path.write_bytes(data[:first] + b"!\xfe" + encode_record("gif", notes.made) + b"\0" + data[first:])

@@ -1,4 +1,4 @@
-"""What all formats share: paths, errors, atomic writing."""
+"""Paths, errors and atomic writing of all formats."""
 
 from __future__ import annotations
 
@@ -19,11 +19,9 @@ from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
 from texrs.io._temporary import name_temporary, put
 
 BYTES_PER_PIXEL = 16
-"""Bytes that what is read may have for each pixel of the limit: four floats."""
-
-
+"""Maximum number of bytes for each pixel of the limit: four floats."""
 _LONGEST = 255
-"""Bytes that the name of a file or of a folder may have."""
+"""Maximum number of bytes of the name of a file or folder."""
 
 
 def as_path(path: PathLike) -> Path:
@@ -41,7 +39,7 @@ def as_path(path: PathLike) -> Path:
 
 @contextmanager
 def translate_errors(path: Path, what: str) -> Iterator[None]:
-    """Turn whatever a decoder or an encoder raises into one sentence that names the file."""
+    """Turn each error of a decoder or an encoder into one sentence that names the file."""
     try:
         yield
     except TexrsError:
@@ -57,7 +55,7 @@ def translate_errors(path: Path, what: str) -> Iterator[None]:
 
 
 def describe_error(error: BaseException) -> str:
-    """Return what an error says, on one line."""
+    """Return the message of an error on one line."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     text = " ".join(str(error).split())
@@ -65,7 +63,7 @@ def describe_error(error: BaseException) -> str:
 
 
 def check_file(path: Path) -> int:
-    """Check that a regular, non-empty file lies there and return its length."""
+    """Check that a path is a regular, non-empty file, and return its length."""
     try:
         status = path.stat()
     except FileNotFoundError:
@@ -81,17 +79,22 @@ def check_file(path: Path) -> int:
     return status.st_size
 
 
-def load(path: Path, limit: int) -> bytes:
-    """Read a whole file that may not be larger than the pixels it may hold."""
+def check_length(path: Path, limit: int) -> None:
+    """Check that a file is not much larger than the pixels that it may hold."""
     length = check_file(path)
     if length > BYTES_PER_PIXEL * limit + 2**26:
         raise LimitExceeded(f"{path}: has {length} bytes, too many for an image of {limit} pixels")
+
+
+def load(path: Path, limit: int) -> bytes:
+    """Read a whole file."""
+    check_length(path, limit)
     with translate_errors(path, "reading"):
         return path.read_bytes()
 
 
 def check_size(path: Path, sides: tuple[int, ...], channels: int, itemsize: int, limit: int) -> int:
-    """Compare what a header announces with the limit and return the number of pixels."""
+    """Compare the sizes in a header with the limit, and return the number of pixels."""
     pixels = prod(sides)
     named = " x ".join(map(str, sides))
     if pixels <= 0 or channels <= 0:

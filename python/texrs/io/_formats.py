@@ -1,4 +1,4 @@
-"""Which files there are: how they are recognised, and what each can hold."""
+"""Formats of files: how they are recognised, and what they can hold."""
 
 from __future__ import annotations
 
@@ -35,16 +35,13 @@ MAGIC = (
     (b"PK\x03\x04", "npz"),
     (_volumes.NRRD_MAGIC, "nrrd"),
     (_volumes.GZIP_MAGIC, "nii.gz"),
-    (_volumes.VTI_MAGIC, "vti"),
-    (b"<VTKFile", "vti"),
-    (b"<?xml", "vti"),
-    (_vtk.LEGACY_MAGIC, "vtk"),
+    *((magic, "vti") for magic in _vtk.VTI_MAGIC),
     *((magic, "nii") for magic in _volumes.NIFTI_MAGIC),
 )
 
 NAMES = (
     *("PNG", "TIFF", "EXR", "HDR", "WebP", "JPEG", "GIF", "BMP", "DDS", "PSD", "AVIF", "JPEG XL"),
-    *(".npy", ".npz", "NRRD", "NIfTI", ".vti", ".vtk", "Zarr"),
+    *(".npy", ".npz", "NRRD", "NIfTI", ".vti", "Zarr"),
 )
 
 _NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
@@ -52,14 +49,14 @@ _SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
 _MOST_CHANNELS = 64
 RAW = _raw.RAW
 STORE = ".zarr"
-"""The suffix of a folder, which is a store of Zarr."""
-VOLUMES = ("nrrd", "nii", "nii.gz", "vti", "vtk", "raw", "slices")
+"""The suffix of a folder that is a Zarr store."""
+VOLUMES = ("nrrd", "nii", "nii.gz", "vti", "raw", "slices")
 UNIT = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """What the files of a suffix can hold."""
+    """Arrays that the files of a suffix can hold."""
 
     dtypes: frozenset[np.dtype[np.generic]]
     channels: range
@@ -103,13 +100,13 @@ FORMATS = {
 WRITTEN_IMAGES = tuple(suffix for suffix, form in FORMATS.items() if form.images)
 WRITTEN_VOLUMES = tuple(suffix for suffix, form in FORMATS.items() if form.volumes)
 READ_IMAGES = (*WRITTEN_IMAGES, ".psd")
-READ_VOLUMES = (*WRITTEN_VOLUMES, ".vtk")
-"""Suffixes of files that hold images or volumes, stores of Zarr apart. All lists of suffixes in texrs come from these."""
+READ_VOLUMES = WRITTEN_VOLUMES
+"""Suffixes of files of images or volumes, without Zarr stores. All lists of suffixes in texrs come from these."""
 READ = tuple(dict.fromkeys((*READ_IMAGES, *READ_VOLUMES)))
 
 
 def detect_kind(path: Path) -> str:
-    """Return which format a file has, by its content."""
+    """Return the format of a file by its content."""
     if _stores.is_store(path):
         return "zarr"
     if _series.is_series(path, READ_IMAGES):
@@ -135,12 +132,12 @@ def detect_kind(path: Path) -> str:
 
 
 def keeps_spacing(suffix: str) -> bool:
-    """Return whether volumes of a suffix can state how far their voxels lie apart."""
+    """Return whether volumes of a suffix can state the distances between voxels."""
     return suffix == STORE or FORMATS.get(suffix) is _TIFF or (suffix in FORMATS and not FORMATS[suffix].images)
 
 
 def holds_spacing(volume: Array, suffix: str) -> bool:
-    """Return whether files of a suffix can state how far the voxels of a volume lie apart."""
+    """Return whether files of a suffix can state the distances between the voxels of a volume."""
     channels = volume.shape[3] if volume.ndim == 4 else 1
     return keeps_spacing(suffix) and (FORMATS.get(suffix) is not _TIFF or _tiff.keeps_spacing(volume.dtype, channels))
 
@@ -154,13 +151,13 @@ def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...
 
 
 def check_spacing(spacing: Sequence[float]) -> tuple[float, ...]:
-    """Check how far voxels lie apart along planes, rows and columns."""
+    """Check the distances between planes, rows and columns."""
     steps = as_tuple(spacing, "spacing", 3, "three numbers, of planes, rows and columns")
     return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 
 
 def _drop_alpha(array: Array, form: Format, axes: int, suffix: str) -> Array:
-    """Return an image without its alpha channel, if that is opaque and the format has no place for it."""
+    """Return an image without its alpha channel if that is opaque and the format cannot hold it."""
     channels = array.shape[axes] if array.ndim > axes else 1
     if channels not in (2, 4) or channels in form.channels or channels - 1 not in form.channels:
         return array
@@ -172,7 +169,7 @@ def _drop_alpha(array: Array, form: Format, axes: int, suffix: str) -> Array:
 
 
 def check(value: object, suffix: str, axes: int) -> Array:
-    """Return what is to be written, contiguous and in native byte order."""
+    """Return the array to be written, contiguous and in native byte order."""
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, MemoryError) as error:

@@ -1,4 +1,4 @@
-"""Who reads grids of samples, by format: volumes, arrays of vectors, and how far apart the samples lie."""
+"""Readers of grids of samples by format: volumes, arrays of vectors, and distances between samples."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import cast
 
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
@@ -18,7 +19,7 @@ __all__ = ["READERS", "VECTORS", "holds_volume", "read_numpy", "read_spacing", "
 _MOST_CHANNELS = 4096
 
 Reader = Callable[[Path, int], Array]
-"""Returns what a file holds, if it is within a limit of samples."""
+"""Function that reads a file within a limit of samples."""
 
 
 def _read_tiff(name: Path, limit: int) -> Array:
@@ -43,52 +44,43 @@ def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
     return (_npy.read_npy if kind == "npy" else _npy.read_npz)(name, limit, check)
 
 
-def _read_raw(name: Path, limit: int) -> Array:
-    raw = _raw.parse_raw(name)
-    assert raw is not None
-    return raw.read(limit)
-
-
 READERS: dict[str, Reader] = {
     "tiff": _read_tiff,
     "npy": lambda name, limit: read_numpy(name, "npy", limit, 3),
     "npz": lambda name, limit: read_numpy(name, "npz", limit, 3),
-    "vti": _volumes.read_vti,
-    "vtk": _vtk.read_structured_points,
+    "vti": _vtk.read_vti,
     "nrrd": _volumes.read_nrrd,
-    "nii": partial(_volumes.read_nifti, compressed=False),
-    "nii.gz": partial(_volumes.read_nifti, compressed=True),
+    "nii": _volumes.read_nifti,
+    "nii.gz": _volumes.read_nifti,
     "zarr": lambda name, limit: _stores.read_store(name, limit, 3),
-    "raw": _read_raw,
+    "raw": lambda name, limit: cast(_raw.Raw, _raw.parse_raw(name)).read(limit),
 }
-"""Of volumes."""
+"""Readers of volumes."""
 VECTORS: dict[str, Reader] = READERS | {
     "npy": _npy.read_npy,
     "npz": _npy.read_npz,
-    "vti": partial(_vtk.read_image_data, vectors=True),
-    "vtk": partial(_vtk.read_structured_points, vectors=True),
+    "vti": partial(_vtk.read_vti, vectors=True),
     "zarr": lambda name, limit: _stores.read_store(name, limit, None),
 }
-"""Of arrays that may have more axes."""
+"""Readers of arrays that may have more axes."""
 SPACINGS: dict[str, Callable[[Path], Sequence[float] | None]] = {
     "vti": _vtk.read_spacing,
-    "vtk": _vtk.read_spacing,
     "nrrd": _volumes.read_nrrd_spacing,
-    "nii": partial(_volumes.read_nifti_spacing, compressed=False),
-    "nii.gz": partial(_volumes.read_nifti_spacing, compressed=True),
+    "nii": _volumes.read_nifti_spacing,
+    "nii.gz": _volumes.read_nifti_spacing,
     "zarr": _stores.read_store_spacing,
     "tiff": _tiff.read_spacing,
     "slices": lambda name: (
         _tiff.read_spacing(first) if detect_kind(first := _series.list_slices(name, READ_IMAGES)[0]) == "tiff" else None
     ),
 }
-"""Of distances between samples, x first."""
+"""Readers of distances between samples, x first."""
 
 
 def holds_volume(path: PathLike) -> bool:
-    """Return whether a file is a volume: of a kind that holds nothing else, or of several planes.
+    """Return whether a file is a volume: its format holds only volumes, or it has several planes.
 
-    The last of three axes of an .npy file is that of channels if there are up to four.
+    The last of three axes of an .npy file contains channels if its length is at most four.
     """
     name = _files.as_path(path)
     kind = detect_kind(name)
@@ -105,7 +97,7 @@ def holds_volume(path: PathLike) -> bool:
 
 
 def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
-    """Return how far the voxels of a file lie apart.
+    """Return the distances between the voxels of a file.
 
     Parameters
     ----------
@@ -115,8 +107,8 @@ def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
     Returns
     -------
     (float, float, float) or None
-        From plane to plane, from row to row and from column to column, as the file states it. NRRD, NIfTI, .vti,
-        .vtk, OME-Zarr, OME-TIFF and stacks of ImageJ (.tif) can. None if nothing is stated.
+        Distances between planes, rows and columns, as the file states them. NRRD, NIfTI, .vti,
+        OME-Zarr, OME-TIFF and stacks of ImageJ (.tif) can. None if nothing is stated.
 
     Raises
     ------

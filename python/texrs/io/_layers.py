@@ -1,89 +1,128 @@
-"""OpenEXR files of any channels: half, float and 32-bit integers, by the names of the layers that they belong to.
-
-The decoder of single pictures knows R, G, B, A and Y alone; the package OpenEXR of the Academy Software Foundation knows all,
-and is an extra: ``pip install texrs[materials]``.
-"""
+"""OpenEXR, images and layers of any name, by the package OpenEXR of the Academy Software Foundation."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from texrs._checks import as_limit
+from texrs._notices import ignore
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
 from texrs.io._files import as_path, atomic, check_file, check_size, translate_errors
-from texrs.io._image_io import SUBSAMPLED
+from texrs.io._notes import INCH, Metadata
 
-__all__ = ["read_layers", "write_layers"]
+MAPS, MADE = "texrs", "texrsMade"
+"""Attributes of the header: the roles of the layers of a material, and how texrs made the file."""
+PICTURES = (("R", "G", "B", "A"), ("R", "G", "B"), ("Y", "A"), ("Y",))
+"""Channels of images, the most first."""
+SUBSAMPLED = (
+    "holds luminance and subsampled chroma (channels such as Y, RY, BY), which are not read; "
+    "convert it to R, G and B, for example with ImageMagick: magick IN.exr OUT.exr"
+)
+"""The package OpenEXR does not convert these channels to colours."""
 
-ATTRIBUTE = "texrs"
-"""Of the header, which holds what a file says of itself."""
-ALONE = 0
-"""Threads beside the caller's: none, for a pool of threads does not outlive a fork."""
+
+def _open(path: Path, **options: Any) -> Any:
+    """Open a file without a pool of threads, because that does not survive a fork."""
+    import OpenEXR
+
+    # The package prints a line about a damaged part: keep it out of the output of commands.
+    with redirect_stdout(sys.stderr):
+        return OpenEXR.File(str(path), separate_channels=True, num_threads=0, **options)
+
+
+def _read_headers(path: Path) -> list[dict[str, Any]]:
+    """Return the header of each part."""
+    check_file(path)
+    with translate_errors(path, "reading"):
+        file = _open(path, header_only=True)
+        return [file.header(k) for k in range(len(file.parts))]
+
+
+def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dict[str, Any]]]:
+    """Return the name of each part, its channels in the display window, and its header."""
+    heads = _read_headers(path)
+    if not heads:
+        raise FileError(f"{path}: holds no pictures")
+    sizes = {_measure(head["displayWindow"])[1] for head in heads}
+    if len(sizes) > 1:
+        raise FileError(f"{path}: its parts have several sizes, {' and '.join(map(str, sorted(sizes)))}")
+    for head in heads:
+        if "deep" in str(head["type"]):
+            raise FileError(f"{path}: deep pictures are not read")
+        for window in ("displayWindow", "dataWindow"):
+            check_size(path, _measure(head[window])[1], 1, 4, limit)
+    # A material has many maps: each counts as an image of one channel.
+    count = sum(len(head["channels"]) for head in heads)
+    if count * int(np.prod(next(iter(sizes)))) * 4 > 64 * 4 * limit:
+        raise LimitExceeded(f"{path}: {count} channels are too many for a limit of {limit} pixels")
+    found = []
+    with translate_errors(path, "decoding"):
+        file = _open(path)
+        # The package leaves out parts that are damaged.
+        if len(file.parts) != len(heads):
+            raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
+        for number, head in enumerate(heads):
+            channels = file.channels(number)
+            if any((each.xSampling, each.ySampling) != (1, 1) for each in channels.values()):
+                raise FileError(f"{path}: {SUBSAMPLED}")
+            placed = {name: _place(each.pixels, head) for name, each in channels.items()}
+            found.append((str(head.get("name", "")) if len(heads) > 1 else "", placed, head))
+    return found
 
 
 def read_layers(path: PathLike, *, limit: int | None = None) -> tuple[dict[str, Array], str | None]:
-    """Return the channels of a file by their full names, (H, W) each, and what the file says of itself.
+    """Return the channels of a file by their full names, (H, W) of float16, float32 or uint32, and the description of its maps.
 
-    The picture is the display window: data outside it is left out, and 0 where it has none. In a file of several parts the
-    names of parts come first.
-
-    Raises
-    ------
-    FileError
-        Missing, not an EXR file, corrupt, of several sizes, deep or subsampled; or the package is not there.
-    LimitExceeded
-        More pixels than the limit.
-
+    The image is the display window: data outside it is left out, and missing data is 0. In a file of several parts the name
+    of the part comes first.
     """
-    name, limit = as_path(path), as_limit(limit)
-    check_file(name)
-    library = import_library(name)
-    with translate_errors(name, "reading"):
-        heads = library.File(str(name), separate_channels=True, header_only=True, num_threads=ALONE)
-        parts = [heads.header(k) for k in range(len(heads.parts))]
-    if not parts:
-        raise FileError(f"{name}: holds no pictures")
-    sizes = {tuple(measure(head["displayWindow"])[1]) for head in parts}
-    if len(sizes) > 1:
-        raise FileError(f"{name}: its parts have several sizes, {' and '.join(map(str, sorted(sizes)))}")
-    count = sum(len(head["channels"]) for head in parts)
-    for head in parts:
-        if "deep" in str(head["type"]):
-            raise FileError(f"{name}: deep pictures are not read")
-        for window in ("displayWindow", "dataWindow"):
-            check_size(name, measure(head[window])[1], 1, 4, limit)
-    # Of maps there are many: each counts as a picture of one channel.
-    if count * int(np.prod(next(iter(sizes)))) * 4 > 64 * 4 * limit:
-        raise LimitExceeded(f"{name}: {count} channels are too many for a limit of {limit} pixels")
-    found: dict[str, Array] = {}
-    with translate_errors(name, "decoding"):
-        file = library.File(str(name), separate_channels=True, num_threads=ALONE)
-        for number, head in enumerate(parts):
-            title = str(head.get("name", "")) if len(parts) > 1 else ""
-            for key, channel in file.channels(number).items():
-                if (channel.xSampling, channel.ySampling) != (1, 1):
-                    raise FileError(f"{name}: {SUBSAMPLED}")
-                found[f"{title}.{key}" if title else key] = place(channel.pixels, head)
-    words = parts[0].get(ATTRIBUTE)
+    parts = _read_parts(as_path(path), as_limit(limit))
+    words = parts[0][2].get(MAPS)
+    found = {f"{part}.{key}" if part else key: value for part, found, _ in parts for key, value in found.items()}
     return found, words if isinstance(words, str) else None
 
 
-def measure(window: Any) -> tuple[tuple[int, int], tuple[int, int]]:
+def read_image(path: Path, limit: int) -> Array:
+    """Read the image of the first part, (H, W) or (H, W, C): its colours, its luminance, or its only channel."""
+    parts = _read_parts(path, limit)
+    channels = parts[0][1]
+    names = next((names for names in PICTURES if channels.keys() >= set(names)), tuple(channels))
+    if channels.keys() & {"RY", "BY"}:
+        raise FileError(f"{path}: {SUBSAMPLED}")
+    if names not in PICTURES and len(names) != 1:
+        raise FileError(f"{path}: has the channels {' '.join(names)}; R G B, R G B A, Y, Y A or a single one are read")
+    if any(channels[name].dtype == np.uint32 for name in names):
+        raise FileError(f"{path}: channels of 32-bit integers are not read")
+    image = channels[names[0]] if len(names) == 1 else np.stack([channels[name] for name in names], axis=-1)
+    rest = [*(channels.keys() - set(names)), *(f"{part}.{key}" for part, found, _ in parts[1:] for key in found)]
+    if rest:
+        ignore(f"{path}: {', '.join(sorted(rest))} not used: these channels are not part of the picture")
+    return image
+
+
+def list_channels(path: Path) -> list[str]:
+    """Return the full names of the channels of the first part."""
+    return [each.name for each in _read_headers(path)[0]["channels"]]
+
+
+def _measure(window: Any) -> tuple[tuple[int, int], tuple[int, int]]:
     """Return the first row and column of a window, and its rows and columns."""
     (left, top), (right, bottom) = ([int(v) for v in corner] for corner in window)
     return (top, left), (bottom - top + 1, right - left + 1)
 
 
-def place(pixels: Array, head: Mapping[str, Any]) -> Array:
-    """Return what of the data lies in the display window."""
-    (top, left), shape = measure(head["displayWindow"])
-    (first, start), (rows, columns) = measure(head["dataWindow"])
+def _place(pixels: Array, head: Mapping[str, Any]) -> Array:
+    """Return the data in the display window."""
+    (top, left), shape = _measure(head["displayWindow"])
+    (first, start), (rows, columns) = _measure(head["dataWindow"])
     if (first, start) == (top, left) and pixels.shape == shape:
         return np.ascontiguousarray(pixels)
     whole = np.zeros(shape, pixels.dtype)
@@ -94,28 +133,53 @@ def place(pixels: Array, head: Mapping[str, Any]) -> Array:
 
 
 def write_layers(path: PathLike, channels: Mapping[str, Array], words: str) -> None:
-    """Write channels of float16, float32 or uint32, (H, W) each, by their full names, whole or not at all.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written, or the package is not there. A former file is as it was.
-
-    """
+    """Write channels of float16, float32 or uint32, (H, W), by their full names, and a description of the maps."""
     target = as_path(path)
-    library = import_library(target)
-    # Arrays that are not contiguous would be written as if they were.
-    whole = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
-    head = {"compression": library.ZIP_COMPRESSION, "type": library.scanlineimage, ATTRIBUTE: words}
     with atomic(target) as temporary, translate_errors(target, "writing"):
-        library.File(head, whole, num_threads=ALONE).write(str(temporary))
+        _write(temporary, channels, {MAPS: words})
 
 
-def import_library(path: Path) -> Any:
-    """Return the package, or say what is missing."""
-    try:
-        return __import__("OpenEXR")
-    except ImportError:
-        raise FileError(
-            f"{path}: several layers need the package OpenEXR, which is not installed (pip install texrs[materials])"
-        ) from None
+def write_image(path: Path, image: Array) -> None:
+    """Write float16 or float32 pixels, (H, W) or (H, W, C) of up to four channels."""
+    planes = image[..., np.newaxis] if image.ndim == 2 else image
+    names = next(names for names in PICTURES if len(names) == planes.shape[2])
+    _write(path, {name: planes[..., k] for k, name in enumerate(names)}, {})
+
+
+def _write(path: Path, channels: Mapping[str, Array], attributes: Mapping[str, object]) -> None:
+    """Write channels and attributes, compressed by ZIP."""
+    import OpenEXR
+
+    head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **attributes}
+    # The package writes arrays that are not contiguous as if they were.
+    whole = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
+    OpenEXR.File(head, whole, num_threads=0).write(str(path))
+
+
+def read_notes(path: Path) -> dict[str, Any]:
+    """Return the metadata of the first part."""
+    head = _read_headers(path)[0]
+    found: dict[str, Any] = {"made": head.get(MADE), "multiplied": any(each.name == "A" for each in head["channels"])}
+    if "chromaticities" in head:
+        numbers = head["chromaticities"]
+        found["primaries"] = (*numbers[6:], *numbers[:6])
+    across = head.get("xDensity", 0) / INCH
+    if across > 0 and head["pixelAspectRatio"] > 0:
+        found["density"] = (across * head["pixelAspectRatio"], across)
+    return found
+
+
+def write_notes(path: Path, notes: Metadata) -> None:
+    """Write a file again with other attributes."""
+    file = _open(path)
+    head = file.header()
+    if notes.primaries is not None:
+        head["chromaticities"] = (*notes.primaries[2:], *notes.primaries[:2])
+    if notes.density is not None:
+        down, across = notes.density
+        head["xDensity"] = across * INCH
+        if abs(down / across - 1) > 1e-3:
+            head["pixelAspectRatio"] = down / across
+    if notes.made is not None:
+        head[MADE] = notes.made
+    file.write(str(path))

@@ -1,4 +1,4 @@
-"""What a file says beside its values: how its colours and its pixels are to be understood, and how it was made."""
+"""Metadata of a file: the meaning of its colours and pixels, and the record of how it was made."""
 
 from __future__ import annotations
 
@@ -8,32 +8,36 @@ from typing import Any
 
 from texrs._checks import as_int
 
+INCH = 0.0254
+"""Metres."""
+MARK = '{"texrs"'
+"""Beginning of the record of how texrs made a file."""
 NODATA = 42113
 """TIFF tag of GDAL that states the value of pixels without data."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metadata:
-    """What a file says beside its values.
+    """Metadata of a file.
 
     Attributes
     ----------
     profile : bytes, optional
         The ICC profile of the colours.
     density : (down, across) of float, optional
-        Pixels a metre, of the picture as `read` returns it.
+        Pixels per metre of the image as `read` returns it.
     srgb : bool
-        Whether the file says that its colours are sRGB.
+        If True, the file states that its colours are sRGB.
     gamma : float, optional
-        Exponent that gives samples of light: 1 for linear ones, 1 / 2.2 for most others.
+        Exponent that encodes light: 1 for linear samples, 1 / 2.2 for most others.
     primaries : tuple of 8 float, optional
         Chromaticities x and y of white, red, green and blue.
     made : str, optional
-        JSON: how texrs made the file.
+        Record of how texrs made the file, as JSON.
     palette : bytes, optional
         Colours of an indexed image in the order of the file, four bytes each: red, green, blue, alpha.
     georeference : tuple of (int, int, int, object)
-        Tags of a TIFF file that state the position of its pixels on the earth, and the value that stands for no data.
+        Tags of a TIFF file that state the position of its pixels on the earth, and the value of pixels without data.
         Each has a code, a type, a number of values, and a value, as tifffile returns them. `write` writes them.
     multiplied : bool, optional
         If True, colours are multiplied by alpha, as in EXR files. None for an image whose alpha is not a transparency.
@@ -66,17 +70,17 @@ class Metadata:
         return None
 
     def fit(self, channels: int) -> Metadata:
-        """Return what is true of a picture of so many channels: a profile is of grey or of colours.
+        """Return metadata that fit an image with a number of channels: a profile is for grey or for colours.
 
         Parameters
         ----------
         channels : int
-            1 or 2 of grey, 3 or 4 of colours, alpha counted.
+            1 or 2 for grey, 3 or 4 for colours; alpha counts.
 
         Returns
         -------
         texrs.io.Metadata
-            Without the profile where that is of the other kind.
+            Without the profile if that does not fit.
 
         Examples
         --------

@@ -1,9 +1,7 @@
-"""NumPy's own files, by a reader that never unpickles and checks the headers before using memory."""
+"""Files of NumPy, by a reader that never unpickles and that checks headers before memory is used."""
 
 from __future__ import annotations
 
-import ast
-import re
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -25,26 +23,25 @@ from texrs.io._texts import MEMBER
 MAGIC = b"\x93NUMPY"
 
 _LONGEST_HEADER = 10_000
-_NUMBERS = re.compile(r"[<>=|]?(b1|[ui][1248]|f[248])")
 _KEY = "image"
 _PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""How NumPy packs arrays. What is packed otherwise Python unpacks whole, however little of it is asked for."""
+"""Compressions that NumPy uses. Python unpacks others as a whole, however few bytes are read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What a file of NumPy says of an array.
+    """Header of an array in a file of NumPy.
 
     Attributes
     ----------
     shape : tuple of int
-        Of the array.
+        Shape of the array.
     dtype : numpy.dtype
-        Of its samples.
+        Type of the samples.
     fortran : bool
-        Whether the first axis runs fastest.
+        If True, the first axis runs fastest.
     start : int
-        Where the samples begin, in bytes.
+        Offset of the samples in bytes.
 
     Examples
     --------
@@ -58,18 +55,16 @@ class Header:
     shape: tuple[int, ...]
     dtype: np.dtype[np.generic]
     fortran: bool
-    """Whether the first axis runs fastest."""
     start: int
-    """Where the samples begin."""
 
     @property
     def size(self) -> int:
-        """Bytes of the samples."""
+        """Number of bytes of the samples."""
         return prod(self.shape) * self.dtype.itemsize
 
 
 Choice = Callable[[Mapping[str, Header]], Iterable[str]]
-"""Says which arrays are to be read, by what all are; or raises."""
+"""Function that returns the keys of the arrays to read, by the headers of all."""
 
 
 def read_header(path: Path) -> Header:
@@ -102,22 +97,22 @@ def read_npz(path: Path, limit: int, check: Callable[[Header], object] | None = 
 
 
 def read_headers(path: PathLike) -> dict[str, Header]:
-    """Return what the arrays of an .npz file are, without their samples.
+    """Return the headers of the arrays of an .npz file.
 
     Parameters
     ----------
     path : path_like
-        An archive of arrays, as `numpy.savez` writes it.
+        Archive of arrays, as `numpy.savez` writes it.
 
     Returns
     -------
     dict of str to Header
-        By key, in the order of the file.
+        Headers by key, in the order of the file.
 
     Raises
     ------
     FileError
-        Not there, not an archive of arrays, or damaged.
+        The file is missing, not an archive of arrays, or damaged.
 
     Examples
     --------
@@ -142,24 +137,24 @@ def read_arrays(path: PathLike, *, limit: int | None = None, choose: Choice | No
     Parameters
     ----------
     path : path_like
-        An archive of arrays of numbers, as `numpy.savez` writes it; what would have to be unpickled is refused.
+        Archive of arrays of numbers, as `numpy.savez` writes it. Python objects are an error.
     limit : int, optional
-        Pixels that each array may have, and a sixteenth of the bytes of all; by default those that `texrs.limits` allows.
+        Maximum number of pixels of each array, and a sixteenth of the bytes of all. Default: as `texrs.limits` allows.
     choose : callable, optional
-        Called with the headers (see `read_headers`) before any samples are read; returns the keys of the arrays to be read,
-        and raises whatever it likes of a file that is not what it should be. It may let all of them together have more bytes.
+        Function that gets the headers (see `read_headers`) before samples are read. It returns the keys of the arrays to
+        read, or raises an error. With it, all arrays together may have more bytes. Default: None, which reads all.
 
     Returns
     -------
     dict of str to ndarray
-        By key, in the order of the file, or in that of the choice.
+        Arrays by key, in the order of the file or of ``choose``.
 
     Raises
     ------
     FileError
-        Not there, not an archive of arrays, or damaged.
+        The file is missing, not an archive of arrays, or damaged.
     LimitExceeded
-        More bytes than ``limit`` allows, or than the machine has.
+        More bytes than ``limit`` or the memory allows.
 
     Examples
     --------
@@ -208,7 +203,7 @@ def _open_member(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) 
 
 
 def _find_members(path: Path, archive: zipfile.ZipFile) -> dict[str, tuple[zipfile.ZipInfo, Header]]:
-    """Return the arrays of an archive by key, none of whose samples have been read."""
+    """Return the members and headers of an archive by key."""
     found = {}
     for member in archive.infolist():
         if member.filename != MEMBER:
@@ -224,7 +219,7 @@ def write_npy(path: Path, array: Array) -> None:
 
 
 def write_parts(path: Path, parts: Iterable[Array], shape: tuple[int, ...], dtype: np.dtype[np.generic]) -> None:
-    """Write an .npy file of arrays that follow each other along the first axis."""
+    """Write an .npy file of arrays that continue each other along the first axis."""
     header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
     with path.open("xb") as file:
         np.lib.format.write_array_header_1_0(file, header)
@@ -241,14 +236,14 @@ def write_npz(path: Path, array: Array) -> None:
 def _read_array(
     path: Path, file: BinaryIO, length: int, limit: int, check: Callable[[Header], object] | None = None
 ) -> Array:
-    """Read what lies in a stream of ``length`` bytes."""
+    """Read an array from a stream of ``length`` bytes."""
     header = _read_header(path, file)
     shape, dtype, size, start = header.shape, header.dtype, header.size, header.start
     if size == 0:
         raise FileError(f"{path}: holds an empty array of shape {shape}")
     if check is not None:
         check(header)
-    # Which axis is the channels is not known here, so only bytes can be compared.
+    # The axis of channels is not known here, so compare only bytes.
     most = limit * BYTES_PER_PIXEL
     if size > most:
         raise LimitExceeded(f"{path}: shape {shape} of {dtype} needs {size} bytes, more than the limit of {most}")
@@ -258,11 +253,10 @@ def _read_array(
     flat = np.empty(prod(shape), dtype)
     room, filled = flat.view(np.uint8).data, 0
     while filled < size:
-        part = file.read(min(size - filled, 2**24))
+        part = file.readinto(room[filled : filled + 2**24])  # type: ignore[attr-defined]
         if not part:
             raise FileError(f"{path}: is cut off after {filled} of {size} bytes")
-        room[filled : filled + len(part)] = part
-        filled += len(part)
+        filled += part
     array = flat.reshape(shape, order="F" if header.fortran else "C")
     if dtype == np.bool_ and (flat.view(np.uint8) > 1).any():
         raise FileError(f"{path}: is corrupt; booleans other than 0 and 1")
@@ -270,30 +264,22 @@ def _read_array(
 
 
 def _read_header(path: Path, file: BinaryIO) -> Header:
-    """Read what comes before the samples."""
-    start = file.read(8)
-    if len(start) < 8 or not start.startswith(MAGIC) or start[6] not in (1, 2, 3):
-        raise FileError(f"{path}: is not a NumPy file of version 1, 2 or 3")
-    width = 2 if start[6] == 1 else 4
-    prefix = file.read(width)
-    length = int.from_bytes(prefix, "little")
-    if len(prefix) < width or length > _LONGEST_HEADER:
-        raise FileError(f"{path}: its NumPy header is cut off or longer than {_LONGEST_HEADER} bytes")
-    text = file.read(length)
+    """Read the header before the samples."""
+    start = file.tell()
     try:
-        fields = ast.literal_eval(text.decode("latin-1").strip())
-        kind, fortran, shape = fields["descr"], fields["fortran_order"], fields["shape"]
-    except (ValueError, SyntaxError, TypeError, KeyError, RecursionError, MemoryError) as error:
-        raise FileError(f"{path}: its NumPy header cannot be read ({describe_error(error)})") from None
-    if isinstance(kind, str) and kind.lstrip("<>=|").startswith("O"):
+        version = np.lib.format.read_magic(file)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+    except (ValueError, KeyError):
+        raise FileError(f"{path}: is not a NumPy file of version 1 or 2") from None
+    try:
+        shape, fortran, dtype = read(file, max_header_size=_LONGEST_HEADER)
+    except Exception as error:
+        what = f"corrupt, cut off or longer than {_LONGEST_HEADER} bytes ({describe_error(error)})"
+        raise FileError(f"{path}: its NumPy header cannot be read, because it is {what}") from None
+    if dtype.hasobject:
         raise FileError(f"{path}: holds Python objects; reading them could run code, so only numbers are read")
-    if not isinstance(kind, str) or not _NUMBERS.fullmatch(kind):
-        raise FileError(f"{path}: holds {kind!r}; bool, integers and floats up to 64 bit are read")
-    if (
-        not isinstance(shape, tuple)
-        or len(shape) > 8
-        or not all(type(side) is int and 0 <= side < 2**48 for side in shape)
-        or not isinstance(fortran, bool)
-    ):
+    if dtype.kind not in "buif" or dtype.itemsize > 8:
+        raise FileError(f"{path}: holds {dtype.str!r}; bool, integers and floats up to 64 bit are read")
+    if len(shape) > 8 or not all(type(side) is int and 0 <= side < 2**48 for side in shape):
         raise FileError(f"{path}: its NumPy header announces the shape {shape!r}")
-    return Header(shape, np.dtype(kind), fortran, 8 + width + length)
+    return Header(shape, dtype, fortran, file.tell() - start)

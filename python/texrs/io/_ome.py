@@ -1,4 +1,4 @@
-"""What OME-Zarr says of an image, so that viewers know its axes, its levels and where it lies."""
+"""Metadata of OME-Zarr: the axes, the levels and the position of an image."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 __all__ = ["describe_image"]
 
 VERSION = "0.5"
-"""Of OME-Zarr."""
+"""Version of OME-Zarr."""
 _COLOURS = {1: ("FFFFFF",), 2: ("FFFFFF", "808080"), 3: ("FF0000", "00FF00", "0000FF")}
 
 
@@ -21,7 +21,7 @@ def describe_image(
     spacing: Sequence[float],
     unit: str | None,
 ) -> dict[str, Any]:
-    """Return what OME-Zarr says of an image: its axes, its levels, and where each lies; channels come first there.
+    """Return the axes, the levels and the positions of an image, with channels first.
 
     References
     ----------
@@ -33,7 +33,7 @@ def describe_image(
     datasets = []
     for level in range(levels):
         step = 2**level
-        # Sample i of a level lies in the middle of those that it is the mean of.
+        # Sample i of a level is in the middle of the samples that it averages.
         first = [(o + (step - 1) / 2) * s for o, s in zip(origin, spacing, strict=True)]
         one, none = [1.0] * len(before), [0.0] * len(before)
         moves = [

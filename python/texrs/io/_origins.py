@@ -1,4 +1,4 @@
-"""Which file an array was read from, for notices, and whether that file was indexed."""
+"""The file that an array was read from, for notices, and whether that file has a palette."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _READ: dict[int, tuple[weakref.ref[Array], str, bool]] = {}
 
 
 def mark(array: Array, path: Path, indexed: bool) -> Array:
-    """Remember where an array was read, for as long as the array lives."""
+    """Remember the file of an array, as long as the array exists."""
     key = id(array)
     _READ[key] = weakref.ref(array, lambda _: _READ.pop(key, None)), str(path), indexed
     return array

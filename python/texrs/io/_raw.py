@@ -1,4 +1,4 @@
-"""Samples without a header, whose size and type are written after the name of the file."""
+"""Samples without a header. The size and the type follow the name of the file."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Raw:
 
 
 def parse_raw(path: Path) -> Raw | None:
-    """Return what a name such as ``scan.raw:96x96x48:uint16:big`` means: width, height, depth, type, byte order; else None."""
+    """Parse a name such as ``scan.raw:96x96x48:uint16:big``: width, height, depth, type, byte order; return None for others."""
     found = _WORDS.fullmatch(str(path))
     if found is None or path.exists():
         return None
@@ -60,13 +60,13 @@ def parse_raw(path: Path) -> Raw | None:
 
 
 def strip_raw(text: str) -> str:
-    """Return the file that a text names: without what states its size and type."""
+    """Return the name of a file without its size and type."""
     found = parse_raw(Path(text)) if RAW in text.lower() else None
     return text if found is None else str(found.path)
 
 
 def make_raw(path: Path, shape: Sequence[int] | None, dtype: object) -> Raw:
-    """Return what samples are by the arguments of a call."""
+    """Return a description of samples by the arguments of a call."""
     if shape is None or dtype is None:
         missing, other = ("shape", "dtype") if shape is None else ("dtype", "shape")
         raise InvalidInput(f"{missing}: is needed with {other}, to read samples without a header")
@@ -83,7 +83,7 @@ def make_raw(path: Path, shape: Sequence[int] | None, dtype: object) -> Raw:
 
 
 def explain_raw(path: Path) -> str:
-    """Return how the size and the type of samples without a header are given."""
+    """Return an error text that explains how to state the size and the type."""
     size = path.stat().st_size
     side = round(size ** (1 / 3))
     example = f"{side}x{side}x{side}:uint8" if side**3 == size else "96x96x48:uint16"

@@ -1,4 +1,4 @@
-"""Volumes in folders: a picture for each plane, numbered."""
+"""Volumes in folders: one numbered image for each plane."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["is_series", "list_slices", "read_series"]
 
 _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\.[a-z]+)", re.IGNORECASE)
 _SHOWN = 8
-"""Missing slices that an error names."""
+"""Maximum number of slices that an error names."""
 LEAST = 2
-"""Slices of a volume."""
+"""Minimum number of slices of a volume."""
 
 
 def _find_groups(folder: Path, suffixes: Collection[str]) -> dict[tuple[str, str], dict[int, str]]:
-    """Return the numbered pictures of a folder, by what stands before and after the number."""
+    """Return the numbered images of a folder, grouped by the parts of the name before and after the number."""
     groups: dict[tuple[str, str], dict[int, str]] = {}
     for entry in sorted(os.scandir(folder), key=lambda entry: entry.name):
         found = _NUMBERED.fullmatch(entry.name)
@@ -39,7 +39,7 @@ def _find_groups(folder: Path, suffixes: Collection[str]) -> dict[tuple[str, str
 
 
 def is_series(folder: Path, suffixes: Collection[str]) -> bool:
-    """Return whether a folder contains numbered slices: two or more pictures whose names differ in their number alone."""
+    """Return whether a folder contains numbered slices: at least two images whose names differ only in the number."""
     return folder.is_dir() and any(len(group) >= LEAST for group in _find_groups(folder, suffixes).values())
 
 
@@ -60,7 +60,7 @@ def list_slices(folder: Path, suffixes: Collection[str]) -> list[Path]:
     first, last = min(group), max(group)
     missing = [n for n in range(first, last + 1) if n not in group]
     if missing:
-        # Names are padded with zeros as the last one is.
+        # Names have as many digits as the last one.
         digits = len(group[last]) - len(before) - len(after)
         padded = len({len(name) for name in group.values()}) == 1
         names = [f"{before}{n:0{digits if padded else 1}d}{after}" for n in missing[:_SHOWN]]
@@ -75,7 +75,7 @@ def list_slices(folder: Path, suffixes: Collection[str]) -> list[Path]:
 
 
 def read_series(folder: Path, suffixes: Collection[str], limit: int, read: Callable[[Path, int], Array]) -> Array:
-    """Read the slices of a folder, which must be alike, as one volume."""
+    """Read the slices of a folder, of one shape and dtype, as a volume."""
     names = list_slices(folder, suffixes)
     first = read(names[0], limit)
     check_size(folder, (len(names), *first.shape[:2]), first[0, 0].size, first.itemsize, limit)

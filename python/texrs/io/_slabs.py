@@ -1,4 +1,4 @@
-"""Volumes that are made and written slab by slab."""
+"""Volumes that are written slab by slab."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def as_shape(shape: object) -> tuple[int, ...]:
 
 
 def check(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
-    """Return slabs on, as long as they fit together; there is at least one."""
+    """Return slabs one by one, and check that they form the volume."""
     done, dtype = 0, None
     for slab in slabs:
         dtype = dtype or slab.dtype
@@ -41,7 +41,7 @@ def check(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
 
 
 def split_planes(slabs: Iterable[Array]) -> Iterator[Array]:
-    """Return the planes of slabs, with channels; bool as 0 and 255."""
+    """Return the planes of slabs with channels, and bool as 0 and 255."""
     for slab in slabs:
         part = slab.astype(np.uint8) * np.uint8(255) if slab.dtype == np.bool_ else slab
         yield from part if part.ndim == 4 else part[..., np.newaxis]

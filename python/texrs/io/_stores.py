@@ -1,4 +1,4 @@
-"""Zarr stores: plain arrays, and OME-Zarr images, of which the finest level counts, read; images of one level written."""
+"""Zarr stores: read plain arrays and the finest level of OME-Zarr images, and write images of one level."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from texrs.io._ome import describe_image
 from texrs.io._temporary import name_temporary, put, settle
 
 MARKS = ("zarr.json", ".zarray", ".zgroup")
-"""One of these lies in the folder of every array and group."""
+"""The folder of each array and group contains one of these files."""
 _RECORD = "texrs"
 _MOST_CHANNELS = 64
 _SPACE = "zyx"
@@ -31,7 +31,7 @@ def is_store(path: str | os.PathLike[str]) -> bool:
     Parameters
     ----------
     path : path_like
-        Of a folder; it need not exist.
+        Folder, which need not exist.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def is_store(path: str | os.PathLike[str]) -> bool:
 
 
 def read_store(path: Path, limit: int, axes: int | None) -> Array:
-    """Return the array of a store with the channels last; ``axes`` of space, or as it is."""
+    """Return the array of a store with ``axes`` spatial axes and the channels last; if ``axes`` is None, as it is stored."""
     with translate_errors(path, "reading the store"):
         array, names = _find(path)
         _check_complete(path, array)
@@ -71,7 +71,7 @@ def read_store(path: Path, limit: int, axes: int | None) -> Array:
 
 
 def count_axes(path: Path) -> int:
-    """Return how many axes of space the array of a store has; channels are named, or come last."""
+    """Return the number of spatial axes of the array of a store; channels have a name or come last."""
     with translate_errors(path, "reading the store"):
         array, names = _find(path)
     if names is None:
@@ -81,7 +81,7 @@ def count_axes(path: Path) -> int:
 
 
 def read_store_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that OME-Zarr states of the finest level, x first."""
+    """Return the distances that OME-Zarr states for the finest level, x first."""
     with translate_errors(path, "reading the store"):
         node = _import_zarr(path).open(os.fspath(path), mode="r")
         said = node.attrs.get("ome", node.attrs)
@@ -101,10 +101,10 @@ def read_store_spacing(path: Path) -> Sequence[float] | None:
 
 
 def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *, overwrite: bool) -> None:
-    """Write an image or a volume as OME-Zarr of one level, whole or not at all; no folder but a store is replaced."""
+    """Write an image or a volume as OME-Zarr of one level, whole or not at all; only a store is replaced."""
     zarr, final = _import_zarr(path), Path(os.path.realpath(path))
     if final.exists() and not (overwrite and is_store(final)):
-        raise FileError(f"{path}: exists already" if is_store(final) else f"{path}: is there, and is no Zarr store")
+        raise FileError(f"{path}: exists already" if is_store(final) else f"{path}: exists and is not a Zarr store")
     if not final.parent.is_dir():
         raise FileError(f"{path}: there is no folder {path.parent}")
     channels = array.shape[axes] if array.ndim > axes else None
@@ -121,7 +121,7 @@ def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *
             )
             stored[...] = values
             if final.exists():
-                settle(temporary)  # Now, so that the moment without either is short.
+                settle(temporary)  # Settle now, so that the time without either store is short.
                 os.replace(final, former := temporary.with_suffix(".former"))
                 try:
                     put(temporary, final)
@@ -141,7 +141,7 @@ def _tidy(values: Any) -> Array:
 
 
 def _find(path: Path) -> tuple[Any, tuple[str, ...] | None]:
-    """Return the array that a path names, or that a group is of, and what its axes are called."""
+    """Return the array at a path, or of the group there, and the names of its axes."""
     zarr = _import_zarr(path)
     node = zarr.open(os.fspath(path), mode="r")
     if isinstance(node, zarr.Array):
@@ -173,7 +173,7 @@ def _name_axes(array: Any) -> tuple[str, ...] | None:
 
 
 def _check_complete(path: Path, array: Any) -> None:
-    """Refuse what an interrupted run of texrs has left: chunks that are missing would be taken for zeros."""
+    """Refuse a store of an interrupted run of texrs, because missing chunks would be read as zeros."""
     store = array.store_path.store
     root = getattr(store, "root", None)
     if root is None:
@@ -193,7 +193,7 @@ def _check_complete(path: Path, array: Any) -> None:
 def _arrange(
     path: Path, shape: tuple[int, ...], names: tuple[str, ...] | None, axes: int
 ) -> tuple[tuple[Any, ...], list[int], int | None]:
-    """Return what is taken of each axis, which axis comes where, and which the channels are."""
+    """Return the index for each axis, the order of the axes, and the axis of channels."""
     space = _SPACE[-axes:]
     what = ("a picture", "a volume")[axes - 2]
     keep: list[Any] = [slice(None)] * len(shape)
@@ -205,7 +205,7 @@ def _arrange(
             keep[a] = 0
             others.remove(a)
     else:
-        # Without names the axes are those of arrays, the channels last.
+        # Axes without names are in the order of arrays, with the channels last.
         order, others = list(range(min(axes, len(shape)))), list(range(axes, len(shape)))
     if len(order) < axes or len(others) > 1:
         called = f" ({', '.join(names)})" if names else ""

@@ -1,4 +1,4 @@
-"""Files that are being made: their names, what dead processes have left of them, and how they take their place for good."""
+"""Temporary files: their names, the removal of those of dead processes, and the final renaming."""
 
 from __future__ import annotations
 
@@ -17,28 +17,27 @@ from pathlib import Path
 __all__ = ["name_prefix", "name_temporary", "put", "settle", "sweep"]
 
 _NAME = re.compile(r"\.texrs-(?P<home>[0-9a-f]{8})-(?P<process>[0-9]{1,10})-\w{8}(\.(?!former$).*)?", re.DOTALL)
-"""What may be swept; a ``.former`` store is what somebody had, and perhaps all that is left of it."""
+"""Names that may be removed. A ``.former`` store is the file of a user, and perhaps the only copy."""
 _WEEK = 7 * 24 * 3600.0
-"""Seconds after which what another machine, or this one before it was started anew, has left counts as forgotten."""
+"""Seconds after which a temporary file of another machine, or of one before its restart, is removed."""
 
 
 def name_prefix() -> str:
-    """Return how the names of what this process is making begin."""
+    """Return the prefix of the temporary names of this process."""
     return f".texrs-{_find_home()}-{os.getpid()}-"
 
 
 def name_temporary(final: Path, suffix: str) -> Path:
-    """Return a name for what is to take a place; the first in a folder sweeps it."""
+    """Return a temporary name for a file; the first call for a folder sweeps it."""
     sweep(os.fspath(final.parent))
-    # Fixed and short: the name that it is to have may already be as long as names can be.
+    # Short, because the final name may already have the maximum length.
     return final.with_name(f"{name_prefix()}{secrets.token_hex(4)}{suffix}")
 
 
 def put(temporary: Path, final: Path) -> None:
-    """Let a file or a folder take a place, so that a loss of power leaves the former one there, or this one whole.
+    """Rename a file or a folder, so that after a loss of power either the former one or the whole new one is there.
 
-    Its bytes are on the disk before it has the name, and the name is before this returns, as far as the file system can
-    tell.
+    The bytes are on the disk before the renaming, and the name is before this function returns, if the file system can do so.
 
     Raises
     ------
@@ -53,7 +52,7 @@ def put(temporary: Path, final: Path) -> None:
 
 
 def settle(path: Path) -> None:
-    """Wait until a file, or all that is in a folder, is on the disk."""
+    """Wait until a file, or the content of a folder, is on the disk."""
     for folder, _, files in os.walk(path):
         for name in files:
             _sync(os.path.join(folder, name))
@@ -64,7 +63,7 @@ def settle(path: Path) -> None:
 
 @cache
 def sweep(folder: str) -> None:
-    """Remove what processes that are gone have left in a folder, once."""
+    """Remove the temporary files of ended processes in a folder, once."""
     try:
         names = os.listdir(folder)
     except OSError:
@@ -85,7 +84,7 @@ def sweep(folder: str) -> None:
 
 @cache
 def _find_home() -> str:
-    """Return what tells apart where numbers of processes mean the same: machines, their starts, and containers."""
+    """Return an identifier of the machine, its start and the container, where the number of a process is unique."""
     parts = [platform.node()]
     with suppress(OSError):
         parts.append(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii"))
@@ -94,8 +93,8 @@ def _find_home() -> str:
 
 
 def _is_gone(process: int) -> bool:
-    """Return whether surely no process has a number."""
-    if os.name != "posix":  # Elsewhere os.kill would end it.
+    """Return whether it is certain that no process has a number."""
+    if os.name != "posix":  # On other systems os.kill would end the process.
         return False
     try:
         os.kill(process, 0)
@@ -107,14 +106,14 @@ def _is_gone(process: int) -> bool:
 
 
 def _sync(path: str | os.PathLike[str]) -> None:
-    """Wait until what a file or a folder holds is on the disk."""
-    if os.name != "posix" and os.path.isdir(path):  # Windows opens none.
+    """Wait until the content of a file or a folder is on the disk."""
+    if os.name != "posix" and os.path.isdir(path):  # Windows does not open folders.
         return
     number = os.open(path, os.O_RDONLY if os.name == "posix" else os.O_RDWR)
     try:
         os.fsync(number)
     except OSError as error:
-        # Some file systems cannot say.
+        # Some file systems do not support this.
         if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EROFS):
             raise
     finally:

@@ -1,9 +1,10 @@
-"""How archives of arrays, pages and reports say how they were made."""
+"""Records of how texrs made archives of arrays, pages and reports."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,11 @@ from typing import Any
 from texrs.io._notes import Metadata
 
 MEMBER = "texrs.json"
-_BEGIN, _END = b"<!-- texrs ", b" -->\n"
+_COMMENT = re.compile(rb"<!-- texrs ((?:(?!--).)*) -->\n\Z", re.DOTALL)
 
 
 def dump(values: dict[str, Any]) -> str:
-    """Return an object as JSON; what says how it was made is JSON itself and stands in one line."""
+    """Return an object as JSON. The record is already JSON, and is put on one line."""
     made = values.get("texrs")
     rest = {key: value for key, value in values.items() if key != "texrs"}
     text = json.dumps(rest, indent=2)
@@ -25,58 +26,54 @@ def dump(values: dict[str, Any]) -> str:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Return how a report was made, or the file that this one lies beside."""
+    """Return the record in a report, or in a file of its own."""
     values = json.loads(path.read_text(encoding="utf-8"))
     made = values.get("texrs") if isinstance(values, dict) else None
     return {"made": json.dumps(made)} if isinstance(made, dict) else {}
 
 
 def write_json(path: Path, notes: Metadata) -> None:
-    """Add to a report how it was made."""
+    """Add a record to a report."""
     values = json.loads(path.read_text(encoding="utf-8"))
     if notes.made is not None and isinstance(values, dict):
         path.write_text(dump({**values, "texrs": notes.made}), encoding="utf-8")
 
 
 def digest_json(path: Path) -> str:
-    """Return the SHA-256 of a report but for how it was made."""
+    """Return the SHA-256 of a report without its record."""
     values = json.loads(path.read_text(encoding="utf-8"))
     rest = {key: value for key, value in values.items() if key != "texrs"} if isinstance(values, dict) else values
     return hashlib.sha256(json.dumps(rest).encode()).hexdigest()
 
 
 def read_npz(path: Path) -> dict[str, Any]:
-    """Return how an archive was made."""
+    """Return the record in an archive."""
     with zipfile.ZipFile(path) as archive:
         if MEMBER not in archive.namelist():
             return {}
         member = archive.getinfo(MEMBER)
-        # By other packings Python unpacks more than is asked for.
+        # Python unpacks other compressions as a whole.
         if member.file_size > 2**24 or member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             return {}
         return {"made": archive.read(MEMBER).decode("utf-8")}
 
 
 def write_npz(path: Path, notes: Metadata) -> None:
-    """Add a member to an archive, or put it in place of the one that was added last."""
+    """Add a record to an archive, or replace its record."""
     if notes.made is None:
         return
-    with zipfile.ZipFile(path, "a") as archive:
+    with zipfile.ZipFile(path) as archive:
         there = MEMBER in archive.namelist()
-        if not there:
-            # Without a date: the same is made of the same.
-            archive.writestr(zipfile.ZipInfo(MEMBER), notes.made)
-    if there:
-        with zipfile.ZipFile(path) as archive:
-            kept = [(m, archive.read(m)) for m in archive.infolist() if m.filename != MEMBER]
-        with zipfile.ZipFile(path, "w") as archive:
-            for member, data in kept:
-                archive.writestr(member, data)
-            archive.writestr(zipfile.ZipInfo(MEMBER), notes.made)
+        kept = [(m, archive.read(m)) for m in archive.infolist() if m.filename != MEMBER] if there else []
+    with zipfile.ZipFile(path, "w" if there else "a") as archive:
+        for member, data in kept:
+            archive.writestr(member, data)
+        # Without a date, so that the same input gives the same bytes.
+        archive.writestr(zipfile.ZipInfo(MEMBER), notes.made)
 
 
 def digest_npz(path: Path) -> str:
-    """Return the SHA-256 of what the arrays of an archive are."""
+    """Return the SHA-256 of the checksums of the arrays in an archive."""
     with zipfile.ZipFile(path) as archive:
         parts = [f"{m.filename} {m.CRC} {m.file_size}" for m in archive.infolist() if m.filename != MEMBER]
         whole = hashlib.sha256("\n".join(parts).encode())
@@ -84,27 +81,19 @@ def digest_npz(path: Path) -> str:
 
 
 def read_html(path: Path) -> dict[str, Any]:
-    """Return how a page was made."""
-    span = find_html(path)
-    if span is None:
-        return {}
-    return {"made": path.read_bytes()[span[0] + len(_BEGIN) : span[1] - len(_END)].decode("utf-8")}
+    """Return the record of a page."""
+    found = _COMMENT.search(path.read_bytes())
+    return {"made": found[1].decode("utf-8")} if found else {}
 
 
 def write_html(path: Path, notes: Metadata) -> None:
     """Put a comment at the end of a page."""
-    if notes.made is None:
-        return
-    data, span = path.read_bytes(), find_html(path)
-    if span is not None:
-        data = data[: span[0]] + data[span[1] :]
-    # A comment may not hold two dashes.
-    text = notes.made.replace("--", "\\u002d\\u002d").encode()
-    path.write_bytes(data + _BEGIN + text + _END)
+    if notes.made is not None:
+        # A comment cannot contain two dashes.
+        text = notes.made.replace("--", "\\u002d\\u002d").encode()
+        path.write_bytes(_COMMENT.sub(b"", path.read_bytes()) + b"<!-- texrs " + text + b" -->\n")
 
 
-def find_html(path: Path) -> tuple[int, int] | None:
-    """Return where the comment lies that says how a page was made."""
-    data = path.read_bytes()
-    start = data.rfind(_BEGIN)
-    return None if start < 0 or not data.endswith(_END) else (start, len(data))
+def digest_html(path: Path) -> str:
+    """Return the SHA-256 of a page without the record."""
+    return hashlib.sha256(_COMMENT.sub(b"", path.read_bytes())).hexdigest()

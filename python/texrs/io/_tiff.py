@@ -1,10 +1,11 @@
-"""TIFF, images and stacks, by tifffile; what it cannot decode without imagecodecs, by Pillow or the compiled decoder."""
+"""TIFF, images and stacks, by tifffile. Pillow or the compiled decoder read what tifffile needs imagecodecs for."""
 
 from __future__ import annotations
 
 import logging
 import lzma
 import re
+import struct
 import threading
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,6 +22,7 @@ from texrs._typing import Array
 from texrs.errors import FileError
 from texrs.io import _image_io, _pillow
 from texrs.io._files import check_file, check_size, load, translate_errors, turn_upright
+from texrs.io._notes import INCH, MARK, NODATA, Metadata
 
 _LZW, _JPEG = 5, 7
 _DEFLATE, _LZMA, _PACKBITS, _ZSTD = frozenset({8, 32946}), 34925, 32773, frozenset({34926, 50000})
@@ -30,34 +32,35 @@ _UNFOLDING: dict[int, float] = {
     _LZMA: inf,
     **dict.fromkeys(_ZSTD, inf),
 }
-"""By compression, into how many bytes one is made at most; those of PackBits are collected in a list, at nine bytes each."""
+"""Maximum ratio of each compression. tifffile collects the bytes of PackBits in a list, at nine bytes each."""
 _PICTURES = frozenset({6, 7, 33003, 33004, 33005, 34712, 34933, 50001})
 """Compressions whose strips and tiles are JPEG, JPEG 2000, PNG and WebP files."""
 _HARMLESS = 2**26
-"""Bytes that a strip may unfold to, at most, without being looked at."""
+"""Maximum number of unpacked bytes of a strip that is not checked."""
 _DICTIONARY = 2**28
-"""Bytes that may be kept while LZMA unfolds."""
-_ORIENTATION = 274
+"""Maximum number of bytes of the dictionary of LZMA."""
+_ORIENTATION, _ACROSS, _DOWN, _UNIT, _SOFTWARE, _PROFILE = 274, 282, 283, 296, 305, 34675
+GEOREFERENCE = frozenset({33550, 33922, 34264, 34735, 34736, 34737, NODATA})
+"""Tags of GeoTIFF, and of GDAL."""
+SOFTWARE = "texrs"
+"""Value of the tag Software, which a record replaces."""
 _SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317, 320, 322, 323, 324, 325, 338, 339})
-"""Tags that say how the pixels lie. tifffile goes on without a tag that it cannot read."""
+"""Tags of the layout of pixels. tifffile continues without a tag that it cannot read."""
 _ASSOCIATED = 1
-"""Kind of an extra sample: an alpha that colours are multiplied by."""
+"""Type of an extra sample: alpha by which the colours are multiplied."""
 _OME = 2**16
 """Maximum number of characters of the metadata of OME that are searched."""
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _SEPARATED, _YCBCR = 0, 1, 2, 3, 5, 6
 
 
 def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
-    """Read planes, rows, columns, channels, and the orientation that is left to apply.
+    """Read planes, rows, columns, channels, and the orientation that is still to be applied.
 
     Images of another size than the first (previews, resolution levels) are not read.
     """
     import tifffile
 
-    length = check_file(path)
-    # OME files can name other files to read; this one is all that was asked for.
-    with translate_errors(path, "decoding"), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
-        _check_chain(path, tif, length)
+    with _open(path, "decoding") as (tif, length):
         if not tif.series or not tif.pages:
             raise FileError(f"{path}: holds no image")
         series, first = tif.series[0], tif.pages.first
@@ -81,7 +84,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         try:
             array = series.asarray(maxworkers=1)
         except Exception as error:
-            # tifffile learns late that a predictor or a width of samples needs imagecodecs, which in turn refuses strips that
+            # tifffile learns late that a predictor or a width of samples needs imagecodecs, which refuses strips that
             # are filled up. Pillow reads both. It prints a line for a corrupt strip, so do not ask it about those.
             reasons = ("imagecodecs", "INSUFFICIENT_SPACE")
             if not isinstance(error, ImportError) and not any(reason in str(error) for reason in reasons):
@@ -95,15 +98,19 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
 
 
 def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channels: int, limit: int) -> Array:
-    """Return planes, rows, columns, channels of what tifffile cannot decode alone."""
+    """Return planes, rows, columns, channels of a file that tifffile cannot decode alone."""
     first, size = series.keyframe, dict(zip(series.axes, series.shape, strict=True))
     outer = series.axes[: len(series.axes) - len(first.axes)]
     pages = [page.index for page in series.pages if page is not None]
     plain = first.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB) and len(pages) == first.planarconfig == 1
     compiled = plain and first.compression == _LZW and series.dtype in _image_io.OF_TIFF
-    # The compiled decoder is quiet about corrupt strips, but does not know all tiles.
-    if compiled and not first.is_tiled and (channels > 1 or series.dtype.kind == "u"):
+
+    def decode() -> Array:
         return _part_alpha(path, _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels), first)
+
+    # The compiled decoder prints nothing about corrupt strips, but it does not read all tiles.
+    if compiled and not first.is_tiled and (channels > 1 or series.dtype.kind == "u"):
+        return decode()
     with suppress(FileError, OSError, ValueError, SyntaxError, TypeError, KeyError):
         if set(first.axes) <= set("YXS") and len(pages) == prod(size[a] for a in outer):
             array = _pillow.read_pages(path, series.dtype, sides[1:], pages)
@@ -114,9 +121,7 @@ def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channe
             return _part_alpha(path, np.ascontiguousarray(array.reshape(*sides, -1)), first, divided=True)
     with suppress(FileError):
         if compiled:
-            return _part_alpha(
-                path, _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels), first
-            )
+            return decode()
     scheme = getattr(first.compression, "name", first.compression)
     colours = getattr(first.photometric, "name", first.photometric)
     raise FileError(
@@ -136,12 +141,8 @@ def _report_others(path: Path, tif: Any, series: Any) -> None:
 
 
 def count_planes(path: Path) -> int:
-    """Return how many planes a file contains."""
-    import tifffile
-
-    length = check_file(path)
-    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
-        _check_chain(path, tif, length)
+    """Return the number of planes in a file."""
+    with _open(path, "reading") as (tif, _):
         if not tif.series:
             return 0
         return _read_sides(path, tif.series[0].axes, tif.series[0].shape)[0][0]
@@ -155,43 +156,27 @@ def read_spacing(path: Path) -> Sequence[float] | None:
 
 def read_ome(path: Path) -> tuple[tuple[float, float, float], str] | None:
     """Return the distances between voxels that OME states, x first, and their unit; None if it states none."""
-    import tifffile
-
-    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
+    with _open(path, "reading") as (tif, _):
         pixels = re.search(r"<(?:\w+:)?Pixels\b[^>]*>", (tif.ome_metadata or "")[:_OME])
-    if pixels is None:
-        return None
-    sides = {axis: _read_side(pixels[0], axis) for axis in "XYZ"}
-    units = {unit for _, unit in sides.values()}
-    if len(units) > 1 or any(step is None for step, _ in sides.values()):
-        return None
-    x, y, z = (float(step or 1) for step, _ in sides.values())
-    return (x, y, z), units.pop()
-
-
-def _read_side(pixels: str, axis: str) -> tuple[float | None, str]:
-    """Return the distance along an axis in the text of an OME element, and its unit, which is micrometres by default."""
-    step, unit = (re.search(rf'\bPhysicalSize{axis}{end}="([^"]*)"', pixels) for end in ("", "Unit"))
-    with suppress(ValueError):
-        if step is not None:
-            return float(step[1]), "µm" if unit is None else unit[1]
-    return None, ""
+    stated = dict(re.findall(r'\bPhysicalSize([XYZ](?:Unit)?)="([^"]*)"', pixels[0])) if pixels else {}
+    # The default unit of OME is a micrometre.
+    units = {stated.get(f"{axis}Unit", "µm") for axis in "XYZ"}
+    with suppress(KeyError, ValueError):
+        x, y, z = (float(stated[axis]) for axis in "XYZ")
+        return ((x, y, z), units.pop()) if len(units) == 1 else None
+    return None
 
 
 def read_imagej(path: Path) -> tuple[tuple[float, float, float], str] | None:
     """Return the distances between voxels that ImageJ states, x first, and their unit; None if it states none."""
-    import tifffile
-
-    length = check_file(path)
-    with translate_errors(path, "reading"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
-        _check_chain(path, tif, length)
+    with _open(path, "reading") as (tif, _):
         said = tif.imagej_metadata
         if not said or not isinstance(said.get("spacing"), int | float) or not tif.pages:
             return None
         steps = []
         for name in ("XResolution", "YResolution"):
             tag = tif.pages.first.tags.get(name)
-            # ImageJ states pixels in a unit as a fraction.
+            # ImageJ states the number of pixels in a unit as a fraction.
             over, under = tag.value if tag is not None and isinstance(tag.value, tuple) else (1, 1)
             steps.append(under / over if over and under else 1.0)
         return (steps[0], steps[1], abs(float(said["spacing"]))), str(said.get("unit", ""))
@@ -222,23 +207,25 @@ def write_tiff(
     description: str | None = None,
     tags: Sequence[tuple[int, int, int, Any]] = (),
 ) -> None:
-    """Write planes of rows, columns, channels, of so many bytes in all: one page a plane, uncompressed."""
+    """Write planes of rows, columns, channels, of ``size`` bytes in all: one page per plane, uncompressed."""
     import tifffile
 
-    extra = {2: ["unassalpha"], 4: ["unassalpha"]}.get(channels, ["unspecified"] * (channels - 1))
-    options: dict[str, Any] = {"photometric": "rgb" if channels in (3, 4) else "minisblack", "metadata": None}
-    if description is not None:
-        options["description"] = description
-    if tags:
-        options["extratags"] = [(*tag, True) for tag in tags]
-    if channels not in (1, 3):
-        options["extrasamples"] = extra
-    if channels > 1:
-        options["planarconfig"] = "contig"
+    options: dict[str, Any] = {
+        "photometric": "rgb" if channels in (3, 4) else "minisblack",
+        "planarconfig": "contig" if channels > 1 else None,
+        "extrasamples": {1: None, 2: ["unassalpha"], 3: None, 4: ["unassalpha"]}.get(
+            channels, ["unspecified"] * (channels - 1)
+        ),
+        "description": description,
+        "extratags": [(*tag, True) for tag in tags],
+        "metadata": None,
+    }
     # Offsets of 32 bits end at 4 GB.
     with tifffile.TiffWriter(path, bigtiff=size > 2**32 - 2**25) as tif:
-        for plane in planes:
-            tif.write(plane if channels > 1 else plane[..., 0], **options)
+        for number, plane in enumerate(planes):
+            # The first page has a place for a record.
+            software = SOFTWARE if number == 0 else False
+            tif.write(plane if channels > 1 else plane[..., 0], software=software, **options)
 
 
 def keeps_spacing(dtype: np.dtype[Any], channels: int) -> bool:
@@ -256,7 +243,74 @@ def write_imagej(path: Path, volume: Array, spacing: Sequence[float], unit: str)
         said["unit"] = unit
     shown = volume if coloured else volume[..., 0]
     with tifffile.TiffWriter(path, imagej=True) as tif:
-        tif.write(shown, resolution=(1 / spacing[2], 1 / spacing[1]), metadata=said)
+        tif.write(shown, resolution=(1 / spacing[2], 1 / spacing[1]), metadata=said, software=SOFTWARE)
+
+
+def read_notes(path: Path) -> dict[str, Any]:
+    """Return the metadata of the first page."""
+    with _open(path, "reading") as (tif, _):
+        tags = {tag.code: tag for tag in tif.pages.first.tags}
+        value = {code: tag.value for code, tag in tags.items()}
+    stated = [tags[code] for code in sorted(GEOREFERENCE & tags.keys())]
+    made, metres = str(value.get(_SOFTWARE, "")), {2: INCH, 3: 0.01}.get(int(value.get(_UNIT, 2)))
+    found: dict[str, Any] = {
+        "profile": value.get(_PROFILE),
+        "made": made if made.startswith(MARK) else None,
+        "georeference": tuple((tag.code, int(tag.dtype), tag.count, tag.value) for tag in stated),
+    }
+    if metres is not None and value.keys() >= {_ACROSS, _DOWN} and value[_ACROSS][1] and value[_DOWN][1]:
+        across, down = (over / under / metres for over, under in (value[_ACROSS], value[_DOWN]))
+        if 1 / INCH < across < 1e9 and down > 0:
+            found["density"] = (across, down) if value.get(_ORIENTATION, 1) > 4 else (down, across)
+    return found
+
+
+def write_notes(path: Path, notes: Metadata) -> None:
+    """Write metadata into the first page of a file that `write_tiff` or `write_imagej` wrote."""
+    import tifffile
+
+    with tifffile.TiffFile(path, mode="r+", is_ome=False) as tif:
+        tags = tif.pages.first.tags
+        if notes.made is not None:
+            tags[_SOFTWARE].overwrite(notes.made.encode())
+        if notes.density is not None:
+            for code, metre in ((_DOWN, notes.density[0]), (_ACROSS, notes.density[1])):
+                tags[code].overwrite((min(round(metre * INCH * 10_000), 2**32 - 1), 10_000))
+            tags[_UNIT].overwrite(2)
+        if notes.profile is not None:
+            _add_profile(tif, notes.profile)
+
+
+def _add_profile(tif: Any, profile: bytes) -> None:
+    """Write the directory of the first page again at the end of its file, with a profile: tifffile does not add tags."""
+    file, layout = tif.filehandle, tif.tiff
+    file.seek(tif.pages.first.offset)
+    count = int(struct.unpack(layout.tagnoformat, file.read(layout.tagnosize))[0])
+    entries = [file.read(layout.tagsize) for _ in range(count)]
+    following, at = file.read(layout.offsetsize), file.seek(0, 2)
+    place = struct.pack(layout.offsetformat, len(profile)) + struct.pack(layout.offsetformat, at)
+    added = struct.pack(layout.tagformat1[:3], _PROFILE, 7) + place
+    entries = [e for e in entries if e[:2] != added[:2]] + [added]
+    entries.sort(key=lambda entry: struct.unpack(layout.tagnoformat[0] + "H", entry[:2]))
+    start = at + len(profile) + len(profile) % 2
+    if start > 2 ** (8 * layout.offsetsize) - 2**17:
+        raise FileError("the profile does not fit into 4 GB")
+    number = struct.pack(layout.tagnoformat, len(entries))
+    file.write(b"".join([profile.ljust(start - at, b"\0"), number, *entries, following]))
+    file.seek(layout.offsetsize)
+    file.write(struct.pack(layout.offsetformat, start))
+
+
+@contextmanager
+def _open(path: Path, what: str) -> Iterator[tuple[Any, int]]:
+    """Open a file whose pages form a chain, and return its length."""
+    import tifffile
+
+    length = check_file(path)
+    # OME files can name other files to read; this one is all that was asked for.
+    with translate_errors(path, what), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
+        _check_chain(path, tif, length)
+        yield tif, length
 
 
 def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, int, int], int]:
@@ -270,7 +324,7 @@ def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[in
 
 
 def _check_chain(path: Path, tif: Any, length: int) -> None:
-    """Check that the pages of a file, each of which says where the next is, end, and lie beside each other."""
+    """Check that the chain of pages of a file ends, and that pages do not overlap."""
     layout, file, at = tif.tiff, tif.filehandle, tif.pages.first.offset if tif.pages else 0
     order: Any = "big" if tif.byteorder == ">" else "little"
     least, seen = layout.tagnosize + layout.tagsize + layout.offsetsize, set()
@@ -285,7 +339,7 @@ def _check_chain(path: Path, tif: Any, length: int) -> None:
 
 
 def _check_tags(path: Path, tif: Any, page: Any) -> None:
-    """Check that all tags that the pixels depend on were read: the file may end among them."""
+    """Check that all tags that the pixels depend on were read, because the file may be cut off."""
     layout, file = tif.tiff, tif.filehandle
     order: Any = "big" if tif.byteorder == ">" else "little"
     file.seek(page.offset)
@@ -297,7 +351,7 @@ def _check_tags(path: Path, tif: Any, page: Any) -> None:
 
 
 def _check_segments(path: Path, series: Any, length: int) -> None:
-    """Check that all strips and tiles lie in the file: missing ones would be read as zeros."""
+    """Check that all strips and tiles are in the file, because missing ones would be read as zeros."""
     cut = FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
     if series.dataoffset is not None and series.dataoffset + series.nbytes > length:
         raise cut
@@ -313,12 +367,12 @@ def _check_segments(path: Path, series: Any, length: int) -> None:
 
 
 def _check_unfolded(path: Path, file: Any, series: Any) -> None:
-    """Check that no strip or tile unfolds to far more than its pixels need, which tifffile without imagecodecs does first."""
+    """Check that no strip or tile unpacks to many more bytes than its pixels need, because tifffile unpacks it as a whole."""
     for page in series.pages:
         key = None if page is None else page.keyframe
         if key is None or (key.compression not in _UNFOLDING and key.compression not in _PICTURES):
             continue
-        # Careless writers fill up.
+        # Some writers fill up strips.
         most = 2 * prod(key.chunks) * max(key.dtype.itemsize, 1) + 2**16
         for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
             if count * _UNFOLDING.get(key.compression, inf) <= max(most, _HARMLESS):
@@ -333,7 +387,7 @@ def _check_unfolded(path: Path, file: Any, series: Any) -> None:
 
 
 def _measure(compression: int, data: bytes, most: int) -> int:
-    """Return how many bytes data unfold to, or more than ``most`` where they are more."""
+    """Return the number of unpacked bytes, or a number above ``most`` if it is larger."""
     if compression in _PICTURES:
         return _pillow.measure(data)
     if compression in _DEFLATE:
@@ -343,7 +397,7 @@ def _measure(compression: int, data: bytes, most: int) -> int:
     if compression == _PACKBITS:
         return _measure_packbits(data, most)
     try:
-        # That of Python 3.14, which tifffile takes too; without it nothing is unfolded.
+        # tifffile uses that of Python 3.14, and cannot unpack without it.
         zstd: Any = import_module("compression.zstd")
     except ImportError:
         return 0
@@ -351,22 +405,22 @@ def _measure(compression: int, data: bytes, most: int) -> int:
 
 
 def _measure_packbits(data: bytes, most: int) -> int:
-    """Return how many bytes runs unfold to, or how many there are beyond ``most``."""
+    """Return the number of unpacked bytes of runs, or a number above ``most`` if it is larger."""
     size = at = 0
     while at < len(data) and size <= most:
         step = data[at]
-        # Bytes as they are, nothing, or one byte many times.
+        # A run contains plain bytes, nothing, or one byte that is repeated.
         run, length = (step + 1, step + 2) if step < 128 else (0, 1) if step == 128 else (257 - step, 2)
         size, at = size + run, at + length
     return size
 
 
 def _apply_colours(path: Path, array: Array, page: Any) -> Array:
-    """Apply what the file says about its samples: palettes, white as zero, single bits."""
+    """Apply the properties of the samples: palettes, white as zero, single bits."""
     photometric = page.photometric
     if photometric == _PALETTE and page.colormap is not None and array.dtype.kind == "u":
         table = page.colormap
-        # Eight bits, spread to sixteen by 257 or by 256, or by a careless writer not at all.
+        # Palettes of 8 bits are spread to 16 by 257 or by 256, and by some writers not at all.
         if (table < 256).all():
             table = table.astype(np.uint8)
         elif (table % 257 == 0).all() or (table % 256 == 0).all():
@@ -376,7 +430,7 @@ def _apply_colours(path: Path, array: Array, page: Any) -> Array:
         array = (array != 0).astype(np.uint8) * np.uint8(255)
     if photometric == _WHITE_IS_ZERO and array.dtype.kind == "u":
         return np.subtract(np.iinfo(array.dtype).max, array)
-    # tifffile turns YCbCr to RGB where it is compressed by JPEG, and there alone.
+    # tifffile converts YCbCr to RGB only if it is compressed by JPEG.
     if photometric in (_BLACK_IS_ZERO, _RGB) or (photometric, page.compression) == (_YCBCR, _JPEG):
         return array
     name = getattr(photometric, "name", str(photometric))
@@ -384,7 +438,7 @@ def _apply_colours(path: Path, array: Array, page: Any) -> Array:
 
 
 def _part_alpha(path: Path, array: Array, page: Any, *, divided: bool = False) -> Array:
-    """Return colours that are not multiplied by alpha, which is how all other files and verbs have them."""
+    """Return colours that are not multiplied by alpha, as in all other files and verbs."""
     if array.shape[-1] not in (2, 4) or tuple(page.extrasamples) != (_ASSOCIATED,) or array.dtype.kind not in "uf":
         return array
     assume(f"{path.name}: colours are divided by alpha, because the file has them multiplied by it (associated alpha)")
@@ -400,7 +454,7 @@ def _part_alpha(path: Path, array: Array, page: Any, *, divided: bool = False) -
 
 @contextmanager
 def _mute() -> Iterator[None]:
-    """Keep what tifffile logs of a corrupt file off the terminal: the error tells it."""
+    """Do not print the log of tifffile about a corrupt file, because the error contains it."""
     mine = threading.get_ident()
 
     def others(record: logging.LogRecord) -> bool:

@@ -1,4 +1,4 @@
-"""Arrays of vectors and matrices, from whatever files they are kept in."""
+"""Arrays of vectors and matrices, from files of all formats."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from texrs.io import _files
 from texrs.io._formats import detect_kind
 from texrs.io._grids import VECTORS
 
-SPATIAL = ("nrrd", "nii", "nii.gz", "vti", "vtk")
-"""Files of programs whose vectors are x, y, z."""
+SPATIAL = ("nrrd", "nii", "nii.gz", "vti")
+"""Formats of programs whose vectors are x, y, z."""
 
 
 def read_vectors(path: PathLike, *, limit: int | None = None) -> tuple[Array, bool]:
-    """Return an array of numbers at places, such as directions or frames, with all its axes.
+    """Return an array of directions or frames at places, with all its axes.
 
     Parameters
     ----------
     path : path_like
-        .npy, .npz (of a single array), a Zarr store, NRRD, NIfTI, .vti or .vtk (their vectors, where there are several
-        arrays), or a TIFF of so many channels.
+        .npy, .npz (of a single array), a Zarr store, NRRD, NIfTI or .vti (the vectors, if there are several
+        arrays), or a TIFF file with one channel per component.
     limit : int, optional
-        Sixteenth of the bytes that it may need; by default the voxels that `texrs.limits` allows.
+        Sixteenth of the maximum number of bytes. Default: the voxels that `texrs.limits` allows.
 
     Returns
     -------
     array : ndarray
-        The places first, in the order of arrays: (plane, row, column).
+        The axes of the places are first, in the order of arrays: (plane, row, column).
     spatial : bool
-        Whether components are x, y, z there, as those programs have it whose format it is.
+        Whether the components are x, y, z, as in the programs that use the format.
 
     Raises
     ------
     FileError
-        Missing, not readable, damaged, or of another kind.
+        The file is missing, not readable, damaged, or of another format.
     LimitExceeded
         More memory than the limit.
 
@@ -55,7 +55,5 @@ def read_vectors(path: PathLike, *, limit: int | None = None) -> tuple[Array, bo
     name, most = _files.as_path(path), as_limit(limit, axes=3)
     kind = detect_kind(name)
     if kind not in VECTORS:
-        raise FileError(
-            f"{name}: is a {kind} file; vectors are read from .npy, .npz, Zarr, NRRD, NIfTI, .vti, .vtk and TIFF"
-        )
+        raise FileError(f"{name}: is a {kind} file; vectors are read from .npy, .npz, Zarr, NRRD, NIfTI, .vti and TIFF")
     return VECTORS[kind](name, most), kind in SPATIAL

@@ -1,37 +1,35 @@
-"""Volumes for other programs: NRRD by pynrrd, NIfTI by nibabel (extra ``vol``), ParaView's image data, STL surfaces.
+"""Volumes for other programs: NRRD by pynrrd, NIfTI by nibabel (extra ``vol``), STL surfaces.
 
-The libraries read and write headers. Samples are read here, when the header has been compared with the limit and with
+The libraries read and write headers. This module reads samples after it has compared the header with the limit and with
 the length of the file, so that neither a huge header nor a bomb of compressed zeros takes memory.
 
-In NRRD and NIfTI the axis that runs fastest comes first, so that (plane, row, column) is z, y, x there.
+NRRD and NIfTI list the axis that runs fastest first, so that plane, row and column are z, y and x.
 """
 
 from __future__ import annotations
 
-import base64
 import gzip
 import io
 import re
 import warnings
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from math import prod
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io import _vtk
 from texrs.io._files import check_file, check_size, translate_errors
 
-VTI_MAGIC = b'<?xml version="1.0"?>\n<VTKFile'
 NRRD_MAGIC = b"NRRD000"
 GZIP_MAGIC = b"\x1f\x8b"
 NIFTI_MAGIC = (b"\x5c\x01\0\0", b"\0\0\x01\x5c", b"\x1c\x02\0\0", b"\0\0\x02\x1c")
-"""The length of the header, which a file of either version and byte order starts with."""
+"""Lengths of the header, with which files of both versions and byte orders begin."""
 
 _MOST_CHANNELS = 64
 _LONGEST_HEADER = 2**16
@@ -53,15 +51,6 @@ _NRRD_TYPES = {
     }.items()
     for name in names.split(", ")
 }
-_VTI_TYPES = {"u": "UInt", "i": "Int", "f": "Float"}
-_VTI_KINDS = {"UInt": "u", "Int": "i", "Float": "f"}
-_VTI = re.compile(
-    r'byte_order="LittleEndian" header_type="UInt64">\s*<ImageData WholeExtent="(?P<extent>0 \d{1,9} 0 \d{1,9} 0 \d{1,9})"'
-    r'.*<DataArray type="(?P<kind>UInt|Int|Float)(?P<bits>8|16|32|64)"[^>]* NumberOfComponents="(?P<channels>\d{1,5})" '
-    r'format="appended" offset="0"/>',
-    re.DOTALL,
-)
-_FIRST = 3 * 2**20 - 8
 _STL_TITLE = b"texrs".ljust(80)
 
 
@@ -69,15 +58,14 @@ _STL_TITLE = b"texrs".ljust(80)
 
 
 def read_nrrd(path: Path, limit: int) -> Array:
-    """Read an NRRD volume whose samples lie in the file itself, or in one beside it, raw or compressed by gzip."""
-    length = check_file(path)
-    with translate_errors(path, "reading"), path.open("rb") as file:
+    """Read an NRRD volume whose samples are in the file or in another file of its folder, raw or compressed by gzip."""
+    with _open(path) as (file, length):
         header, end = _read_nrrd_header(path, file, length)
         beside = header.get("data file", header.get("datafile"))
         if beside is not None and (
             not isinstance(beside, str) or beside in ("", ".", "..") or re.search(r"[/\\%\s]|^LIST$", beside)
         ):
-            raise FileError(f"{path}: keeps its samples in other files, of which one that lies beside it is read")
+            raise FileError(f"{path}: keeps its samples in other files; only one file in the same folder is read")
         encoding = str(header.get("encoding", "")).lower()
         if encoding not in _NRRD_ENCODINGS:
             raise FileError(f"{path}: its encoding is {encoding!r}; raw and gzip are read")
@@ -112,25 +100,22 @@ def read_nrrd(path: Path, limit: int) -> Array:
 
 
 def read_nrrd_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that a header states, in the order of the file, by numbers or as the lengths of steps in space."""
-    length = check_file(path)
-    with translate_errors(path, "reading"), path.open("rb") as file:
-        header, _ = _read_nrrd_header(path, file, length)
-        steps = header.get("spacings")
-        if steps is None and header.get("space directions") is not None:
-            none = [np.nan] * 3
-            steps = [np.linalg.norm(none if row is None else row) for row in header["space directions"]]
+    """Return the distances that a header states in the order of the file, as numbers or as the lengths of vectors."""
+    header = read_header(path)
+    steps = header.get("spacings")
+    if steps is None and header.get("space directions") is not None:
+        steps = [np.nan if row is None else np.linalg.norm(row) for row in header["space directions"]]
     return None if steps is None else [float(s) for s in steps if np.isfinite(s)]
 
 
 def _read_nrrd_header(path: Path, file: BinaryIO, length: int) -> tuple[dict[str, Any], int]:
-    """Return what a header says, and where it ends."""
+    """Return the fields of a header, and its length."""
     nrrd: Any = _import_library("nrrd", "pynrrd", path)
-    # The library reads lines of any length: give it no more than a header may have.
+    # The library reads lines of any length, so limit the header.
     start = file.read(_LONGEST_HEADER)
     end = min((at + n for n, at in ((2, start.find(b"\n\n")), (4, start.find(b"\r\n\r\n"))) if at >= 0), default=-1)
     if end < 0 and length == len(start) and re.search(rb"^data ?file:", start, re.MULTILINE):
-        # A header alone ends with its file.
+        # A header without samples ends with its file.
         end = length
     if end < 0:
         raise FileError(f"{path}: its NRRD header does not end within {_LONGEST_HEADER} bytes")
@@ -141,18 +126,14 @@ def _read_nrrd_header(path: Path, file: BinaryIO, length: int) -> tuple[dict[str
 
 def read_header(path: Path) -> Any:
     """Return the header of an NRRD file as pynrrd reads it, or that of a NIfTI file as nibabel does."""
-    length = check_file(path)
-    with translate_errors(path, "reading"), path.open("rb") as raw:
-        start = raw.read(2)
-        raw.seek(0)
-        if start == NRRD_MAGIC[:2]:
-            return _read_nrrd_header(path, raw, length)[0]
-        file: BinaryIO = gzip.GzipFile(fileobj=raw) if start == GZIP_MAGIC else raw  # type: ignore[assignment]
-        return _read_nifti_header(path, file)[0]
+    with _open(path) as (file, length):
+        start = file.read(2)
+        file.seek(0)
+        return (_read_nrrd_header(path, file, length) if start == NRRD_MAGIC[:2] else _read_nifti_header(path, file))[0]
 
 
 def _place_nrrd(known: dict[str, Any], steps: list[float], before: int) -> dict[str, Any]:
-    """Return the fields of a header that state where voxels lie, as another header has them, with steps of these lengths."""
+    """Return the fields of another header for the positions of voxels, with the given distances."""
     placed: dict[str, Any] = {
         key: known[key] for key in ("space", "space dimension", "space units", "measurement frame") if key in known
     }
@@ -160,7 +141,7 @@ def _place_nrrd(known: dict[str, Any], steps: list[float], before: int) -> dict[
     units = [u for u in known.get("units", []) if u][-3:]
     if len(units) == 3:
         placed["units"] = [""] * before + units
-    # Only three directions of space can be those of the axes.
+    # Only three directions can belong to the axes.
     if rows is None or not placed.keys() & {"space", "space dimension"}:
         return placed | {"spacings": [float("nan")] * before + steps}
     found = np.array([[np.nan] * 3 if row is None else row for row in rows], float)
@@ -174,7 +155,7 @@ def _place_nrrd(known: dict[str, Any], steps: list[float], before: int) -> dict[
 
 
 def write_nrrd(path: Path, volume: Array, spacing: Sequence[float], like: dict[str, Any] | None = None) -> None:
-    """Write an NRRD volume, raw; its voxels lie as the header ``like`` states."""
+    """Write an NRRD volume, raw, with the positions of voxels in the header ``like``."""
     nrrd: Any = _import_library("nrrd", "pynrrd", path)
     steps = [float(s) for s in reversed(spacing)]
     header: dict[str, Any] = {"encoding": "raw", "endian": "little"}
@@ -186,7 +167,7 @@ def write_nrrd(path: Path, volume: Array, spacing: Sequence[float], like: dict[s
     little = volume.astype(volume.dtype.newbyteorder("<"), copy=False)
     with path.open("xb") as file:
         nrrd.write(file, little, header, index_order="C", compression_level=1)
-    # The library writes when it wrote; the same volume is to give the same bytes.
+    # The library writes the date, but the same volume must give the same bytes.
     with path.open("r+b") as file:
         start = file.read(256)
         first = start.find(b"# on ")
@@ -196,7 +177,7 @@ def write_nrrd(path: Path, volume: Array, spacing: Sequence[float], like: dict[s
 
 
 def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
-    """Return which axis is the channels; without kinds the fastest of four."""
+    """Return the axis of the channels: without kinds, the fastest of four."""
     if len(sizes) == 3:
         return None
     if len(sizes) != 4:
@@ -212,11 +193,9 @@ def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
 # --- NIfTI -----------------------------------------------------------------------------------------------------------
 
 
-def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
+def read_nifti(path: Path, limit: int) -> Array:
     """Read a NIfTI volume in one file, of version 1 or 2."""
-    length = check_file(path)
-    with translate_errors(path, "reading"), path.open("rb") as raw:
-        file: BinaryIO = gzip.GzipFile(fileobj=raw) if compressed else raw  # type: ignore[assignment]
+    with _open(path) as (file, length):
         header, dtype, need = _read_nifti_header(path, file)
         fields = dtype.names or ()
         colours = len(fields) if fields and all(dtype[n] == np.uint8 for n in fields) else 0
@@ -231,12 +210,12 @@ def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
         _check_sides(path, sizes)
         channels = several[0] if several else 1
         offset = float(header["vox_offset"])
-        if not need <= offset <= (_LONGEST_HEADER if compressed else length) or offset != int(offset):
+        if not need <= offset <= (length or _LONGEST_HEADER) or offset != int(offset):
             raise FileError(f"{path}: says that its samples start at byte {offset:g}")
         check_size(path, tuple(sizes[2::-1]), max(channels, colours), dtype.itemsize // (colours or 1), limit)
         file.seek(int(offset))
         whole = prod(sizes)
-        flat = _read_samples(path, file, None if compressed else length - int(offset), whole, dtype, compressed=False)
+        flat = _read_samples(path, file, length and length - int(offset), whole, dtype, compressed=False)
         slope, intercept = header.get_slope_inter() if not colours else (None, None)
     if colours:
         volume = flat.view(np.uint8).reshape(*sizes[2::-1], colours)
@@ -249,17 +228,13 @@ def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
     return _tidy(volume)
 
 
-def read_nifti_spacing(path: Path, *, compressed: bool) -> Sequence[float] | None:
+def read_nifti_spacing(path: Path) -> Sequence[float] | None:
     """Return the distances that a header states, x first."""
-    check_file(path)
-    with translate_errors(path, "reading"), path.open("rb") as raw:
-        file: BinaryIO = gzip.GzipFile(fileobj=raw) if compressed else raw  # type: ignore[assignment]
-        header, _, _ = _read_nifti_header(path, file)
-        return [abs(float(s)) for s in header["pixdim"][1:4]]
+    return [abs(float(s)) for s in read_header(path)["pixdim"][1:4]]
 
 
 def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], int]:
-    """Return what a header says, the dtype of the samples, and its length."""
+    """Return a header, the dtype of the samples, and the length of the header."""
     nibabel: Any = _import_library("nibabel", "nibabel", path)
     start = file.read(540)
     if start[:4] not in NIFTI_MAGIC:
@@ -280,7 +255,7 @@ def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], 
 def write_nifti(path: Path, volume: Array, spacing: Sequence[float], like: Any = None, *, compressed: bool) -> None:
     """Write a NIfTI volume: bytes of three or four channels as colours, others as vectors.
 
-    Its voxels lie as the header ``like`` states; without one it is of version 1, and the first voxel is the origin.
+    The header ``like`` states the positions of the voxels. Without one, the version is 1 and the first voxel is the origin.
     """
     nibabel: Any = _import_library("nibabel", "nibabel", path)
     channels = volume.shape[3] if volume.ndim == 4 else 1
@@ -305,7 +280,7 @@ def write_nifti(path: Path, volume: Array, spacing: Sequence[float], like: Any =
 
 
 def _place_nifti(nibabel: Any, data: Array, steps: NDArray[np.float64], like: Any) -> Any:
-    """Return an image whose voxels lie as a header states, with steps of these lengths."""
+    """Return an image with the positions of voxels in a header, and with the given distances."""
     second = isinstance(like, nibabel.Nifti2Header)
     header = (nibabel.Nifti2Header if second else nibabel.Nifti1Header)()
     for key in ("qform_code", "sform_code", "xyzt_units", "quatern_b", "quatern_c", "quatern_d"):
@@ -322,70 +297,11 @@ def _place_nifti(nibabel: Any, data: Array, steps: NDArray[np.float64], like: An
     return (nibabel.Nifti2Image if second else nibabel.Nifti1Image)(data, None, header)
 
 
-# --- ParaView and surfaces -------------------------------------------------------------------------------------------
-
-
-def write_vti(path: Path, volume: Array, spacing: Sequence[float]) -> None:
-    """Write ParaView's image data: a value a point, at the middle of each voxel, in base64."""
-    channels = volume.shape[3] if volume.ndim == 4 else 1
-    kind = f"{_VTI_TYPES[volume.dtype.kind]}{8 * volume.dtype.itemsize}"
-    extent = " ".join(f"0 {n - 1}" for n in volume.shape[2::-1])
-    steps = " ".join(repr(float(s)) for s in reversed(spacing))
-    little = np.ascontiguousarray(volume, volume.dtype.newbyteorder("<"))
-    with path.open("xb") as file:
-        file.write(
-            '<?xml version="1.0"?>\n'
-            '<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
-            f'<ImageData WholeExtent="{extent}" Origin="0 0 0" Spacing="{steps}">\n'
-            f'<Piece Extent="{extent}">\n<PointData Scalars="texture">\n'
-            f'<DataArray type="{kind}" Name="texture" NumberOfComponents="{channels}" format="appended" offset="0"/>\n'
-            '</PointData>\n<CellData/>\n</Piece>\n</ImageData>\n<AppendedData encoding="base64">\n_'.encode()
-        )
-        # The length and the samples are one stream; coded in threes of bytes, its parts join.
-        head, data = little.nbytes.to_bytes(8, "little"), little.reshape(-1).view(np.uint8).data
-        file.write(base64.b64encode(head + bytes(data[:_FIRST])))
-        for start in range(_FIRST, len(data), 3 * 2**20):
-            file.write(base64.b64encode(data[start : start + 3 * 2**20]))
-        file.write(b"\n</AppendedData>\n</VTKFile>\n")
-
-
-def read_vti(path: Path, limit: int) -> Array:
-    """Read image data; what `write_vti` writes, one array of points in base64 at the end, piece by piece."""
-    length = check_file(path)
-    with translate_errors(path, "reading"), path.open("rb") as file:
-        start = file.read(_LONGEST_HEADER)
-        mark = b'<AppendedData encoding="base64">\n_'
-        end = start.find(mark)
-        found = _VTI.search(start[:end].decode("latin-1")) if end >= 0 else None
-        if found is None:
-            # Of other programs, which put samples in other places.
-            return _vtk.read_image_data(path, limit)
-        sizes = [int(n) + 1 for n in found["extent"].split()[1::2]]
-        channels = int(found["channels"])
-        dtype = np.dtype(f"<{_VTI_KINDS[found['kind']]}{int(found['bits']) // 8}")
-        _check_sides(path, [*sizes, channels])
-        check_size(path, tuple(sizes[::-1]), channels, dtype.itemsize, limit)
-        size = prod(sizes) * channels * dtype.itemsize
-        file.seek(end + len(mark))
-        if length - file.tell() < (size + 8) * 4 // 3:
-            raise FileError(f"{path}: is cut off; not all of its samples are there")
-        out, filled = bytearray(size + 8), 0
-        while filled < size + 8:
-            with translate_errors(path, "decoding"):
-                part = base64.b64decode(file.read(min(2**22, -(-(size + 8 - filled) // 3) * 4)), validate=True)
-            if not part:
-                raise FileError(f"{path}: is cut off; not all of its samples are there")
-            out[filled : filled + len(part)] = part
-            filled += len(part)
-        if int.from_bytes(out[:8], "little") != size:
-            raise FileError(f"{path}: says that its samples are of another length than its extent")
-    if len(out) != size + 8:
-        raise FileError(f"{path}: is corrupt; its samples are not encoded as they should be")
-    return _tidy(np.frombuffer(out, dtype, offset=8).reshape(*sizes[::-1], channels))
+# --- surfaces -------------------------------------------------------------------------------------------------------
 
 
 def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int64]) -> None:
-    """Write triangles, their corners as x, y, z."""
+    """Write triangles with corners x, y, z."""
     facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     with path.open("xb") as file:
         file.write(_STL_TITLE + len(faces).to_bytes(4, "little"))
@@ -401,16 +317,26 @@ def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int64
 # --- shared ----------------------------------------------------------------------------------------------------------
 
 
+@contextmanager
+def _open(path: Path) -> Iterator[tuple[BinaryIO, int]]:
+    """Open a file, unpack it if it is compressed as a whole, and return its length: 0 if that is not known."""
+    length = check_file(path)
+    with translate_errors(path, "reading"), path.open("rb") as raw:
+        packed = raw.read(2) == GZIP_MAGIC
+        raw.seek(0)
+        yield (cast(BinaryIO, gzip.GzipFile(fileobj=raw)), 0) if packed else (raw, length)
+
+
 def _read_samples(
-    path: Path, file: BinaryIO, left: int | None, count: int, dtype: np.dtype[Any], *, compressed: bool
+    path: Path, file: BinaryIO, left: int, count: int, dtype: np.dtype[Any], *, compressed: bool
 ) -> Array:
-    """Read so many samples, and no byte more than they need, in native byte order."""
+    """Read ``count`` samples, and no byte more than they need, in native byte order."""
     size = count * dtype.itemsize
-    if left is not None and not compressed and left < size:
+    if left and not compressed and left < size:
         raise FileError(f"{path}: is cut off; its samples need {size} bytes, {left} are there")
     inflate = zlib.decompressobj(31) if compressed else None
     out, filled, rest = bytearray(), 0, b""
-    # What is compressed may promise more than it holds: memory grows with what is there.
+    # A compressed file may contain less than its header states, so let memory grow with the content.
     while filled < size:
         part = rest or file.read(min(2**20, size - filled) if inflate is None else 2**20)
         if inflate is not None:
@@ -430,7 +356,7 @@ def _read_samples(
 
 
 def _check_sides(path: Path, sizes: list[int]) -> None:
-    """Refuse what has no extent: of two negative sides the product would be positive."""
+    """Refuse sizes below 1, because the product of two negative sides is positive."""
     if min(sizes) < 1:
         raise FileError(f"{path}: holds no voxels ({' x '.join(map(str, sizes))})")
 

@@ -166,7 +166,7 @@ class Exports(Mapping[str, Map]):
 
         The channels of ``albedo`` are ``albedo.R``, ``albedo.G`` and ``albedo.B``, those of normals end in X, Y and Z, others
         in Y. As everywhere in EXR, colours are linear light: sRGB is decoded. The header keeps roles, spaces and dtypes, so
-        that integers of up to 16 bit, labels and linear floats come back to the bit. Needs ``pip install texrs[materials]``.
+        that integers of up to 16 bit, labels and linear floats come back to the bit.
 
         Parameters
         ----------
@@ -184,7 +184,7 @@ class Exports(Mapping[str, Map]):
         Raises
         ------
         FileError
-            Another suffix, the file cannot be written, or OpenEXR is not installed. What was there is as it was.
+            Another suffix, or the file cannot be written. A former file is unchanged.
         InvalidInput
             A volume, another depth, or values that EXR cannot hold whole.
 
