@@ -30,7 +30,6 @@ HOMES = {
     "pulp": ("foundation/wide",),
     "spade": ("kernels/warp",),
     "image": ("kernels/image_io",),
-    "exr": ("kernels/image_io",),
     "pyo3": ("bindings/",),
     "numpy": ("bindings/",),
     "thiserror": ("foundation/error",),

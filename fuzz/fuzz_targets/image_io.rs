@@ -7,14 +7,8 @@ use libfuzzer_sys::fuzz_target;
 use texrs::image_io::{BYTES_PER_PIXEL, Decoded, Format, Sample, decode, encode};
 use texrs_fuzz::{Draw, speaks};
 
-const FORMATS: [Format; 5] = [
-    Format::Png,
-    Format::WebP,
-    Format::Tiff,
-    Format::Hdr,
-    Format::Exr,
-];
-const SAMPLES: [Sample; 4] = [Sample::U8, Sample::U16, Sample::F16, Sample::F32];
+const FORMATS: [Format; 3] = [Format::Png, Format::Tiff, Format::Hdr];
+const SAMPLES: [Sample; 3] = [Sample::U8, Sample::U16, Sample::F32];
 
 /// Reads a file, and checks that the result is inpaint and within the limits.
 fn read(file: &[u8], limit: u64) -> Option<Decoded> {
@@ -39,8 +33,8 @@ fuzz_target!(|bytes: &[u8]| {
         return;
     }
     let mut draw = Draw::new(bytes);
-    let format = FORMATS[draw.within(0..=4)];
-    let sample = SAMPLES[draw.within(0..=3)];
+    let format = FORMATS[draw.within(0..=2)];
+    let sample = SAMPLES[draw.within(0..=2)];
     let shape = [draw.within(1..=9), draw.within(1..=9), draw.within(1..=4)];
     let size = shape.iter().product::<usize>() * sample.size();
     let pixels: Vec<u8> = draw.words(size).map(|x| x as u8).collect();

@@ -20,15 +20,8 @@ fn bytes(seed: u64, n: usize) -> Vec<u8> {
 
 /// Writes small files of all supported kinds, half of each file, and headers of the other formats.
 fn images(folder: &Path) -> io::Result<()> {
-    let formats = [
-        Format::Png,
-        Format::WebP,
-        Format::Tiff,
-        Format::Hdr,
-        Format::Exr,
-    ];
-    for format in formats {
-        for sample in [Sample::U8, Sample::U16, Sample::F16, Sample::F32] {
+    for format in [Format::Png, Format::Tiff, Format::Hdr] {
+        for sample in [Sample::U8, Sample::U16, Sample::F32] {
             for channels in 1..=4 {
                 for side in [1, 3, 17] {
                     let pixels = bytes(side as u64, side * side * channels * sample.size());

@@ -47,9 +47,8 @@ in the file. Volumes larger than memory are written slab by slab (`write_slabs`)
 without a channel axis, from ``.npy`` and ``.npz`` as it was written. ``.npz`` files have the key ``image``.
 
 The content of a file decides its format when it is read (the suffix does for TGA), and the suffix when it is written. Headers
-are compared with the limit before memory is used. `read_metadata` reads metadata, such as ICC profiles, densities and the record
-of how texrs made a file, and `write_metadata` writes them. All files are written to a temporary name and renamed. Errors are
-`texrs.errors.FileError`, `~texrs.errors.LimitExceeded` and `~texrs.errors.InvalidInput`.
+are compared with the limit before memory is used. `read_metadata` reads metadata, such as ICC profiles, densities and the
+record of how texrs made a file, and `write_metadata` writes them. All files are written to a temporary name and renamed.
 """
 
 from __future__ import annotations

@@ -76,7 +76,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
             data = content[mark + int(chosen.get("offset") or 0) : content.rfind(b"</AppendedData")]
         if form == "ascii":
             values = np.array(data.split(), np.float64 if dtype.kind == "f" else dtype.newbyteorder("="))
-            samples = values.astype(dtype).tobytes()
+            samples: bytes | memoryview = values.astype(dtype).tobytes()
         else:
             samples = _unpack(path, data, header, encoded, root.get("compressor"), size)
         if len(samples) < size:

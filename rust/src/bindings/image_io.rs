@@ -5,19 +5,16 @@ use super::run;
 use crate::Error;
 use crate::kernels::image_io::{self, Format, Sample};
 
-const FORMATS: [(&str, Format); 5] = [
+const FORMATS: [(&str, Format); 3] = [
     ("png", Format::Png),
-    ("webp", Format::WebP),
     ("tiff", Format::Tiff),
     ("hdr", Format::Hdr),
-    ("exr", Format::Exr),
 ];
 
 /// NumPy names of the sample types.
-const SAMPLES: [(&str, Sample); 4] = [
+const SAMPLES: [(&str, Sample); 3] = [
     ("uint8", Sample::U8),
     ("uint16", Sample::U16),
-    ("float16", Sample::F16),
     ("float32", Sample::F32),
 ];
 

@@ -1,26 +1,22 @@
-//! Image files in memory: PNG, WebP, TIFF, Radiance HDR and OpenEXR, 8 and 16 bit and float, with limits.
+//! Image files in memory: PNG, TIFF and Radiance HDR, 8 and 16 bit and float, with limits.
 //!
-//! The only file that names the image and exr crates. Samples travel as bytes in native order, so that one path serves
-//! every sample type and nothing is converted on the way. Three habits make hostile files harmless:
+//! Python's libraries read and write the other formats. They do not read PNG and LZW-compressed TIFF of 16 bits and several
+//! channels, or HDR. Only this file names the image crate. Samples are bytes in native order, so that one path serves every
+//! sample type and converts nothing. Three measures make hostile files harmless:
 //!
 //! 1. The header's pixels and bytes are compared with the limit before anything is decoded.
 //! 2. The output is reserved with an allocation that may fail, instead of one that ends the process.
-//! 3. A decoder that panics is caught, and its message kept off the terminal, for the error already tells it.
+//! 3. A panic of a decoder is caught. Its message is not printed, because the error contains it.
 
 use std::cell::Cell;
 use std::io::Cursor;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
-use image::codecs::{hdr, png, tiff, webp};
+use image::codecs::{hdr, png, tiff};
 use image::{ColorType, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageResult};
 
 use crate::{Error, Result};
-
-mod headers;
-mod openexr;
-
-use headers::{png_exif, rgbe, whole_chunks};
 
 /// Bytes that a decoded image may have for each pixel of the limit: four floats.
 pub const BYTES_PER_PIXEL: u64 = 16;
@@ -33,14 +29,10 @@ const PNG_EXTRAS: u64 = 32 << 20;
 pub enum Format {
     /// Portable Network Graphics: 8 and 16 bit, one to four channels.
     Png,
-    /// WebP: 8 bit, three or four channels; written without loss.
-    WebP,
     /// TIFF, the first page: 8 and 16 bit and float.
     Tiff,
     /// Radiance RGBE: three channels of float with a shared exponent.
     Hdr,
-    /// OpenEXR: half or float.
-    Exr,
 }
 
 impl Format {
@@ -48,23 +40,7 @@ impl Format {
     pub fn of_content(file: &[u8]) -> Option<Self> {
         match file {
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some(Self::Png),
-            [
-                b'R',
-                b'I',
-                b'F',
-                b'F',
-                _,
-                _,
-                _,
-                _,
-                b'W',
-                b'E',
-                b'B',
-                b'P',
-                ..,
-            ] => Some(Self::WebP),
             [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Some(Self::Tiff),
-            [b'v', b'/', b'1', 1, ..] => Some(Self::Exr),
             _ if file.starts_with(b"#?RADIANCE") || file.starts_with(b"#?RGBE") => Some(Self::Hdr),
             _ => None,
         }
@@ -78,8 +54,6 @@ pub enum Sample {
     U8,
     /// Unsigned, 16 bit.
     U16,
-    /// IEEE half.
-    F16,
     /// IEEE single.
     F32,
 }
@@ -89,7 +63,7 @@ impl Sample {
     pub const fn size(self) -> usize {
         match self {
             Self::U8 => 1,
-            Self::U16 | Self::F16 => 2,
+            Self::U16 => 2,
             Self::F32 => 4,
         }
     }
@@ -110,8 +84,8 @@ pub struct Decoded {
 
 /// Decodes a file, at most `limit` pixels and [`BYTES_PER_PIXEL`] bytes for each of them. `name` is for messages.
 pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
-    let format = Format::of_content(file)
-        .ok_or_else(|| fail(name, "not a PNG, WebP, TIFF, HDR or EXR file"))?;
+    let format =
+        Format::of_content(file).ok_or_else(|| fail(name, "not a PNG, TIFF or HDR file"))?;
     let budget = Budget { name, limit };
     caught(name, || match format {
         Format::Png => {
@@ -124,10 +98,6 @@ pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
                 ..budget.read(decoder)?
             })
         }
-        Format::WebP => {
-            whole_chunks(name, file)?;
-            budget.read(webp::WebPDecoder::new(Cursor::new(file)))
-        }
         Format::Tiff => budget.read(tiff::TiffDecoder::new(Cursor::new(file))),
         Format::Hdr => {
             // The lenient reader takes the signature for a comment, and so knows #?RGBE as well as #?RADIANCE.
@@ -137,7 +107,6 @@ pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
             }
             budget.read(decoder)
         }
-        Format::Exr => openexr::decode(&budget, file),
     })
 }
 
@@ -186,16 +155,10 @@ pub fn encode(
                 );
                 encoder.write_image(pixels, width, height, color)
             }
-            Format::WebP => {
-                webp::WebPEncoder::new_lossless(&mut out).write_image(pixels, width, height, color)
-            }
             Format::Tiff => {
                 tiff::TiffEncoder::new(&mut out).write_image(pixels, width, height, color)
             }
             Format::Hdr => hdr::HdrEncoder::new(&mut out).write_image(pixels, width, height, color),
-            Format::Exr => {
-                return openexr::encode(name, sample, shape, pixels);
-            }
         }
         .map_err(|error| speak(name, &error))?;
         Ok(out.into_inner())
@@ -207,32 +170,51 @@ pub fn exif_orientation(exif: &[u8]) -> u8 {
     image::metadata::Orientation::from_exif_chunk(exif).map_or(1, |o| o.to_exif())
 }
 
+/// The Exif block of a PNG file, which may also stand behind the pixels, where the decoder has no eye for it.
+fn png_exif(file: &[u8]) -> Option<&[u8]> {
+    let mut at = 8;
+    loop {
+        let length = u32::from_be_bytes(file.get(at..at + 4)?.try_into().ok()?) as usize;
+        let end = at.checked_add(12)?.checked_add(length)?;
+        match file.get(at + 4..at + 8)? {
+            b"eXIf" => return file.get(at + 8..at + 8 + length),
+            b"IEND" => return None,
+            _ => at = end,
+        }
+    }
+}
+
+/// Radiance files may hold XYZ instead of RGB.
+fn rgbe(name: &str, metadata: &hdr::HdrMetadata) -> Result<()> {
+    let format = metadata
+        .custom_attributes
+        .iter()
+        .find(|(key, _)| key == "FORMAT");
+    match format {
+        Some((_, format)) if format.trim() != "32-bit_rle_rgbe" => Err(fail(
+            name,
+            format!("Radiance samples of format {format:?} are not read, only 32-bit_rle_rgbe"),
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// The image crate's name for samples that the format gives back as they came.
 fn color(format: Format, sample: Sample, channels: usize) -> Option<ExtendedColorType> {
     use ExtendedColorType as C;
-    let color = match (sample, channels) {
-        (Sample::U8, 1) => C::L8,
-        (Sample::U8, 2) => C::La8,
-        (Sample::U8, 3) => C::Rgb8,
-        (Sample::U8, 4) => C::Rgba8,
-        (Sample::U16, 1) => C::L16,
-        (Sample::U16, 2) => C::La16,
-        (Sample::U16, 3) => C::Rgb16,
-        (Sample::U16, 4) => C::Rgba16,
-        (Sample::F32, 3) => C::Rgb32F,
-        (Sample::F32, 4) => C::Rgba32F,
-        // Only EXR, which does not look at it, has these.
-        (Sample::F16, 1..=4) | (Sample::F32, 1..=2) => C::Unknown(0),
-        _ => return None,
-    };
-    let held = match format {
-        Format::Png => matches!(sample, Sample::U8 | Sample::U16),
-        Format::WebP => matches!(color, C::Rgb8 | C::Rgba8),
-        Format::Tiff => !matches!(color, C::La8 | C::La16 | C::Unknown(_)),
-        Format::Hdr => color == C::Rgb32F,
-        Format::Exr => matches!(sample, Sample::F16 | Sample::F32),
-    };
-    held.then_some(color)
+    match (format, sample, channels) {
+        (Format::Png | Format::Tiff, Sample::U8, 1) => Some(C::L8),
+        (Format::Png, Sample::U8, 2) => Some(C::La8),
+        (Format::Png | Format::Tiff, Sample::U8, 3) => Some(C::Rgb8),
+        (Format::Png | Format::Tiff, Sample::U8, 4) => Some(C::Rgba8),
+        (Format::Png | Format::Tiff, Sample::U16, 1) => Some(C::L16),
+        (Format::Png, Sample::U16, 2) => Some(C::La16),
+        (Format::Png | Format::Tiff, Sample::U16, 3) => Some(C::Rgb16),
+        (Format::Png | Format::Tiff, Sample::U16, 4) => Some(C::Rgba16),
+        (Format::Tiff | Format::Hdr, Sample::F32, 3) => Some(C::Rgb32F),
+        (Format::Tiff, Sample::F32, 4) => Some(C::Rgba32F),
+        _ => None,
+    }
 }
 
 /// The limit in force for one file.
@@ -249,23 +231,16 @@ impl Budget<'_> {
             return Err(fail(self.name, message));
         }
         let pixels = u128::from(rows) * u128::from(cols);
-        let (bytes, most) = (
-            pixels * u128::from(bytes_per_pixel),
-            u128::from(self.limit) * u128::from(BYTES_PER_PIXEL),
-        );
-        if pixels > u128::from(self.limit) {
-            return Err(Error::Limit {
-                what: format!("{} ({rows} x {cols})", self.name),
-                needed: format!("{pixels} pixels"),
-                limit: format!("{} pixels", self.limit),
-            });
-        }
-        if bytes > most {
-            return Err(Error::Limit {
-                what: format!("{} ({rows} x {cols})", self.name),
-                needed: format!("{bytes} bytes"),
-                limit: format!("{most} bytes"),
-            });
+        let (bytes, limit) = (pixels * u128::from(bytes_per_pixel), u128::from(self.limit));
+        let most = limit * u128::from(BYTES_PER_PIXEL);
+        for (needed, limit, unit) in [(pixels, limit, "pixels"), (bytes, most, "bytes")] {
+            if needed > limit {
+                return Err(Error::Limit {
+                    what: format!("{} ({rows} x {cols})", self.name),
+                    needed: format!("{needed} {unit}"),
+                    limit: format!("{limit} {unit}"),
+                });
+            }
         }
         Ok(())
     }

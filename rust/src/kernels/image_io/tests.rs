@@ -10,7 +10,6 @@ fn pixels(shape: [usize; 3], sample: Sample) -> Vec<u8> {
         .flat_map(|v| match sample {
             Sample::U8 => vec![v as u8],
             Sample::U16 => (v as u16 * 257 + 3).to_ne_bytes().to_vec(),
-            Sample::F16 => (v as u16 * 32).to_ne_bytes().to_vec(),
             Sample::F32 => (v as f32 * 1.37 - 40.0).to_ne_bytes().to_vec(),
         })
         .collect()
@@ -24,8 +23,6 @@ fn written(format: Format, sample: Sample, shape: [usize; 3]) -> Vec<u8> {
 fn lossless_formats_give_back_what_came() {
     let cases = [
         (Format::Png, vec![Sample::U8, Sample::U16], 1..5),
-        (Format::WebP, vec![Sample::U8], 3..5),
-        (Format::Exr, vec![Sample::F16, Sample::F32], 1..5),
         (
             Format::Tiff,
             vec![Sample::U8, Sample::U16, Sample::F32],
@@ -82,62 +79,12 @@ fn an_exif_block_is_found_wherever_it_stands() {
 }
 
 #[test]
-fn an_exr_picture_is_its_display_window() {
-    use exr::prelude::{
-        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds,
-        Layer, LayerAttributes, Vec2, WritableImage,
-    };
-    let channel = |name: &str, first: f32| {
-        let data = (0..6).map(|i| first + i as f32).collect();
-        AnyChannel::new(name, FlatSamples::F32(data))
-    };
-    let file = |channels: Vec<AnyChannel<FlatSamples>>| {
-        let mut layer = Layer::new(
-            (3, 2),
-            LayerAttributes::default(),
-            Encoding::FAST_LOSSLESS,
-            AnyChannels::sort(channels.into_iter().collect()),
-        );
-        layer.attributes.layer_position = Vec2(-1, 1);
-        let window = IntegerBounds::from_dimensions((4, 3));
-        let mut out = Cursor::new(Vec::new());
-        Image::new(ImageAttributes::new(window), layer)
-            .write()
-            .to_buffered(&mut out)
-            .unwrap();
-        out.into_inner()
-    };
-    // Any name will do for a single channel; data left of the window is dropped.
-    let back = decode("a file", &file(vec![channel("height", 1.0)]), LIMIT).unwrap();
-    assert_eq!((back.shape, back.sample), ([3, 4, 1], Sample::F32));
-    let values: Vec<f32> = back
-        .bytes
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|b| f32::from_ne_bytes(*b))
-        .collect();
-    let expected = [0.0, 0.0, 0.0, 0.0, 2.0, 3.0, 0.0, 0.0, 5.0, 6.0, 0.0, 0.0];
-    assert_eq!(values, expected);
-    // Colour is found among other channels; strangers alone are not.
-    let all = ["A", "B", "G", "R", "Z"].map(|name| channel(name, 1.0));
-    let back = decode("a file", &file(all.to_vec()), LIMIT).unwrap();
-    assert_eq!(back.shape, [3, 4, 4]);
-    let strangers = file(vec![channel("u", 0.0), channel("v", 0.0)]);
-    let outcome = decode("a file", &strangers, LIMIT);
-    assert!(matches!(outcome, Err(Error::File { message, .. }) if message.contains("u v")));
-}
-
-#[test]
 fn what_a_format_cannot_hold_is_refused() {
     let refused = [
         (Format::Png, Sample::F32, 3),
         (Format::Png, Sample::U8, 5),
-        (Format::WebP, Sample::U16, 3),
-        (Format::WebP, Sample::U8, 1),
         (Format::Hdr, Sample::F32, 4),
-        (Format::Exr, Sample::U8, 3),
-        (Format::Tiff, Sample::F16, 3),
+        (Format::Tiff, Sample::U8, 2),
     ];
     for (format, sample, channels) in refused {
         let shape = [2, 2, channels];
@@ -152,10 +99,8 @@ fn what_a_format_cannot_hold_is_refused() {
 fn limits_are_kept_before_decoding() {
     for (format, sample) in [
         (Format::Png, Sample::U8),
-        (Format::WebP, Sample::U8),
         (Format::Tiff, Sample::U8),
         (Format::Hdr, Sample::F32),
-        (Format::Exr, Sample::F32),
     ] {
         let file = written(format, sample, [9, 9, 3]);
         assert!(decode("a file", &file, 81).is_ok());
@@ -173,10 +118,8 @@ fn limits_are_kept_before_decoding() {
 fn a_file_that_is_cut_off_is_refused() {
     for (format, sample) in [
         (Format::Png, Sample::U8),
-        (Format::WebP, Sample::U8),
         (Format::Tiff, Sample::U8),
         (Format::Hdr, Sample::F32),
-        (Format::Exr, Sample::F16),
     ] {
         let file = written(format, sample, [16, 16, 3]);
         for share in [0, 1, 10, 40, 70, 90] {
@@ -200,11 +143,10 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
     #[test]
     fn corrupt_files_give_an_image_or_an_error(
-        which in 0usize..5, places in prop::collection::vec((0f64..1.0, any::<u8>()), 1..6),
+        which in 0usize..3, places in prop::collection::vec((0f64..1.0, any::<u8>()), 1..6),
     ) {
         let (format, sample) = [
-            (Format::Png, Sample::U16), (Format::WebP, Sample::U8), (Format::Tiff, Sample::U8),
-            (Format::Hdr, Sample::F32), (Format::Exr, Sample::F32),
+            (Format::Png, Sample::U16), (Format::Tiff, Sample::U8), (Format::Hdr, Sample::F32),
         ][which];
         let mut file = written(format, sample, [12, 10, 3]);
         let length = file.len() as f64;
