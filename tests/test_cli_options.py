@@ -129,6 +129,8 @@ def paint(
     *,
     colour: Colour | None = None,
     mirror: bool = True,
+    copies: int = 4,
+    margin: int | None = None,
     knobs: Knobs | None = None,
     size: int | tuple[int, int] | None = None,
     progress: object = None,
@@ -144,6 +146,10 @@ def paint(
         How. See `texrs.paint`. "fine" takes longer than ``size`` says (section 3.2).
     colour, mirror
         Whether False.
+    copies : int
+        Number of copies. Default: 4.
+    margin : int, optional
+        Width in pixels. Default: 1.5 times the example.
     size : int
         None leaves it.
 
@@ -168,6 +174,9 @@ def test_a_docstring_says_what_an_option_is() -> None:
         "mode": "How. fine takes longer than --size says.",
         "colour": "Whether False.",
         "mirror": "Whether --no-mirror.",
+        # The command shows the 4 itself, but not a computed default.
+        "copies": "Number of copies.",
+        "margin": "Width in pixels. Default: 1.5 times the example.",
         "knobs_width": "How wide, 1 to 9; see --mode. far is not near.",
         "knobs_kind": "near: here. far: there.",
         "size": "The default leaves it.",
@@ -180,6 +189,8 @@ def test_types_and_names_say_how_an_option_is_read() -> None:
         "--mode": ("plain", "plain|fine"),
         "--colour": ("default", "default|red|blue"),
         "--mirror": (True, None),
+        "--copies": (4, None),
+        "--margin": (None, None),
         "--knob-width": (None, None),
         "--knob-kind": ("default", "default|near|far"),
         "--size": (None, "WIDTHxHEIGHT"),
@@ -236,12 +247,12 @@ def test_a_word_means_the_same_in_every_command() -> None:
                 form = str(parameter.metavar).removeprefix("default|").removeprefix("PLANESx").removesuffix("|auto")
                 form = form.replace("xyz|...", "xy|x|y")
                 forms.setdefault(max(parameter.opts, key=len), set()).add(form)
-    # A folder, an entry or a picture is written; each verb has algorithms and plans of its own; a picture of a volume is a
-    # square; a photograph may show several planes.
+    # The output is a folder, an entry or an image; each command has its own algorithms; an image of a volume is a square; a
+    # photograph may show several planes; check reads the source map that other commands write.
     several = {flag for flag, found in forms.items() if len(found) > 1}
-    assert several == {"--out", "--method", "--size", "--slant", "--tilt", "--fov"}
+    assert several == {"--out", "--method", "--size", "--slant", "--tilt", "--fov", "--source-map"}
     assert not {"--source", "--source-image", "--held", "--rim", "--children"} & set(forms)
-    assert forms["--source-map"] == {"OUT.npz"}
+    assert forms["--source-map"] == {"OUT.npz", "MAP.npz"}
 
 
 def test_commands_are_those_of_the_verbs() -> None:
@@ -260,3 +271,11 @@ def test_commands_are_those_of_the_verbs() -> None:
     }
     assert drawn == set(VERBS)
     assert all(callable(getattr(texrs, name.replace("-", "_"))) for name in VERBS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_shows_each_default_once(command: str) -> None:
+    context = typer.Context(GROUP)
+    for parameter in GROUP.get_command(None, command).params:
+        text = (parameter.get_help_record(context) or ("", ""))[1]
+        assert len(re.findall(r"Default: |\[default: (?!default\])", text)) < 2, text

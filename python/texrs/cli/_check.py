@@ -31,7 +31,7 @@ def check_command(
         str | None,
         typer.Option(
             "--source-map",
-            metavar="FILE",
+            metavar="MAP.npz",
             help="Source map of the image (.npz). The seams inside the image are checked too.",
             show_default="only the borders are checked",
         ),

@@ -40,9 +40,9 @@ APPLIED = Options(
             *("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines"),
             *("flatten_lighting", "within"),
         ),
-        "as the map says",
+        "as in the source map",
     )
-    | dict.fromkeys(("map_type", "green"), "as the name says"),
+    | {"map_type": "from the file name", "green": "from the file name, else up"},
 )
 
 

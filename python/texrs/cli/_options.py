@@ -213,11 +213,13 @@ class Options:
         elif kind is not None and "default" in kind.words and name not in self.optional:
             default = "default"
         shown = self.optional.get(name) or default not in (None, MISSING)
+        # The word default by itself is not a description of the default.
+        shows = flag.startswith("--") and bool(shown) and default != "default"
         # The command shows its own default, so drop the default of the function.
         stated = MISSING if self.optional.get(name) else parameter.default
         words = () if kind is None or kind.file else kind.pick(kind.metavar, self.axes).split("|")
         texts = (
-            _shorten(text, flags, flag if type_ is bool else "", stated, words),
+            _shorten(text, flags, flag if type_ is bool else "", stated, words, shown=shows),
             kind.pick(kind.note, self.axes) if kind else "",
         )
         help_ = " ".join(t for t in texts if t)
@@ -360,13 +362,20 @@ def describe(function: Callable[..., Any]) -> dict[str, str]:
     return found
 
 
-def _shorten(text: str, flags: Mapping[str, str], flag: str, default: Any, words: Collection[str]) -> str:
-    """Return the first sentence or two of a description, or one for each word, in the words of the command line."""
+def _shorten(
+    text: str, flags: Mapping[str, str], flag: str, default: Any, words: Collection[str], *, shown: bool
+) -> str:
+    """Return the first sentence or two of a description, or one for each word, in the words of the command line.
+
+    If the option shows its default, a last sentence "Default: ..." is dropped.
+    """
     # References are for readers of the documentation only.
     text = re.sub(r"\s*\((?:see )?(?:`|section|Eq\.)[^)]*\)|\s*\[\d+\]_|[:;,] see `texrs[^`]*`", "", text)
     # Drop the description of None, unless it is the default: users cannot request it.
     beside = ("See ", "`texrs.") if default is None else ("See ", "`texrs.", "None")
     first, *further = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
+    if shown and further and further[-1].startswith("Default: "):
+        further.pop()
     if "yes" in words:
         further = [re.sub(r"\bFalse\b", "no", re.sub(r"\bTrue\b", "yes", each)) for each in further]
     if len(first) > LONGEST:

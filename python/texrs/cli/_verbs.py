@@ -100,7 +100,7 @@ def make_verb(name: str) -> Verb:
                 perspective,
                 arguments={"exemplar": EXAMPLE},
                 kinds={"scale_map": SEEN, "target": TARGET, "direction": DIRECTION},
-                optional={"target_green": "as the name says"},
+                optional={"target_green": "from the file name, else up"},
             )
             return Verb(options, times=2, shape="target", says=tell_sizes, knows=read_cameras)
         case "rectify":
