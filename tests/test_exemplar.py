@@ -106,7 +106,7 @@ def test_damaged_files_are_refused(tmp_path):
     [
         (WEAVE[0, 0], {}, "image: needs shape (rows, columns)"),
         (WEAVE, {"axes": 4}, "axes: needs an integer from 2 to 3"),
-        (WEAVE, {"labels": True}, "labels: classes need one channel, got 3"),
+        (WEAVE, {"labels": True}, "labels: must have one channel, got 3"),
         (WEAVE, {"repeat": "xyz"}, "repeat: needs True, False or 2"),
         (np.full((20, 20), np.nan), {}, "image: 400 of 400 values are NaN"),
     ],
@@ -122,7 +122,7 @@ def test_verbs_take_either():
     assert as_exemplar(exemplar) is exemplar
     assert as_exemplar(WEAVE).key == exemplar.key
     for value, options, says in (
-        (exemplar, {"axes": 3}, "exemplar: needs an Exemplar with axes=3, got one with axes=2"),
+        (exemplar, {"axes": 3}, "exemplar: must be an Exemplar with axes=3, got one with axes=2"),
         (exemplar, {"minimum": 64}, "exemplar: each side must be at least 64, got shape (48, 48)"),
         (np.array("weave"), {}, "exemplar: needs numbers"),
         (texrs.Exemplar(WEAVE[:12]).image, {"minimum": 16}, "exemplar: each side must be at least 16"),

@@ -395,7 +395,7 @@ def test_exemplars_stand_for_their_arrays():
     other = samples.pebbles((64, 80), seed=5).image
     made = texrs.inpaint(texrs.Exemplar(PEBBLES), HOLE, exemplar=texrs.Exemplar(other))
     np.testing.assert_array_equal(made.image, texrs.inpaint(PEBBLES, HOLE, exemplar=other).image)
-    with pytest.raises(InvalidInput, match="^exemplar: needs an Exemplar with axes=2"):
+    with pytest.raises(InvalidInput, match="^exemplar: must be an Exemplar with axes=2"):
         texrs.inpaint(PEBBLES, HOLE, exemplar=texrs.Exemplar(np.zeros((8, 8, 8), np.uint8), axes=3))
 
 

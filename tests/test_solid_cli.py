@@ -144,7 +144,7 @@ WRONG = [
     ("solid v.npy -o out.tif --method literal", "--method: must be one of default, paper, paper-compensated"),
     ("solid v.npy -o out.tif --interpolation best", "--interpolation: must be one of default, nearest, linear, cubic"),
     ("solid v.npy -o out.tif --seed -1", "--seed: needs an integer from 0"),
-    ("solid v.npy -o out.tif --labels --size 20", "--labels: classes need one channel, got 3"),
+    ("solid v.npy -o out.tif --labels --size 20", "--labels: must have one channel, got 3"),
     ("solid v.npy -o out.tif --constraint-mask m.npy", "m.npy: there is no such file"),
     (
         "solid v.npy -o out.tif --size 20 --constraint-mask v.npy --constraint-values v.npy",

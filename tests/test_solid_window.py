@@ -182,7 +182,7 @@ def test_bad_options() -> None:
     ):
         with pytest.raises(InvalidInput, match=says):
             texrs.SolidTexture(SOLID, **options)  # type: ignore[arg-type]
-    with pytest.raises(InvalidInput, match="exemplar: needs an Exemplar with axes=3"):
+    with pytest.raises(InvalidInput, match="exemplar: must be an Exemplar with axes=3"):
         texrs.SolidTexture(texrs.Exemplar(PLANE))
     with pytest.raises(InvalidInput, match="origin"):
         texture().window((0, 0), 8)

@@ -1,4 +1,4 @@
-"""What an exemplar is: its pixels, the channels that guide, features, labels, repeats, layers and scaled copies."""
+"""Represent an exemplar: pixels, guidance channels, features, labels, periods, layers and scaled copies."""
 
 from texrs.exemplar._exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import Analysis

@@ -1,4 +1,4 @@
-"""The one place for what is known of an example: each fact is worked out when it is first asked for, and kept by content."""
+"""Provide `Exemplar`, which computes each fact about an example on first use and caches it by content."""
 
 from __future__ import annotations
 
@@ -53,38 +53,38 @@ T = TypeVar("T")
 
 FORMAT = 2
 CACHED = 256 << 20
-"""Bytes of facts that are kept by content; one that is larger is kept alone."""
+"""Size of the cache of facts, which are keyed by content, in bytes. A larger fact is cached without any other."""
 _SMALL = 1 << 12
 _ANALYSED, _SAID = 256, 1 << 24
-"""Bytes that the analysis in a file may take a sample, and beside them."""
+"""Maximum size of a saved analysis in bytes per sample, and of the other parts of the file in bytes."""
 
 
 class Exemplar:
-    """An example, and what is known of it.
+    """An example together with the facts that texrs derives from it.
 
-    Every verb that grows from an example takes an array or an `Exemplar`. What a verb finds out about it, as its
-    pyramid of windows, is worked out once: it stays with the exemplar, and is kept for a while for any array of the
-    same content. It travels to other processes as its pixels, what was said of them and the small facts; the others (the
-    pyramid, the elements) are worked out again where they are asked for, once a process, for they would be 20 times as large.
+    Every function that synthesises from an example takes an array or an `Exemplar`. Facts about the example, such as
+    its pyramid of windows, are computed once. They stay with the exemplar, and are cached for a while for any array
+    with the same content. A pickled exemplar contains its pixels, its options and the small facts. Large facts (the
+    pyramid, the elements) would make it 20 times as large, so each process computes them again when it needs them.
 
     Parameters
     ----------
     image : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array_like, path_like or PIL.Image.Image
-        The pixels: integers, floats of 16, 32 or 64 bit, or bool, channels last. Anything that makes itself an array is taken
-        (tensors, labelled arrays, DLPack), and a file is read. They are copied.
+        Pixels: integers, floats of 16, 32 or 64 bits, or bool, with the channels last. Any object that converts to an
+        array is accepted (tensors, labelled arrays, DLPack), and a path is read as a file. The pixels are copied.
     axes : int
-        2 for a picture, 3 for a volume.
+        Number of axes: 2 for an image, 3 for a volume.
     labels : bool, optional
-        Whether the values are classes without an order, looked up at the nearest sample whatever the interpolation.
-        None: where they are one channel of integers or bool, with 2 to 16 values, such as a mask of 0 and 255.
+        If True, the values are unordered classes and are looked up at the nearest sample, whatever the interpolation.
+        Default: True for one channel of integers or bool with 2 to 16 values, such as a mask of 0 and 255.
     repeat : bool, or one an axis, optional
-        Axes along which the example repeats; None measures it.
+        Axes along which the example is periodic. Default: measured.
 
     Raises
     ------
     InvalidInput
-        Not an image or not a volume, channels first, values that are masked or not finite, labels of several channels, or a
-            wrong option.
+        The argument is not an image or a volume, or has its channels first. Values are masked or not finite,
+            labels have several channels, or an option is invalid.
 
     See Also
     --------
@@ -110,7 +110,7 @@ class Exemplar:
             are_labels(checked, labels)
         self._labels = labels
         self._repeat = None if repeat is None else as_wrap(repeat, "repeat", axes=self._axes)
-        # A copy: facts that are kept by content must not come to be of another one.
+        # Copy the pixels: facts are cached by content, so a later change must not attach them to other pixels.
         self._pixels = checked.copy()
         self._pixels.flags.writeable = False
         self._image = self._pixels if given.ndim > self._axes else self._pixels[..., 0]
@@ -118,75 +118,80 @@ class Exemplar:
         self._facts: dict[Hashable, object] = {}
 
     def __repr__(self) -> str:
-        """Return the size, the channels and the dtype."""
+        """Return a text with the size, the channels and the dtype."""
         return f"<Exemplar of {measure(self._pixels, self._axes)}>"
 
     def _repr_png_(self) -> bytes:
-        """Show the picture in a notebook; of a volume the middle plane."""
+        """Show the image in a notebook, or the middle plane of a volume."""
         return as_png(self._image if self._axes == 2 else self._image[self.shape[0] // 2])
 
     def _repr_html_(self) -> str | None:
-        """Show a volume in a notebook by slices with sliders."""
+        """Show a volume in a notebook as slices with sliders."""
         return None if self._axes == 2 else as_page(self._pixels)
 
     # --- pixels ------------------------------------------------------------------------------------------------------
 
     @property
     def image(self) -> Array:
-        """The array as it was given, read-only."""
+        """The array as given, read-only."""
         return self._image
 
     @property
     def pixels(self) -> Array:
-        """The same with its channels last, (..., C), read-only."""
+        """The array as given with its channels last, (..., C), read-only."""
         return self._pixels
 
     @property
     def axes(self) -> int:
-        """2 for a picture, 3 for a volume."""
+        """Number of axes: 2 for an image, 3 for a volume."""
         return self._axes
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Samples along each axis, without the channels."""
+        """Number of samples along each axis, without the channels."""
         return self._pixels.shape[: self._axes]
 
     @cached_property
     def normalized(self) -> Floats:
-        """The pixels in [0, 1], (..., C) float32: integers by the range of their dtype, floats beyond it by their own."""
+        """Pixels in [0, 1], (..., C) float32.
+
+        Integers are divided by the range of their dtype.
+
+        Floats outside [0, 1] are scaled by their own range.
+        """
         return to_unit(self._pixels)
 
     @cached_property
     def guidance(self) -> Floats:
-        """The channels that decisions are made on: up to three in [0, 1], transparency over mid grey."""
+        """Up to three channels in [0, 1] that guide decisions, with transparency over mid grey."""
         return guidance(self._pixels)
 
     @cached_property
     def colours(self) -> Floats:
-        """The up to four channels in [0, 1] that windows are compared by; classes are corners of a cube."""
+        """Up to four channels in [0, 1] for comparing windows. Classes are corners of a cube."""
         return code_colours(self._pixels, self._labels)
 
     # --- what is measured --------------------------------------------------------------------------------------------
 
     @property
     def labels(self) -> bool:
-        """Whether the values are classes without an order."""
+        """True if the values are unordered classes."""
         return self.cached("labels", lambda: are_labels(self._pixels, self._labels))
 
     @property
     def repeat(self) -> tuple[bool, ...]:
-        """Axes along which the example repeats: as given, or measured at each level of its pyramid."""
+        """Axes along which the example is periodic: as given, or measured at each level of its pyramid."""
         return self.cached("repeat", lambda: self._measure(count_levels(self.shape, COARSEST)))
 
     def analyse(self, radii: Sequence[int] = (2,), coarsest: int = COARSEST) -> Analysis:
-        """Return the pyramid, with the appearance vector of each sample's window at each level.
+        """Return the pyramid, with an appearance vector for the window of each sample.
 
         Parameters
         ----------
         radii : sequence of int
-            Radius of the windows, 1 to 8, from the coarsest level on; the last one serves all that follow.
+            Radius of the windows, 1 to 8, from the coarsest level on. The last radius is used for all further levels.
         coarsest : int
-            Least side of the coarsest level, in samples.
+            Minimum side of the coarsest level, in samples.
 
         Returns
         -------
@@ -195,7 +200,7 @@ class Exemplar:
         Raises
         ------
         InvalidInput
-            A side below 16, or windows that do not fit.
+            A side is below 16, or the windows do not fit.
 
         Examples
         --------
@@ -208,7 +213,7 @@ class Exemplar:
         _check_sides(self.shape, "exemplar", COARSEST)
         near = tuple(as_int(r, "radii", 1, 8) for r in as_items(radii, "radii"))
         if not near:
-            raise InvalidInput("radii: needs at least one")
+            raise InvalidInput("radii: must contain at least one radius")
         least = as_int(coarsest, "coarsest", 2 * max(near) + 2, 1 << 16)
         count = count_levels(self.shape, least)
         return self.cached(
@@ -225,22 +230,22 @@ class Exemplar:
         numbers: int = 8,
         progress: Callable[[float], object] | None = None,
     ) -> Similarity:
-        """Return what each sample of a level may be replaced by: the samples that look most like it.
+        """Return the most similar samples of each sample of a level.
 
         Parameters
         ----------
         level : int
-            Of the analysis with windows of radius 2; 0 is the coarsest, -1 the finest.
+            Level of the analysis with windows of radius 2. 0 is the coarsest, -1 the finest.
         coarsest : int
-            Of that analysis, in samples.
+            Minimum side of the coarsest level of that analysis, in samples.
         k : int
-            Samples of a set, 1 to 16.
+            Number of similar samples per sample, 1 to 16.
         n : int
-            Side of the box around each chosen sample from which no other is chosen; odd.
+            Side of the box around each chosen sample that excludes other choices, in samples. Must be odd.
         numbers : {8, 24}
-            How many of the leading numbers of the appearance vectors are compared.
+            Number of leading components of the appearance vectors that are compared.
         progress : callable, optional
-            Called with the share that is done.
+            Function that is called with the share of the work that is done.
 
         Returns
         -------
@@ -249,9 +254,9 @@ class Exemplar:
         Raises
         ------
         InvalidInput
-            A level that is not there, or no ``k`` samples so far apart.
+            The level does not exist, or it does not have ``k`` samples that far apart.
         Cancelled
-            The work was stopped.
+            The work was cancelled.
 
         Examples
         --------
@@ -270,29 +275,32 @@ class Exemplar:
 
     @property
     def instances(self) -> Instances | None:
-        """The separate elements, in two or three axes; None where nothing says for sure that there are any."""
+        """The separate elements, in two or three axes. None if the evidence for elements is uncertain."""
         if self.labels:
             return self.cached("instances", lambda: as_instances(self._pixels[..., 0], self.repeat))
         return self.cached("instances", lambda: find_instances(self.colours, self.repeat))
 
     @property
     def stitcher(self) -> Stitcher:
-        """The exemplar as patches are cut from it: with its elements, and which colours lie side by side.
+        """The exemplar prepared for cutting patches, with its elements and the costs of neighbouring colours.
 
-        Where elements are not found for sure, those that `segment` finds in a picture are cut less.
+        If the elements are uncertain, cuts through the elements that `segment` finds in an image cost more.
         """
         return self.cached("stitcher", self._make_stitcher)
 
     @property
     def mirror_symmetries(self) -> tuple[Flip, ...]:
-        """The mirror images that a picture is like, itself first: (rows mirrored, columns mirrored) of each."""
+        """Mirror images that look like the example, as pairs (rows mirrored, columns mirrored).
+
+        The first pair is the example itself.
+        """
         return self.cached("mirror_symmetries", lambda: find_mirrors(self.guidance, SUSPECT))
 
     @property
     def anisotropy(self) -> float:
-        """How much edges agree in direction, or in two at right angles: 0 not at all, 1 wholly.
+        """Degree to which edges share one direction, or two at right angles, from 0 (none) to 1 (all).
 
-        Of a volume: of that of its three middle planes where they agree most.
+        For a volume, the largest value of its three middle planes.
         """
         if self._axes == 2:
             return self.cached("anisotropy", lambda: measure_direction(self.guidance))
@@ -302,24 +310,25 @@ class Exemplar:
     def segment(
         self, options: ElementOptions = ElementOptions(), *, progress: Progress | bool | None = None
     ) -> Segmentation:
-        """Return the background and the elements of a picture, and the lattice that they may lie on.
+        """Return the background and elements of an image, and their lattice if there is one.
 
         Parameters
         ----------
         options : ElementOptions
-            How elements are found.
+            Options for finding the elements.
         progress : callable or True, optional
-            Called as ``progress("segment", share)`` along the way; raising stops the work. True shows a bar.
+            Function that is called as ``progress("segment", share)`` during the work. An exception from it stops the
+            work. True shows a progress bar.
 
         Returns
         -------
         Segmentation
-            Its arrays are read-only.
+            The segmentation. Its arrays are read-only.
 
         Raises
         ------
         InvalidInput
-            A volume, or labels of another shape.
+            The exemplar is a volume, or the labels have another shape.
 
         Examples
         --------
@@ -335,7 +344,7 @@ class Exemplar:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel without large facts: they are worked out again, and kept by content."""
+        """Pickle without large facts, which are computed again and cached by content."""
         small = {fact: value for fact, value in self._facts.items() if isinstance(value, bool | float | tuple)}
         return _restore, (self._image, self._axes, self._labels, self._repeat, small)
 
@@ -343,32 +352,32 @@ class Exemplar:
 
     @cached_property
     def key(self) -> str:
-        """Digest of the pixels and of what was said of them: the same key, the same facts."""
+        """Digest of the pixels and options. Exemplars with the same key have the same facts."""
         return content_hash(self._pixels, self._axes, self._labels, self._repeat).hex()
 
     def cached(self, fact: Hashable, make: Callable[[], T]) -> T:
-        """Return a fact about the exemplar, worked out when it is first asked for.
+        """Return a fact about the exemplar, computed on first use.
 
-        It stays with the exemplar, and is kept for any other of the same content as long as there is room. To add a
-        fact, write a method that returns ``self.cached((name, *options), make)``: whatever the fact depends on, but
-        for the pixels and what the exemplar was made with, must be among the options. A fact is never changed.
+        The fact stays with the exemplar, and is cached for other exemplars with the same content while there is room.
+        To add a fact, write a method that returns ``self.cached((name, *options), make)``. The options must include
+        everything that the fact depends on, except the pixels and the options of the exemplar. A fact never changes.
 
         Parameters
         ----------
         fact : hashable
-            A name and all options that it depends on.
+            Key of the fact: a name and all options that it depends on.
         make : callable
-            Works the fact out. A result with ``nbytes`` is counted by them.
+            Function that computes the fact. If its result has ``nbytes``, this is its size in the cache.
 
         Returns
         -------
         object
-            What ``make`` returned, now or earlier.
+            The result of ``make``, from this call or an earlier one.
 
         Raises
         ------
         TypeError
-            A fact that is not hashable. What ``make`` raises goes through, and nothing is kept.
+            The key is not hashable. Exceptions of ``make`` are passed on, and nothing is cached.
 
         Examples
         --------
@@ -381,23 +390,25 @@ class Exemplar:
         try:
             hash(fact)
         except TypeError:
-            raise InvalidInput(f"fact: needs what can be a key, got a {type(fact).__name__}") from None
+            raise InvalidInput(f"fact: must be hashable, got a {type(fact).__name__}") from None
         if fact not in self._facts:
             self._facts[fact] = _FACTS.get_or_make((self.key, fact), make)
         return cast(T, self._facts[fact])
 
     def save(self, path: Path) -> None:
-        """Write the exemplar and its analysis to a .npz file; a former file is replaced only when all is written.
+        """Write the exemplar and its analysis to a .npz file.
+
+        An existing file is replaced only after everything is written.
 
         Parameters
         ----------
         path : path_like
-            With the suffix .npz.
+            Path of the file, with the suffix .npz.
 
         Raises
         ------
         FileError
-            It cannot be written.
+            The file cannot be written.
 
         Examples
         --------
@@ -424,7 +435,7 @@ class Exemplar:
         Parameters
         ----------
         path : path_like
-            The .npz file.
+            Path of the .npz file.
 
         Returns
         -------
@@ -433,7 +444,7 @@ class Exemplar:
         Raises
         ------
         FileError
-            The file cannot be read, is of another version, or is damaged.
+            The file cannot be read, has another version, or is damaged.
 
         Examples
         --------
@@ -449,13 +460,13 @@ class Exemplar:
         from texrs.io import read_arrays
 
         def choose(headers: Mapping[str, Header]) -> list[str]:
-            # An analysis takes tens of bytes a sample, of all levels together.
+            # Check the size before reading: an analysis takes tens of bytes per sample over all levels.
             size = sum(header.size for name, header in headers.items() if "/" in name)
             if any(name not in headers for name in ("format", "image", "said")):
-                raise FileError(f"{path}: is no exemplar that was saved")
+                raise FileError(f"{path}: not a saved exemplar")
             samples, few = prod(headers["image"].shape), max(headers[name].size for name in ("format", "said"))
             if samples > 4 * MAX_PIXELS or size > _ANALYSED * samples + _SAID or few > _SMALL:
-                raise FileError(f"{path}: is damaged ({samples} samples, {size} bytes of analysis)")
+                raise FileError(f"{path}: the file is damaged ({samples} samples, {size} bytes of analysis)")
             return [name for name in headers if "/" in name or name in ("format", "image", "said")]
 
         arrays = read_arrays(path, choose=choose)
@@ -471,11 +482,11 @@ class Exemplar:
             )
             analysis = Analysis.from_arrays(arrays)
             if analysis.shape != made.shape:
-                raise InvalidInput(f"the analysis is of {analysis.shape}, the image of {made.shape}")
+                raise InvalidInput(f"the analysis has shape {analysis.shape}, the image {made.shape}")
         except FileError:
             raise
         except (InvalidInput, KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
-            raise FileError(f"{path}: is damaged ({error})") from None
+            raise FileError(f"{path}: the file is damaged ({error})") from None
         made._facts["analysis", (2,), COARSEST] = analysis
         return made
 
@@ -491,37 +502,39 @@ class Exemplar:
 def _restore(
     image: Array, axes: int, labels: bool | None, repeat: tuple[bool, ...] | None, facts: dict[Hashable, object]
 ) -> Exemplar:
-    """Return an exemplar that has travelled."""
+    """Return an exemplar from its pickled parts."""
     made = Exemplar(image, axes=axes, labels=labels, repeat=repeat)
     made._facts.update(facts)
     return made
 
 
 def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum: int = 1) -> Exemplar:
-    """Return an exemplar as it is, or that of an array: what every verb does with its first argument.
+    """Return an `Exemplar` unchanged, or make one from an array.
+
+    Every public function calls this for its first argument.
 
     Parameters
     ----------
     value : Exemplar, array_like, path_like or PIL.Image.Image
-        What the user gave: an exemplar, or whatever `Exemplar` takes.
+        The argument from the user: an exemplar, or any value that `Exemplar` accepts.
     name : str
-        The argument's name, for messages.
+        Name of the argument, for messages.
     axes : int
-        2 or 3, as the verb needs.
+        Required number of axes, 2 or 3.
     minimum : int
-        The least length of an axis, in samples.
+        Minimum length of an axis, in samples.
 
     Returns
     -------
     Exemplar
-        The one that was given, or a new one; what is known of equal pixels is shared.
+        The given exemplar, or a new one. Exemplars with equal pixels share their facts.
 
     Raises
     ------
     InvalidInput
-        An exemplar of other axes, not an array, or too small.
+        The exemplar has another number of axes, or the value is not an array or is too small.
     FileError
-        A path that cannot be read.
+        The path cannot be read.
 
     Examples
     --------
@@ -535,7 +548,7 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
     axes, minimum = as_axes(axes), as_int(minimum, "minimum", 0, 2**31)
     if isinstance(value, Exemplar):
         if value.axes != axes:
-            raise InvalidInput(f"{name}: needs an Exemplar with axes={axes}, got one with axes={value.axes}")
+            raise InvalidInput(f"{name}: must be an Exemplar with axes={axes}, got one with axes={value.axes}")
         _check_sides(value.shape, name, minimum)
         return value
     given = as_ndarray(value, name, axes=axes)

@@ -1,4 +1,4 @@
-"""Which colours of an exemplar are seen side by side, and how surprising other pairs are."""
+"""Measure which colours of an exemplar are neighbours, and how surprising other pairs are."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from texrs._typing import Floats
 __all__ = ["Adjacency", "classify", "measure_adjacency"]
 
 CLASSES = 48
-"""Colours of the palette whose pairs are counted."""
+"""Number of palette colours whose pairs are counted."""
 SAMPLES = 6000
-"""Samples that a palette is made from, at most."""
+"""Maximum number of samples for computing a palette."""
 MOST = 6.0
-"""Surprise, in natural units, that counts as the greatest."""
+"""Maximum surprise, in nats. Larger values are clipped to it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Adjacency:
-    """How surprising pairs of neighbours are.
+    """Surprise of each pair of neighbouring colours.
 
     Attributes
     ----------
     classes : uint8 array
-        Class of each sample's colour.
+        Class of the colour of each sample.
     costs : (K, K) float32
-        Minus the pointwise mutual information of two classes side by side, 0 to 1.
+        Negative pointwise mutual information of two neighbouring classes, scaled to [0, 1].
 
     """
 
@@ -38,20 +38,21 @@ class Adjacency:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the arrays."""
+        """Size of the arrays in bytes."""
         return self.classes.nbytes + self.costs.nbytes
 
 
 def classify(colours: Floats, count: int) -> NDArray[np.uint8]:
-    """Return the class of each sample, of at most ``count`` colours that k-means finds; always the same ones.
+    """Return the colour class of each sample, from at most ``count`` k-means classes.
 
-    ``colours`` is (..., C); a picture of few colours keeps them as its classes.
+    ``colours`` is (..., C). If there are at most ``count`` colours, each is a class. The result does not depend on
+    chance.
     """
     from scipy.cluster.vq import kmeans, vq
 
     flat = np.ascontiguousarray(colours.reshape(-1, colours.shape[-1]), np.float64)
     step = max(1, len(flat) // SAMPLES)
-    # Every so many, at places that no period of a texture follows.
+    # Draw the samples at random places: regular places could coincide with a period of the texture.
     some = flat[np.random.default_rng(0).permutation(len(flat))[: len(flat) // step]]
     distinct = np.unique(some, axis=0)
     centres = distinct if len(distinct) <= count else kmeans(some, _spread(distinct, count))[0]
@@ -59,7 +60,7 @@ def classify(colours: Floats, count: int) -> NDArray[np.uint8]:
 
 
 def _spread(colours: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return colours far from each other: each the farthest from those before."""
+    """Return colours that are far apart: each is the farthest from those chosen before."""
     chosen = [int(np.linalg.norm(colours - colours.mean(axis=0), axis=-1).argmin())]
     away = np.linalg.norm(colours - colours[chosen[0]], axis=-1)
     while len(chosen) < count:
@@ -69,14 +70,14 @@ def _spread(colours: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 
 
 def measure_adjacency(colours: Floats, wrap: Sequence[bool]) -> Adjacency:
-    """Count which colours lie side by side along the axes.
+    """Count which colours are neighbours along the axes.
 
     Parameters
     ----------
     colours : (..., C) float32
-        The exemplar.
+        Colours of the exemplar.
     wrap : one bool an axis
-        Axes along which it repeats.
+        Axes along which the exemplar is periodic.
 
     Returns
     -------
@@ -84,7 +85,7 @@ def measure_adjacency(colours: Floats, wrap: Sequence[bool]) -> Adjacency:
 
     Examples
     --------
-    Stripes of two colours: a pair of both is as usual as any other, next to what is never seen.
+    A pair of equal colours in these stripes is as usual as any other that occurs.
 
     >>> import numpy as np
     >>> from texrs.exemplar.adjacency import measure_adjacency

@@ -1,4 +1,4 @@
-"""What is known of an exemplar before anything is grown from it: a pyramid, and appearance vectors at each level."""
+"""Analyse an exemplar before synthesis: a pyramid, with appearance vectors at each level."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from texrs.errors import InvalidInput
 __all__ = ["COARSEST", "Analysis", "analyse_colours", "are_labels", "code_colours", "count_levels", "measure_repeat"]
 
 COARSEST = 16
-"""Least side of the coarsest level: below, a window covers most of the exemplar."""
+"""Minimum side of the coarsest level. Below it, a window covers most of the exemplar."""
 SIMILAR = 1.25
-"""An exemplar repeats along an axis if its ends differ by at most this much more than neighbours within it."""
+"""Maximum ratio of the difference across the ends of a periodic axis to the difference of neighbours within it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +30,7 @@ class Analysis:
     Attributes
     ----------
     levels : tuple of Appearance
-        From the coarsest to the exemplar's own resolution, each twice as fine as the one before.
+        Levels from the coarsest to the resolution of the exemplar. Each is twice as fine as the level before.
 
     Examples
     --------
@@ -46,26 +46,26 @@ class Analysis:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Samples of the exemplar along each axis."""
+        """Number of samples of the exemplar along each axis."""
         return self.levels[-1].shape
 
     @property
     def wrap(self) -> tuple[bool, ...]:
-        """Axes along which the exemplar repeats."""
+        """Axes along which the exemplar is periodic."""
         return self.levels[-1].wrap
 
     @property
     def nbytes(self) -> int:
-        """Memory that the analysis takes, about."""
+        """Approximate size of the analysis in bytes."""
         return sum(int(np.prod(level.shape)) * 56 for level in self.levels)
 
     def arrays(self) -> dict[str, Array]:
-        """Return the analysis as plain arrays, to be kept; `from_arrays` takes them back.
+        """Return the analysis as plain arrays for storage. `from_arrays` restores it.
 
         Returns
         -------
         dict of str to array
-            By level and name, as ``"0/basis"``.
+            The arrays by level and name, such as ``"0/basis"``.
 
         Examples
         --------
@@ -78,12 +78,12 @@ class Analysis:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Array]) -> Analysis:
-        """Return the analysis whose arrays are among these.
+        """Return the analysis from its arrays.
 
         Parameters
         ----------
         arrays : mapping of str to array
-            As `arrays` returns them; those whose name has no slash are left alone.
+            Arrays as returned by `arrays`. Names without a slash are ignored.
 
         Returns
         -------
@@ -92,7 +92,7 @@ class Analysis:
         Raises
         ------
         InvalidInput
-            Arrays that are missing or do not belong together.
+            An array is missing, or the arrays do not belong together.
 
         Examples
         --------
@@ -104,23 +104,23 @@ class Analysis:
 
         """
         if not isinstance(arrays, Mapping) or not all(isinstance(name, str) for name in arrays):
-            raise InvalidInput(f"arrays: needs arrays by their names, got {type(arrays).__name__}")
-        # Single numbers come back from a file as arrays of one.
+            raise InvalidInput(f"arrays: must be a mapping of names to arrays, got {type(arrays).__name__}")
+        # A file stores a single number as an array with one value.
         mine = {name: a.reshape(()) if a.size == 1 else a for name, a in arrays.items() if "/" in name}
         count = len({name.split("/")[0] for name in mine})
         if not count:
-            raise InvalidInput("analysis: has no levels")
+            raise InvalidInput("analysis: must have at least one level")
         parts = ({k.partition("/")[2]: v for k, v in mine.items() if k.startswith(f"{i}/")} for i in range(count))
         return cls(tuple(Appearance.from_arrays(part) for part in parts))
 
 
 def count_levels(shape: Sequence[int], coarsest: int) -> int:
-    """Return how many levels a pyramid has whose coarsest one has at least so many samples a side."""
+    """Return the number of pyramid levels for a minimum side of the coarsest level."""
     return max(1, int(log2(max(1, min(shape) / coarsest))) + 1)
 
 
 def analyse_colours(seen: Floats, wrap: tuple[bool, ...], radii: Sequence[int], count: int) -> Analysis:
-    """Return the analysis of the colours that windows are compared by, at so many levels."""
+    """Return an analysis of colours with a given number of levels."""
     pyramid, axes = [seen], len(wrap)
     for _ in range(count - 1):
         pyramid.append(halve(pyramid[-1], wrap, axes=axes))
@@ -131,17 +131,17 @@ def analyse_colours(seen: Floats, wrap: tuple[bool, ...], radii: Sequence[int], 
 
 
 def code_colours(image: Array, labels: bool | None = None) -> Floats:
-    """Return the up to four channels, within [0, 1], that an exemplar's windows are compared by.
+    """Return up to four channels, in [0, 1], for comparing windows of an exemplar.
 
-    Transparent colours count as little as they are seen. Classes become corners of a cube, all equally far apart or
-    nearly so; more than four channels become their four principal components.
+    Colours count in proportion to their opacity. Classes become corners of a cube, which are all equally far apart or
+    nearly so. If there are more than four channels, the four principal components are used.
     """
     if are_labels(image, labels):
         values, index = np.unique(image[..., 0], return_inverse=True)
         if len(values) > 4096:
-            raise InvalidInput(f"labels: up to 4096 classes are allowed, got {len(values)}")
+            raise InvalidInput(f"labels: must have at most 4096 classes, got {len(values)}")
         if len(values) == 2:
-            code = np.array([[0], [1]], np.float32)  # A second channel would say the same again.
+            code = np.array([[0], [1]], np.float32)  # A second channel would contain the same values.
         elif len(values) <= 4:
             code = np.eye(len(values), dtype=np.float32)
         else:
@@ -165,13 +165,15 @@ def code_colours(image: Array, labels: bool | None = None) -> Floats:
 
 
 def are_labels(image: Array, labels: bool | None = None) -> bool:
-    """Return whether an exemplar's values are classes: as said, or integers or bool of one channel, with 2 to 16 values.
+    """Return whether an exemplar contains classes instead of ordered values.
 
-    Between so few values interpolation would invent others.
+    By default this holds for one channel of integers or bool with 2 to 16 values.
+
+    With so few values, interpolation would produce values that are not classes.
     """
     if labels is not None:
         if as_bool(labels, "labels") and image.shape[-1] != 1:
-            raise InvalidInput(f"labels: classes need one channel, got {image.shape[-1]}")
+            raise InvalidInput(f"labels: must have one channel, got {image.shape[-1]}")
         return labels
     if image.dtype.kind not in "bui" or image.shape[-1] != 1:
         return False
@@ -179,10 +181,10 @@ def are_labels(image: Array, labels: bool | None = None) -> bool:
 
 
 def measure_repeat(exemplar: object, *, axes: int, levels: int = 1) -> tuple[bool, ...]:
-    """Return along which axes an exemplar repeats, by what lies across its ends.
+    """Return the axes along which an exemplar is periodic, by comparing its opposite ends.
 
-    The ends of an axis must differ no more than neighbouring samples within it, by a quarter, at every level of the
-    pyramid; and its length must be a multiple of what a sample of the coarsest level spans.
+    The ends of a periodic axis differ by at most 25 % more than neighbouring samples within it, at every level of the
+    pyramid. Its length must also be a multiple of the span of a sample of the coarsest level.
 
     Examples
     --------

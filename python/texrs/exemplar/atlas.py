@@ -1,8 +1,8 @@
-"""An atlas: copies of an exemplar in several sizes, side by side in one array, analysed at every resolution.
+"""Build an atlas: copies of an exemplar in several sizes in one array, analysed at every resolution.
 
-Where an exemplar's elements have many sizes, little of it has the one that is wanted at a point. Copies of it,
-enlarged and reduced, add to that: each has the scale map of its own. Windows that leave a copy, or touch what must
-not be copied, are barred.
+If the elements of an exemplar have many sizes, only a small part of it has the scale that is needed at a point.
+Enlarged and reduced copies provide more such parts. Each copy has its own scale map. Windows that cross the border of
+a copy, or touch an area that must not be copied, are barred.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
 __all__ = ["LARGEST", "RADIUS", "SMALLEST", "Atlas", "AtlasLevel", "Copy", "code_logs", "extend_sizes"]
 
 RADIUS = 2
-"""Of a window."""
+"""Radius of a window, in samples."""
 NAT = 512
-"""Units of a scale's natural logarithm in the 12 bits of a demand."""
+"""Number of units per nat of scale in the 12 bits of a demand."""
 STEP = 1.25
-"""From one size of a copy to the next."""
+"""Ratio between successive sizes of copies."""
 SMALLEST, LARGEST = 1 / 8, 4.0
-"""Sizes that copies may have."""
+"""Minimum and maximum size of a copy."""
 BARRED = 2047
-"""What a barred sample shows in the fourth value of a demand, and no output asks for."""
+"""Fourth value of a demand at a barred sample. No output requests it."""
 RESIZED = 0.1
-"""What it costs to be taken from a copy of another size, as a share of what a scale costs that is as far off."""
+"""Cost of taking a sample from a resized copy, relative to the cost of a scale error of the same ratio."""
 BAND = 1 << 15
-"""Places that are located at once."""
+"""Number of places that are located at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +50,11 @@ class Copy:
     Attributes
     ----------
     factor : (float, float)
-        Samples of the copy for one of the exemplar, along rows and columns.
+        Samples of the copy per sample of the exemplar, along rows and columns.
     first : (int, int)
-        First sample of the exemplar.
+        First sample of the part in the exemplar.
     origin, shape : (int, int)
-        Where in the atlas it lies.
+        Position and size of the copy in the atlas.
     """
 
     factor: tuple[float, float]
@@ -64,7 +64,7 @@ class Copy:
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """Where in the atlas it lies."""
+        """Position of the copy in the atlas, as slices."""
         (top, left), (rows, columns) = self.origin, self.shape
         return slice(top, top + rows), slice(left, left + columns)
 
@@ -76,11 +76,12 @@ class AtlasLevel:
     Attributes
     ----------
     appearance : Appearance
-        Its windows.
+        Appearance vectors of the windows.
     values : (samples * 4) int16
-        The logarithm of each sample's scale, and of its copy's size; nothing; whether it is barred.
+        Four values per sample: the logarithm of its scale, the logarithm of the size of its copy, 0, and 0 or
+        `BARRED`.
     order : (any) uint32
-        The samples that are not barred, by their scale.
+        Samples that are not barred, sorted by scale.
 
     """
 
@@ -96,11 +97,11 @@ class Atlas:
     Attributes
     ----------
     shape : (int, int)
-        Of the exemplar.
+        Sides of the exemplar.
     copies : tuple of Copy
-        Where each lies; the first is the exemplar as it is.
+        The copies. The first is the exemplar in its own size.
     levels : tuple of AtlasLevel
-        From the coarsest on.
+        Levels, from the coarsest on.
 
     """
 
@@ -124,17 +125,17 @@ class Atlas:
         Parameters
         ----------
         colours : (H, W, C) float32
-            What decisions are made on (`texrs.Exemplar.guidance`).
+            Channels that guide decisions (`texrs.Exemplar.guidance`).
         scale : (H, W) float32, optional
-            Its scale map; None where sizes do not count.
+            Scale map of the exemplar. None if sizes are ignored.
         sizes : sequence of float
-            Of the copies, 1 for the exemplar as it is, which comes first.
+            Sizes of the copies. The first is 1, the exemplar in its own size.
         levels : int
-            How many resolutions.
+            Number of resolutions.
         wanted : (float, float), optional
-            Least and largest scale that is asked for: of other copies than the first only what has them is kept.
+            Minimum and maximum requested scale. Other copies than the first keep only the parts with such scales.
         known : (H, W) bool, optional
-            What may be copied; None is all.
+            Samples that may be copied. Default: all.
         """
         shape, block = (colours.shape[0], colours.shape[1]), 1 << (levels - 1)
         logs = np.zeros(shape, np.float32) if scale is None else log_single(scale)
@@ -161,11 +162,14 @@ class Atlas:
 
     @property
     def usable(self) -> bool:
-        """Whether there is anything to copy from at every level."""
+        """True if every level has samples to copy from."""
         return all(level.order.size for level in self.levels)
 
     def locate(self, places: NDArray[np.int32]) -> tuple[NDArray[np.uint32], Floats]:
-        """Return the copy, and the place in the exemplar, of places in the atlas, in units of 1/4096 of a sample."""
+        """Return the copy and the position in the exemplar of places in the atlas.
+
+        Positions are in units of 1/4096 of a sample.
+        """
         sample = places.reshape(-1, 2)
         which, found = np.zeros(len(sample), np.uint32), np.empty((len(sample), 2), np.float32)
         owner = np.zeros([n + 1 for n in self.levels[-1].appearance.shape], np.uint32)
@@ -184,7 +188,7 @@ class Atlas:
         return which, found
 
     def source(self, places: NDArray[np.int32], shape: tuple[int, ...]) -> SourceMap:
-        """Return the source map of places: labels tell the copies, frames their sizes."""
+        """Return the source map of places. Its labels identify the copies, its Jacobians contain their sizes."""
         which, at = self.locate(places)
         inverse = np.array([np.diag([1 / f for f in c.factor]) for c in self.copies], np.float32)
         frame = inverse if len(self.copies) > 1 else None
@@ -192,9 +196,9 @@ class Atlas:
 
 
 def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float]) -> tuple[float, ...]:
-    """Return sizes of copies with more of them added until they reach the least and the largest scale that is wanted."""
+    """Return sizes of copies, extended until they reach the minimum and maximum requested scale."""
     found = list(sizes)
-    # What is wanted at the ends should not hang on the ends of the exemplar alone.
+    # Use quantiles: requested scales at the ends should not depend only on the extremes of the exemplar.
     low, high = np.quantile(scale, [0.3, 0.7])
     while wanted[1] > max(found) * high and max(found) * STEP <= LARGEST:
         found.append(max(found) * STEP)
@@ -206,7 +210,10 @@ def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, flo
 def find_box(
     logs: Floats, factor: float, wanted: tuple[float, float] | None, least: int
 ) -> tuple[int, int, int, int] | None:
-    """Return the part of the exemplar that has wanted scales when resized: rows from, to, columns from, to."""
+    """Return the part of the exemplar that has requested scales when resized.
+
+    The part is (first row, end row, first column, end column).
+    """
     rows, columns = logs.shape
     if wanted is None or factor == 1.0:
         return 0, rows, 0, columns
@@ -228,7 +235,7 @@ def find_box(
 
 
 def pack(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block: int, gap: int = 0) -> tuple[Copy, ...]:
-    """Lay copies on shelves, the highest first, at least a gap apart; the order of the copies stays."""
+    """Place copies on shelves, the highest first, with a minimum gap. The order of the copies stays."""
     sizes = []
     for factor, box in parts:
         assert box is not None
@@ -250,13 +257,16 @@ def pack(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block:
 
 
 def measure(copies: Sequence[Copy], block: int) -> tuple[int, int]:
-    """Return the rows and columns that copies take, in whole blocks."""
+    """Return the number of rows and columns that copies take, in whole blocks."""
     ends = [[-(-(o + n) // block) * block for o, n in zip(c.origin, c.shape, strict=True)] for c in copies]
     return max(e[0] for e in ends), max(e[1] for e in ends)
 
 
 def fill_gaps(packed: Array, copies: Sequence[Copy], block: int) -> None:
-    """Fill what no copy covers with colours of the first: what is constant would count as texture."""
+    """Fill the gaps between copies with colours of the first copy.
+
+    A constant colour would count as texture.
+    """
     empty = np.ones(packed.shape[:2], bool)
     for copy in copies:
         (top, left), (rows, columns) = copy.origin, copy.shape
@@ -268,7 +278,10 @@ def fill_gaps(packed: Array, copies: Sequence[Copy], block: int) -> None:
 
 
 def resampling_matrix(n: int, m: int) -> csr_array:
-    """Return the matrix that resamples n samples to m by cubic convolution, widened where that reduces them."""
+    """Return the matrix that resamples n samples to m by cubic convolution.
+
+    The kernel is widened if m is smaller than n.
+    """
     from scipy.sparse import csr_array
 
     stretch = max(1.0, n / m)
@@ -278,7 +291,7 @@ def resampling_matrix(n: int, m: int) -> csr_array:
     x = np.abs(taps - centre[:, np.newaxis]) / stretch
     weight = np.where(x < 1, (1.5 * x - 2.5) * x * x + 1, np.where(x < 2, ((-0.5 * x + 2.5) * x - 4) * x + 2, 0.0))
     weight /= weight.sum(axis=1, keepdims=True)
-    # What lies beyond the ends is the last sample.
+    # Positions outside the ends use the last sample.
     column = np.clip(taps, 0, n - 1).astype(np.intp)
     row = np.broadcast_to(np.arange(m)[:, np.newaxis], column.shape)
     return csr_array((weight.ravel().astype(np.float32), (row.ravel(), column.ravel())), shape=(m, n))
@@ -299,7 +312,7 @@ def resize(colours: Floats, copy: Copy) -> Floats:
 
 
 def pick_known(known: Bools, copy: Copy) -> Bools:
-    """Return which samples of a copy are made of known ones alone."""
+    """Return which samples of a copy are computed from known samples only."""
     from scipy import ndimage
 
     reach = [2 * max(1.0, 1 / f) for f in copy.factor]
@@ -316,18 +329,18 @@ def pick_known(known: Bools, copy: Copy) -> Bools:
 def code_values(
     copies: Sequence[Copy], logs: Floats, free: Bools, shape: tuple[int, ...], spacing: int
 ) -> NDArray[np.int16]:
-    """Return what a demand compares at the samples of a level."""
+    """Return the values that a demand compares at the samples of a level."""
     from scipy import ndimage
 
     values = np.zeros((*shape, 4), np.int16)
     values[..., 3] = BARRED
-    # A sample of the level is made of those that it stands for and one more step on each side.
+    # A sample of the level is computed from a block of samples and one more step on each side.
     blocks = free[: shape[0] * spacing, : shape[1] * spacing].reshape(shape[0], spacing, shape[1], spacing)
     whole: Bools = np.asarray(blocks.all(axis=(1, 3)))
     for copy in copies:
         (top, left), (rows, columns) = ([n // spacing for n in pair] for pair in (copy.origin, copy.shape))
         here = (slice(top, top + rows), slice(left, left + columns))
-        # Windows inside the copy, of known samples alone.
+        # Allow only windows that are inside the copy and contain only known samples.
         reach = 2 * RADIUS + 1
         inside = ndimage.minimum_filter(whole[here].astype(np.uint8), reach, mode="constant", cval=0)
         values[here][..., 3] = np.where(inside > 0, 0, BARRED)
@@ -343,7 +356,7 @@ def code_values(
 
 
 def sort_by_scale(values: NDArray[np.int16]) -> NDArray[np.uint32]:
-    """Return the samples that are not barred, by their scale."""
+    """Return the samples that are not barred, sorted by scale."""
     scale, barred = values[0::4], values[3::4] > 0
     if barred.all():
         return np.zeros(0, np.uint32)
@@ -352,5 +365,5 @@ def sort_by_scale(values: NDArray[np.int16]) -> NDArray[np.uint32]:
 
 
 def code_logs(logs: Array) -> NDArray[np.int16]:
-    """Return the logarithms of scales in the 12 bits of a demand."""
+    """Return logarithms of scales in the 12 bits of a demand."""
     return np.asarray(np.clip(np.rint(logs * NAT), -2048, 2047), np.int16)

@@ -1,7 +1,8 @@
-"""Which of an exemplar's layers is the background, and which further layers hold elements.
+"""Choose the background among the layers of an exemplar, and the layers that contain elements.
 
-Each layer is tried as the background, and the one that leaves the most convincing elements is taken. Layers are added as long
-as they find more elements of the same size, and so is what is smooth on a ground of fine grain.
+Each layer is tried as the background, and the one that leaves the most convincing elements is used. Layers are added
+as long as they yield more elements of the same size. Smooth areas on a background of fine grain are added in the same
+way.
 """
 
 from __future__ import annotations
@@ -20,19 +21,27 @@ from texrs.exemplar.layers import Regions, mark_smooth
 __all__ = ["USUAL_LAYERS", "Features", "find_foreground"]
 
 LEAST_COVERED, LARGEST, SPREAD = 0.05, 0.25, 1.6
-"""Elements cover at least this share of the image, each at most this one, and their areas vary by at most so many means."""
+"""Minimum share of the image that elements cover; maximum share for one element; maximum ratio of the standard
+deviation of areas to their mean.
+"""
 WHOLE, INSIDE, OUTSIDE, HEAP = 0.79, 1.6, 1.5, 0.6
-"""Least solidity; least contrast across outlines over that inside; over that of the background, unless they lie in a heap,
-which covers at least this share of the image and has a background of gaps."""
+"""Minimum solidity; minimum ratio of the contrast across outlines to the contrast inside; minimum ratio to the
+contrast of the background.
+
+The last is not required for a heap, whose elements cover at least `HEAP` of the image and whose background is gaps.
+"""
 CONVINCING = 0.83
-"""Score of elements from which on no other background is tried."""
+"""Score of elements that ends the search for a background."""
 USUAL_LAYERS, MOST_LAYERS = 2, 4
-"""Layers by default, and at most unless asked for."""
+"""Default number of layers, and maximum number of layers that are chosen automatically."""
 APART, CLEARLY, SAME_SIZE = 0.45, 1.15, 0.6
-"""Share of the image that elements which lie apart cover at most; how many times more of it further layers must bring; least
-ratio of median areas of elements that are of the same size."""
+"""Maximum coverage of separate elements.
+
+Minimum factor of increase in coverage that justifies further layers. Minimum ratio of median areas of elements of the
+same size.
+"""
 SMOOTH_GROUND = 0.6
-"""Share of the ground that may be smooth where the ground is taken to be of fine grain."""
+"""Maximum share of smooth pixels in a background of fine grain."""
 
 
 def find_foreground(
@@ -43,20 +52,20 @@ def find_foreground(
     Parameters
     ----------
     rgb : (H, W, 3) float32
-        The image, in [0, 1].
+        Image in [0, 1].
     regions : Regions
-        Its regions of one colour.
+        Regions of one colour in the image.
     layers : int, optional
-        Number of layers; by default as many as find its elements.
+        Number of layers. By default chosen by the elements that they yield.
     watch : callable
-        Called along the way.
+        Function that is called during the work.
 
     Returns
     -------
     layers, elements : (H, W) int32
-        The background is 0 in both.
+        Layer and element of each pixel. The background is 0 in both.
     fault : str
-        Why the elements cannot be trusted; empty if they can.
+        Reason why the elements cannot be trusted. Empty if they can.
 
     """
     features = Features.of(rgb)
@@ -72,7 +81,7 @@ def find_foreground(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """What elements are found by, beside their layers: creases and contrasts."""
+    """Creases and contrasts, which serve to find elements in layers."""
 
     crease: Floats
     contrast: Floats
@@ -84,15 +93,15 @@ class Features:
         return cls(measure_creases(lab), measure_contrast(lab))
 
     def find(self, layers: Labels) -> tuple[Labels, Evidence]:
-        """Find the elements of the layers above 0, and what speaks for them."""
+        """Find the elements of the layers above 0, and the evidence for them."""
         found = find_elements(layers, self.crease)
         return found, weigh_evidence(found, self.crease, self.contrast)
 
 
 def choose_background(layers: Labels, features: Features, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
-    """Take as the background the layer that leaves the most convincing elements; put it first.
+    """Move the layer that leaves the most convincing elements to the front, as the background.
 
-    Returns the layers, the elements and why they cannot be trusted, which is empty if they can.
+    Returns the layers, the elements, and the reason why the elements cannot be trusted (empty if they can).
     """
     best: tuple[float, Labels, Labels, str] | None = None
     for background in range(int(layers.max()) + 1):
@@ -113,9 +122,9 @@ def choose_background(layers: Labels, features: Features, watch: Callable[[], ob
 def add_layers(
     regions: Regions, features: Features, layers: Labels, elements: Labels, fault: str, watch: Callable[[], object]
 ) -> tuple[Labels, Labels, str]:
-    """Add layers as long as they find clearly more elements of the same size, which lie apart.
+    """Add layers while they yield clearly more separate elements of the same size.
 
-    Two layers see the light stones on a dark ground, and not those that are as dark as the ground.
+    Two layers find the light stones on a dark background, but not the stones that are as dark as the background.
     """
     for count in range(USUAL_LAYERS + 1, MOST_LAYERS + 1):
         if fault or (elements > 0).mean() > APART:
@@ -130,9 +139,12 @@ def add_layers(
 
 
 def add_smooth(rgb: Floats, features: Features, layers: Labels, elements: Labels) -> tuple[Labels, Labels] | None:
-    """Add what is smooth on a ground of fine grain, as stones as dark as their sand; None where that is not clearly more."""
+    """Add smooth areas on a background of fine grain, such as stones as dark as their sand.
+
+    Returns None if this does not yield clearly more elements.
+    """
     smooth = mark_smooth(rgb)
-    # Where there is no grain at all, only outlines are not smooth.
+    # In an image without grain, everything except outlines is smooth.
     if smooth is None or smooth[layers == 0].mean() > SMOOTH_GROUND:
         return None
     more = (smooth | (layers > 0)).astype(np.int32)
@@ -143,7 +155,7 @@ def add_smooth(rgb: Floats, features: Features, layers: Labels, elements: Labels
 
 
 def find_fault(evidence: Evidence) -> str:
-    """Return why elements cannot be trusted; empty if they can."""
+    """Return the reason why elements cannot be trusted. Empty if they can."""
     e = evidence
     if e.covered < LEAST_COVERED:
         return f"elements cover {e.covered:.0%} of the image, less than {LEAST_COVERED:.0%}"

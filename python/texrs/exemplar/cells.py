@@ -1,9 +1,9 @@
-"""Cells of a connected texture: bricks between mortar, stones between gaps, the cells of a comb, scales.
+"""Find the cells of a connected texture: bricks in mortar, stones between gaps, honeycomb, scales.
 
-The joints are lines that are darker than what they part, or lighter; which, and how far apart they are, is found: each
-polarity is tried at several sizes, and the tessellation is taken whose joints are closed, whose cells are free of joints,
-solid, and of one size. Cells are first parted too often, and joined again where neither the joint between them, nor the shape
-that they have together, nor the size that others agree on speaks for two.
+Joints are lines that are darker or lighter than the cells between them. Their polarity and spacing are unknown, so
+each polarity is tried at several sizes. The best tessellation has closed joints, and cells that are free of joints,
+solid and of one size. Each tessellation starts with too many cells. Neighbours are then joined unless the joint
+between them, their common shape, or the usual size of cells supports two cells.
 """
 
 from __future__ import annotations
@@ -27,32 +27,41 @@ from texrs.exemplar.shapes import Shapes, mark_outlines, widen
 __all__ = ["Cells", "find_cells", "take_cells"]
 
 WORKING = 22.0
-"""Width of a cell, in pixels, that images are shrunk to before they are looked at."""
+"""Working width of a cell, in pixels. Images with larger cells are reduced to it."""
 SIZES, STEP = (7.0, 0.4), 1.4
-"""Widths that are tried: from so many pixels to such a share of the shorter side, and the step from one to the next."""
+"""Cell widths that are tried: minimum in pixels, maximum as a share of the shorter side, and ratio between successive
+widths.
+"""
 RADII = (0.14, 0.28)
-"""Of the closings that joints are found by, in widths of a cell."""
+"""Radii of the closings that detect joints, in cell widths."""
 JOINT = 82.0
-"""Percentile of the joint strength from which on a pixel is taken for joint to begin with."""
+"""Percentile of the joint strength above which a pixel is initially a joint."""
 PARTS = 0.42
-"""Where between the 40th and the 90th percentile of the strength a joint begins to part cells."""
+"""Minimum strength of a joint that separates cells, as a position between the 40th and the 90th percentile."""
 BASIN = 0.09
-"""Least height, in widths, between two basins of the distance to joints for both to be cells."""
+"""Minimum height between two basins of the distance to joints for two cells, in cell widths."""
 FRAGMENT = 0.15
-"""Share of the usual area below which a cell is given to the neighbour with the least joint between them."""
+"""Share of the usual area below which a cell joins the neighbour with the weakest joint between them."""
 FEWEST = 4
-"""Cells without which nothing is known of their size."""
+"""Minimum number of cells for an estimate of their size."""
 NEAR = (-0.75, 0.0, 0.75)
-"""Steps from a given width that are tried."""
+"""Ratios to a given width that are tried."""
 CLEAR, SPREAD = 0.2, 0.2
-"""Widths from an outline from which on a cell should be free of joints, and the standard deviation of the logarithm of areas
-below which cells are alike."""
+"""Minimum distance from an outline, in cell widths, where a cell should be free of joints.
+
+Maximum standard deviation of the logarithm of areas of equally large cells.
+"""
 EVEN, WIDTH = 0.38, 0.04
-"""Score at which a texture is as likely to have cells as not, and what it differs by at odds of 2.7 to 1: of 19 textures with
-cells 17 lie above, of 12 without none. Chosen on these very textures."""
+"""Score of a texture that is equally likely to have cells or not, and score difference for odds of 2.7 to 1. A higher
+score was measured for 17 of 19 textures with cells, and for 0 of 12 without. The values were chosen on these
+same textures. The values were chosen on these same
+textures.
+"""
 SURE, FINE = 0.15, 0.3
-"""Widths from an outline from which on a pixel belongs to its cell also at full resolution, and how much the light of the
-full resolution says there against the strength of the joints."""
+"""Minimum distance from an outline, in cell widths, where a pixel keeps its cell at full resolution.
+
+Weight of the full-resolution lightness relative to the joint strength.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,25 +71,25 @@ class Cells:
     Attributes
     ----------
     labels : (H, W) int32
-        The cell of each pixel, from 1; joints are shared out among the cells beside them, so that no pixel is in none.
+        Cell of each pixel, from 1. Joints are divided among the adjacent cells, so that every pixel has a cell.
     outlines : (n, P, 2) float64
-        Outline of each cell, row n - 1 that of cell n: equally spaced points (row, column).
+        Outline of each cell as equally spaced points (row, column). Row n - 1 belongs to cell n.
     centre : (n, 2) float64
         Centroids of the outlines.
     area : (n,) float64
-        In squared pixels.
+        Areas in squared pixels.
     angle : (n,) float64
-        Direction of the longest axis, degrees in [0, 180) from the columns' axis towards the rows'.
+        Direction of the longest axis, in degrees in [0, 180), from the column axis towards the row axis.
     whole : (n,) bool
-        Whether no border of the image cuts the cell.
+        True if no border of the image cuts the cell.
     certain : (n,) float64
-        How sure each cell is, 0 to 1: how closed its joints are, times how free of joints it is inside.
+        Certainty of each cell, 0 to 1: closedness of its joints times absence of joints inside.
     joints : (H, W) float32
-        Joint strength: 0 inside of cells, about 1 in joints.
+        Joint strength: 0 inside cells, about 1 in joints.
     confidence : float
-        How sure the whole is, 0 to 1.
+        Certainty of the whole tessellation, 0 to 1.
     polarity : int
-        -1 where joints are darker than cells, 1 where they are lighter.
+        -1 if joints are darker than cells, 1 if they are lighter.
 
     """
 
@@ -99,15 +108,16 @@ class Cells:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of cells."""
         return len(self.area)
 
     @property
     def size(self) -> float:
-        """Side of a square of the median cell's area, in pixels.
+        """Side of a square with the median area of cells, in pixels.
 
-        Of whole cells, each weighed by how seldom a cell of its height and width lies whole in such a picture (Miles and
-        Lantuéjoul): borders cut large cells more often than small ones. Where too few are whole, of the larger half.
+        Only whole cells count. Borders cut large cells more often. Each cell is therefore weighted by the inverse
+        probability that a cell of its size is whole in the image (Miles and Lantuéjoul). If too few cells are whole,
+        the median of the larger half is used.
         """
         if np.count_nonzero(self.whole) < FEWEST:
             return float(np.sqrt(np.quantile(self.area, 0.75)))
@@ -120,12 +130,12 @@ class Cells:
 
     @property
     def joint_width(self) -> float:
-        """Usual width of a joint in pixels: the area of all, over the length of all outlines."""
+        """Usual width of a joint, in pixels: total area of joints divided by total outline length."""
         return 2 * float((self.joints > 0.5).sum()) / max(int(mark_outlines(self.labels).sum()), 1)
 
 
 class _Tessellation(NamedTuple):
-    """Cells at one size and polarity, at the resolution that they were looked for at."""
+    """Cells for one size and polarity, at the working resolution."""
 
     labels: Labels
     relief: Floats
@@ -144,23 +154,23 @@ def find_cells(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        The texture, sides of at least 16; any dtype.
+        Texture with sides of at least 16, of any dtype.
     size : float, optional
-        About how wide a cell is across its shorter axis, in pixels; found by default.
+        Approximate width of a cell across its shorter axis, in pixels. Default: estimated.
     joints : (H, W) array of bool, optional
-        What is known of the joints: one more tessellation that is tried.
+        Mask of known joints. It provides one more tessellation to choose from.
     progress : callable, optional
-        Called as ``progress("cells", share)``; raising stops the work.
+        Function that is called as ``progress("cells", share)``. An exception from it stops the work.
 
     Returns
     -------
     Cells
-        The best that was found; its confidence says whether there are any.
+        The best tessellation. Its confidence is low if the texture probably has no cells.
 
     Raises
     ------
     InvalidInput
-        An argument of another type, shape or range.
+        An argument has another type, shape or range.
 
     Examples
     --------
@@ -178,7 +188,7 @@ def find_cells(
     if joints is not None:
         joints = np.asarray(joints)
         if joints.shape != light.shape or joints.dtype != np.bool_:
-            raise InvalidInput(f"joints: needs bool of shape {light.shape}, got {joints.dtype} {joints.shape}")
+            raise InvalidInput(f"joints: must be bool of shape {light.shape}, got {joints.dtype} {joints.shape}")
     sizes = _list_sizes(light.shape)
     if size is not None:
         about = as_float(size, "size", 3, max(light.shape))
@@ -192,25 +202,25 @@ def find_cells(
         watch("cells", done / len(trials))
         found = trial()
         best = found if best is None or found.score > best.score else best
-    assert best is not None  # a size is always tried
+    assert best is not None  # at least one size is tried
     return _measure(best, light)
 
 
 def take_cells(labels: Labels, image: object) -> Cells:
-    """Take cells that are known, whatever a picture looks like.
+    """Make `Cells` from known cells, independent of the colours.
 
     Parameters
     ----------
     labels : (H, W) array of int
-        The cell of each pixel, from 1, without gaps in the numbers; 0 in joints, which the cells beside them share. Where
-        cells lie side by side their outlines are the joints.
+        Cell of each pixel, from 1, with consecutive numbers; 0 in joints, which the adjacent cells share. If cells
+        touch, their outlines are the joints.
     image : (H, W) or (H, W, C) array
-        The texture, whose joints are darker or lighter.
+        Texture, which decides whether joints are darker or lighter.
 
     Returns
     -------
     Cells
-        Of the confidence 1, each certain.
+        The cells, with confidence 1 and each certain.
 
     Examples
     --------
@@ -235,7 +245,10 @@ def take_cells(labels: Labels, image: object) -> Cells:
 
 
 def _project(lab: Floats, joints: Bools) -> Floats:
-    """Return the combination of the colours that tells joints best from the rest (Fisher), higher in joints."""
+    """Return the linear combination of colours that separates joints best (Fisher).
+
+    It is higher in joints.
+    """
     inside, outside = lab[joints].astype(np.float64), lab[~joints].astype(np.float64)
     within = (np.cov(inside.T, bias=True) * len(inside) + np.cov(outside.T, bias=True) * len(outside)) / lab[
         ..., 0
@@ -254,7 +267,7 @@ def _list_sizes(shape: tuple[int, ...]) -> list[float]:
 
 
 def _tessellate(light: Floats, size: float, polarity: int) -> _Tessellation:
-    """Find the cells of about one width, parted by joints that are dark (-1) or light (1)."""
+    """Find cells of about one width between joints that are dark (-1) or light (1)."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter, label
     from skimage.morphology import h_minima
     from skimage.segmentation import watershed
@@ -276,7 +289,7 @@ def _tessellate(light: Floats, size: float, polarity: int) -> _Tessellation:
 
 
 def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
-    """Take the pieces between joints that are known for cells; these share the joints."""
+    """Use the connected areas between known joints as cells, which share the joints."""
     from scipy.ndimage import distance_transform_edt, label
     from skimage.segmentation import watershed
 
@@ -287,7 +300,7 @@ def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
     _, pieces = np.unique(pieces, return_inverse=True)
     away = distance_transform_edt(pieces == 0)
     labels = watershed(away, pieces.reshape(joints.shape)).astype(np.int32)
-    # What is said to be joint must look like it too: masks are often made by colours alone.
+    # A known joint must also look like one, because masks are often made only from colours.
     width = float(np.sqrt(usual))
     shrink = min(1.0, WORKING / width)
     relief = _measure_relief(-_shrink(seen, shrink), width * shrink)
@@ -295,7 +308,7 @@ def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
 
 
 def _find_threshold(relief: Floats) -> float:
-    """Return twice the strength from which on a joint parts cells."""
+    """Return twice the minimum strength of a joint that separates cells."""
     low, high = np.percentile(relief, (40, 90))
     return max(2 * float(low + PARTS * (high - low)), 1e-6)
 
@@ -314,7 +327,10 @@ def _resize(values: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 def _measure_relief(light: Floats, width: float) -> Floats:
-    """Return how strongly each pixel looks like a dark joint: what closings fill, and how dark it is among its surroundings."""
+    """Return how strongly each pixel looks like a dark joint.
+
+    The strength adds the fill of closings to the darkness of a pixel relative to its surroundings.
+    """
     from scipy.ndimage import gaussian_filter, grey_closing
     from skimage.morphology import disk
 
@@ -330,13 +346,13 @@ def _measure_relief(light: Floats, width: float) -> Floats:
 
 
 def _judge(labels: Labels, relief: Floats, width: float, polarity: int) -> _Tessellation:
-    """Weigh how closed the joints of each cell are, how free of joints it is inside, and how alike all are."""
+    """Score a tessellation by closed joints, cells free of joints, solidity and equal areas."""
     from scipy.ndimage import distance_transform_edt
 
     count = int(labels.max())
     outline = mark_outlines(labels)
     ridge = widen(relief) > 0.5
-    # Beyond what lines drawn at random would meet.
+    # Subtract the share of the outline that random lines would meet.
     chance = min(0.9, float(ridge.mean()))
     closed = np.clip((_average(ridge, labels, outline, count) - chance) / (1 - chance), 0, 1)
     clean = 1 - _average(relief > 0.5, labels, distance_transform_edt(~outline) > CLEAR * width, count)
@@ -352,7 +368,7 @@ def _judge(labels: Labels, relief: Floats, width: float, polarity: int) -> _Tess
 
 
 def _average(values: Array, labels: Labels, where: Bools, count: int) -> NDArray[np.float64]:
-    """Return the mean of values at some pixels of each label; 0 where a label has none."""
+    """Return the mean of values over some pixels of each label. 0 if a label has none."""
     chosen = labels[where]
     number = np.bincount(chosen, minlength=count + 1)[1:]
     return np.asarray(np.bincount(chosen, values[where], count + 1)[1:] / np.maximum(number, 1))
@@ -374,7 +390,7 @@ def _mark_whole(labels: Labels) -> Bools:
 
 
 def _measure(found: _Tessellation, light: Floats) -> Cells:
-    """Draw the cells at full resolution, and measure them."""
+    """Draw the cells at full resolution and measure them."""
     labels, relief = (found.labels, found.relief) if found.labels.shape == light.shape else _enlarge(found, light)
     outlines = trace(labels, np.arange(1, int(labels.max()) + 1))
     moments = measure_moments(outlines)
@@ -393,19 +409,22 @@ def _measure(found: _Tessellation, light: Floats) -> Cells:
 
 
 def _compare(light: Floats, relief: Floats) -> int:
-    """Return whether joints are darker than what lies beside them, -1, or lighter, 1."""
+    """Return -1 if joints are darker than the other pixels, or 1 if they are lighter."""
     joint = relief > 0.5
     return 1 if joint.any() and not joint.all() and light[joint].mean() > light[~joint].mean() else -1
 
 
 def _enlarge(found: _Tessellation, light: Floats) -> tuple[Labels, Floats]:
-    """Return the labels at full resolution, their borders on the ridges of the joints there, and the joints' strength."""
+    """Return the labels and the joint strength at full resolution.
+
+    The borders of labels follow the ridges of the joints.
+    """
     from scipy.ndimage import distance_transform_edt, gaussian_filter
     from skimage.segmentation import watershed
 
     depth = distance_transform_edt(~mark_outlines(found.labels))
     seeds = np.where(depth > SURE * found.width, found.labels, 0)
-    # Every cell keeps a seed: its deepest pixels, where it is narrow.
+    # Every cell keeps a seed: a narrow cell keeps its deepest pixels.
     peak = np.zeros(int(found.labels.max()) + 1)
     np.maximum.at(peak, found.labels.ravel(), depth.ravel())
     seeds = np.where(depth >= 0.7 * peak[found.labels], found.labels, seeds)

@@ -1,4 +1,4 @@
-"""Outlines of labelled sets of pixels as closed polygons of equally many points, and what can be read off them."""
+"""Trace outlines of labels as closed polygons of equally many points, and measure them."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ __all__ = ["POINTS", "Moments", "measure_moments", "measure_profiles", "paint", 
 Polygons = NDArray[np.float64]
 
 POINTS = 48
-"""Of an outline."""
+"""Number of points of an outline."""
 SMOOTH = 1.0
-"""Standard deviation, in pixels, of the Gaussian that rounds the steps of pixels off."""
+"""Standard deviation of the Gaussian that smooths the steps of pixels, in pixels."""
 
 
 class Moments(NamedTuple):
-    """What polygons are like as areas.
+    """Areas, centroids, directions and elongations of polygons.
 
     Attributes
     ----------
     area : (n,) float64
-        In squared pixels.
+        Areas in squared pixels.
     centre : (n, 2) float64
         Centroids, (row, column).
     angle : (n,) float64
-        Direction of the longest axis, in degrees from the columns' axis towards the rows', in [0, 180).
+        Direction of the longest axis, in degrees in [0, 180), from the column axis towards the row axis.
     aspect : (n,) float64
-        Longest over shortest axis of the ellipse of the same second moments, 1 at least.
+        Ratio of the longest to the shortest axis of the ellipse with the same second moments, at least 1.
 
     """
 
@@ -47,18 +47,18 @@ def trace(labels: Labels, numbers: NDArray[np.integer], *, smooth: float = SMOOT
     Parameters
     ----------
     labels : (H, W) int32
-        The labels; what lies beyond the image belongs to none.
+        Label image. Pixels outside the image belong to no label.
     numbers : (n,) int
-        Which labels are traced. Each must be there.
+        Labels to trace. Each must exist.
     smooth : float
-        Standard deviation of the Gaussian, in pixels, under which steps of pixels are rounded off; less where a label would
-        vanish under it.
+        Standard deviation of the Gaussian that smooths the steps of pixels, in pixels. Reduced for a label that would
+        vanish.
 
     Returns
     -------
     (n, POINTS, 2) float64
-        Equally spaced points (row, column) along the longest outline of each, all in the same sense: from the rows' axis
-        towards the columns' axis.
+        Equally spaced points (row, column) along the longest outline of each label. All outlines run in the same
+        sense: from the row axis towards the column axis.
 
     Examples
     --------
@@ -91,7 +91,10 @@ def trace(labels: Labels, numbers: NDArray[np.integer], *, smooth: float = SMOOT
 
 
 def paint(polygons: Polygons, shape: tuple[int, ...]) -> Labels:
-    """Return for each pixel the polygon that it lies inside of, from 1; 0 where that is none, or several."""
+    """Return the number of the polygon that contains each pixel, from 1.
+
+    Pixels in no polygon, or in several, are 0.
+    """
     from skimage.draw import polygon
 
     labels, times = np.zeros(shape, np.int32), np.zeros(shape, np.uint8)
@@ -104,7 +107,7 @@ def paint(polygons: Polygons, shape: tuple[int, ...]) -> Labels:
 
 
 def resample(polygon: Polygons, count: int = POINTS) -> Polygons:
-    """Return so many equally spaced points along a closed polygon (n, 2)."""
+    """Return a given number of equally spaced points along a closed polygon (n, 2)."""
     closed = np.concatenate([polygon, polygon[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
     at = np.linspace(0, along[-1], count, endpoint=False)
@@ -137,7 +140,10 @@ def measure_moments(polygons: Polygons) -> Moments:
 
 
 def measure_profiles(polygons: Polygons, centres: Polygons, rays: int) -> NDArray[np.float64]:
-    """Return how far the outline lies from its centre along equally spaced rays, (n, rays); the first is the columns' axis."""
+    """Return the distance from centre to outline along equally spaced rays, (n, rays).
+
+    The first ray is the column axis.
+    """
     away = polygons - centres[:, None]
     turn = np.arctan2(away[..., 0], away[..., 1])
     radius = np.hypot(away[..., 0], away[..., 1])

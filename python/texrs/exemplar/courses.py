@@ -1,7 +1,7 @@
-"""Courses: the rows that a wall, a parquet or a hem is laid in, whatever their heights, and free along them.
+"""Find courses: the rows of a wall, a parquet or a hem, of any height, without vertical alignment.
 
-What lies in courses need not repeat: each has a height of its own, and what stands in it begins anywhere. What goes through
-all of it is the joints between courses, lines that are straight, alike all along, and thin.
+Elements in courses need not repeat: each course has its own height, and its elements begin anywhere. Only the joints
+between courses cross the whole image. They are straight, thin, and look the same along their length.
 """
 
 from __future__ import annotations
@@ -21,22 +21,29 @@ from texrs.source_map import SourceMap
 __all__ = ["Courses", "find_courses"]
 
 STRIPS = 24
-"""Strips across the courses that are compared."""
+"""Number of strips across the courses that are compared."""
 STEEPEST, SLOPES = 0.15, (41, 21)
-"""Steepest courses that are levelled, in rows a column, and the number of slopes tried, coarsely and then finely."""
+"""Maximum slope of courses that are levelled, in rows per column; and the numbers of slopes that are tried, first
+coarsely, then finely.
+"""
 AGREE = 0.6
-"""Share of the slopes across that all strips have in common from which on there are courses: textures without have .05 to .25,
-denim .46, walls .9."""
+"""Minimum share of the brightness gradient across courses that all strips have in common.
+
+Textures without courses have 0.05 to 0.25, denim 0.46, walls 0.9.
+"""
 CLEAR = 0.4
-"""A joint stands out by so much of what the strongest do, and in a strip by so much of what it does on the average."""
+"""Minimum strength of a joint, relative to the strongest joints; and in a strip, relative to the mean strength of the
+joint.
+"""
 THROUGH, MOST = 0.8, 0.75
-"""Share of strips that a joint goes through, and of all lines that stand out which do so."""
+"""Minimum share of strips that a joint crosses, and minimum share of prominent lines that are such joints."""
 FEWEST, LEAST = 4, 6.0
-"""Courses that make a wall, and their least height in pixels."""
+"""Minimum number of courses in a wall, and minimum height of a course in pixels."""
 GAIN = 0.15
-"""By how much places of a lattice must correlate better than others of the same course to be one of more than courses."""
+"""Minimum gain in correlation at lattice points over other places of the same course that proves a lattice.
+"""
 PARTS = 2.0**4
-"""Of a pixel to which joints are known: exact on every processor."""
+"""Number of parts of a pixel to which joints are rounded, so that they are the same on every processor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +53,11 @@ class Courses:
     Attributes
     ----------
     axis : int
-        The axis across them: 0 for level courses, 1 for upright ones.
+        Axis across the courses: 0 for level courses, 1 for upright ones.
     slope : float
-        By how many pixels along that axis they climb a pixel of the other one.
+        Slope of the courses: pixels along `axis` per pixel along the other axis.
     joints : tuple of float
-        Where they meet, in pixels along the axis, in the exemplar once it is level.
+        Joints between courses, in pixels along `axis`, in the levelled exemplar.
 
     """
 
@@ -71,19 +78,19 @@ class Courses:
         return np.diff(self.joints)
 
     def level(self, shape: tuple[int, ...]) -> SourceMap:
-        """Return the map of an exemplar of a shape that is turned so that its courses are level."""
+        """Return the source map that rotates an exemplar of a given shape until its courses are level."""
         return bend(shape, turn(self.slope, self.axis)) if self.slope else SourceMap.identity(shape)
 
 
 def turn(slope: float, axis: int) -> NDArray[np.float64]:
-    """Return the rotation of (row, column) that makes level what climbs by a slope."""
+    """Return the rotation of (row, column) that levels courses of a given slope."""
     cosine = 1 / np.hypot(1, slope)
     sine = slope * cosine * (1 if axis == 0 else -1)
     return np.rint(np.array([[cosine, -sine], [sine, cosine]]) * FRACTIONS) / FRACTIONS
 
 
 def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
-    """Find the courses of an image; none where it repeats along them, too, on a lattice."""
+    """Find the courses of an image. None if the image also repeats along them, on a lattice."""
     if min(guide.shape[:2]) < STRIPS * 2:
         return None
     light = guide.mean(axis=-1, dtype=np.float64)
@@ -101,7 +108,7 @@ def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
 
 
 def cut_strips(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the means (rows, strips) of an image in strips, and where these lie from the middle."""
+    """Return the means (rows, strips) of an image in strips, and the strips' distances from the middle."""
     from scipy.ndimage import gaussian_filter1d
 
     ends = np.linspace(0, light.shape[1], STRIPS + 1).astype(int)
@@ -110,12 +117,15 @@ def cut_strips(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
 
 
 def measure_slope(light: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the share of the slopes down an image that its strips have in common, and by how much they climb to have most."""
+    """Return the share of the row gradient that strips have in common, and the slope of courses.
+
+    The slope is the one with the largest share.
+    """
     first = max(0, light.shape[1] - WINDOW) // 2
     strips, away = cut_strips(light[:, first : first + WINDOW])
 
     def agree(slope: float) -> float:
-        # Each strip moved by whole rows and the rest of one.
+        # Move each strip by whole rows, then by a fraction of a row.
         down = slope * away
         whole = np.floor(down).astype(np.intp)
         inside = int(np.abs(whole).max()) + 1
@@ -133,18 +143,21 @@ def measure_slope(light: NDArray[np.float64]) -> tuple[float, float]:
     for count in SLOPES:
         tried = np.linspace(middle - reach, middle + reach, count)
         found = [agree(slope) for slope in tried.tolist()]
-        # Of those that agree alike, the least.
+        # Among slopes with the same share, take the smallest.
         best, _, middle = max((value, -abs(slope), slope) for value, slope in zip(found, tried.tolist(), strict=True))
         if best < AGREE / 2:
             return best, 0.0
         reach *= 2 / (count - 1)
-    # What climbs by less than half a pixel is level.
+    # Courses that climb by less than half a pixel are level.
     steep = abs(middle) * light.shape[1] > 0.5 and best > agree(0.0) + 1e-3
     return best, float(np.rint(middle * FRACTIONS) / FRACTIONS) if steep else 0.0
 
 
 def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the rows of the thin lines that go through a level image, bright or dark ones; none where few do."""
+    """Return the rows of thin lines, bright or dark, that cross a level image.
+
+    Empty if few of the prominent lines cross it.
+    """
     from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
     strips, _ = cut_strips(light)
@@ -162,7 +175,7 @@ def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
         kept = peaks[through >= THROUGH]
         if len(kept) < MOST * len(peaks):
             continue
-        # A parabola through three rows.
+        # Interpolate the peak by a parabola through three rows.
         low, high = line[kept] - line[kept - 1], line[kept] - line[kept + 1]
         joints = kept + 0.5 * (low - high) / np.maximum(low + high, 1e-9)
         joints = np.rint(joints * PARTS) / PARTS
@@ -171,7 +184,7 @@ def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
 
 
 def repeats(lattice: Lattice, courses: Courses, level: Floats) -> bool:
-    """Whether a level image correlates better with itself at the places of a lattice than elsewhere along the same courses."""
+    """Return whether a level image correlates better at lattice points than elsewhere along its courses."""
     correlation = widen(correlate(crop_light(level)), 2)
     reach = np.array(correlation.shape) // 2
     vectors = turn(courses.slope, courses.axis) @ lattice.vectors

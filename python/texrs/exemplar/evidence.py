@@ -1,4 +1,4 @@
-"""What speaks for elements being things: their outlines stand out, and they are whole, few of them large, and of one size."""
+"""Measure evidence for elements: prominent outlines, solid shapes, few large ones, similar areas."""
 
 from __future__ import annotations
 
@@ -13,13 +13,18 @@ from texrs.exemplar.shapes import mark_outlines, measure_solidity, widen
 __all__ = ["Evidence", "measure_contrast", "measure_creases", "weigh_evidence"]
 
 CREASE = 1.5
-"""Standard deviation in pixels of the Gaussian under which creases are looked for."""
+"""Standard deviation of the Gaussian for detecting creases, in pixels."""
 CONTRAST, CLEAR = 2.0, 2
-"""Standard deviation of the Gaussian under which contrasts are looked for, and how far inside is away from an outline."""
+"""Standard deviation of the Gaussian for measuring contrast, and minimum distance of inner pixels from an outline, in
+pixels.
+"""
 
 
 def measure_creases(lab: Floats) -> Floats:
-    """Return how deep a dark line each pixel lies on: the larger curvature of the lightness, where it is positive."""
+    """Return the depth of the dark line at each pixel.
+
+    The depth is the larger curvature of the lightness, where it is positive.
+    """
     from scipy.ndimage import gaussian_filter
 
     light = lab[..., 0]
@@ -30,24 +35,24 @@ def measure_creases(lab: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What speaks for elements being things."""
+    """Measures of whether found elements are convincing."""
 
     covered: float
-    """Share of the image."""
+    """Share of the image that elements cover."""
     largest: float
-    """Share of the image that the largest one covers."""
+    """Share of the image that the largest element covers."""
     spread: float
-    """Standard deviation of their areas over the mean."""
+    """Standard deviation of the areas of elements, divided by their mean."""
     solidity: float
-    """Share of their convex hulls that they fill: gaps between things fill little of theirs."""
+    """Share of their convex hulls that elements fill. Gaps between elements fill only a small share."""
     inside: float
-    """How many times stronger contrasts are, or creases deeper, along outlines than inside."""
+    """Ratio of contrast, or crease depth, along outlines to that inside elements."""
     outside: float
-    """How many times stronger contrasts are along outlines than in the background."""
+    """Ratio of contrast along outlines to that in the background."""
 
 
 def measure_contrast(lab: Floats) -> Floats:
-    """Return how much colours change at each pixel, in Lab."""
+    """Return the colour gradient at each pixel, in Lab units per pixel."""
     from scipy.ndimage import gaussian_filter
 
     square = np.zeros(lab.shape[:2], np.float32)
@@ -60,7 +65,7 @@ def measure_contrast(lab: Floats) -> Floats:
 
 
 def weigh_evidence(elements: Labels, crease: Floats, contrast: Floats) -> Evidence:
-    """Weigh elements against the image that they were found in."""
+    """Measure the evidence for elements in their image."""
     outline = mark_outlines(elements)
     far = ~widen(outline, CLEAR)
     covered = elements > 0

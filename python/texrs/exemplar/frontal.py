@@ -1,4 +1,4 @@
-"""A sheet of what is seen from the front, everywhere in one size: curved surfaces are covered with it."""
+"""Prepare a frontal view with elements of one size as a sheet for covering curved surfaces."""
 
 from __future__ import annotations
 
@@ -17,17 +17,19 @@ from texrs.exemplar.sheet import FINE, FLAT, MOST, OPEN, Copies, measure_seen, r
 __all__ = ["Frontal"]
 
 SMALLEST = 32
-"""Samples of the shorter side that are always there, if the exemplar has them."""
+"""Minimum number of samples of the shorter side, if the exemplar has them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frontal(Copies):
-    """An exemplar that is seen from the front, as it is or smaller: its patches are bent to any size, and in any way.
+    """A frontal exemplar in its own size or reduced.
+
+    Its patches are bent to any size and direction.
 
     Attributes
     ----------
     size : float
-        Of its elements.
+        Size of its elements.
 
     """
 
@@ -37,7 +39,7 @@ class Frontal(Copies):
 
     @classmethod
     def over(cls, colours: Floats, size: float, target: Floats) -> Frontal:
-        """Lay an exemplar out as finely as a target needs."""
+        """Lay out an exemplar at the resolution that a target needs."""
         shape = (colours.shape[0], colours.shape[1])
         finest = float(np.sqrt(np.prod(np.quantile(target, [FINE, 1 - FINE])))) / size
         factor = min(1.0, max(finest, SMALLEST / min(shape)), float(np.sqrt(MOST / np.prod(shape))))
@@ -53,21 +55,21 @@ class Frontal(Copies):
         )
 
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Analyse it in the size in which it is laid out."""
+        """Analyse the exemplar at its size in the sheet."""
         return find_instances(self.colours, OPEN), measure_adjacency(self.colours, OPEN)
 
     def describe(self) -> dict[str, Any]:
-        """Return its resolution."""
+        """Return the resolution."""
         return {"kind": "front", "resolution": round(float(np.sqrt(np.prod(self.copies[0].factor))), 5)}
 
     def side(self, target: Floats) -> float:
-        """Return a share of what there is: patches bend with the surface."""
+        """Return a share of the sheet's side. Patches bend with the surface."""
         return FLAT * float(np.sqrt(self.free.size))
 
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
-        """Return the Jacobians, in samples."""
+        """Return the Jacobians in samples."""
         return round_frames(jacobians * (self.size * np.array(self.copies[0].factor)[:, np.newaxis]))
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median, by the area of the exemplar that each pixel shows."""
+        """Return the median scale error, weighted by the area of the exemplar that each pixel shows."""
         return measure_seen(places, frames)

@@ -1,8 +1,8 @@
-"""Separate elements of an exemplar by their colours: what lies in a background that hangs together.
+"""Find separate elements of an exemplar by colour: areas in a connected background.
 
-The colours are a small palette, and the background is the part of it that, taken away, leaves many bounded pieces, while
-it hangs together itself. It is only taken for one where nothing speaks against it: textures without such a background
-are better cut by which colours are seen side by side (`texrs.exemplar.adjacency`).
+Colours are reduced to a small palette. The background is the connected part of the palette whose removal leaves many
+bounded areas. It is accepted only if no criterion speaks against it. Textures without such a background are better cut
+by the frequency of neighbouring colours (`texrs.exemplar.adjacency`).
 """
 
 from __future__ import annotations
@@ -22,17 +22,20 @@ from texrs.exemplar.adjacency import classify
 __all__ = ["Instances", "find_instances"]
 
 COLOURS = 6
-"""Of the palette."""
+"""Number of colours of the palette."""
 LEAST = 6
-"""Pieces, and samples of a piece, that count."""
+"""Minimum number of areas, and minimum number of samples of an area that counts."""
 LARGEST = 0.15
-"""Of all pieces, that one may have: more of it is no element."""
+"""Maximum size of an element, as a share of all areas."""
 FAIR, SHARE, COMPACT, EXPLAINED, PLAIN = 0.9, 0.65, 0.9, 0.3, 0.45
-"""What must be reached: score of the background; most of the exemplar that is not background; share of the pieces that are
-shorter than half of the exemplar; share of the variance of colours that the two explain; most variance of the background,
-as a share of all."""
+"""Criteria for accepting a background, in order.
+
+Minimum score of the background. Maximum share of the exemplar outside the background. Minimum share of elements
+shorter than half of the exemplar. Minimum share of colour variance that the division explains. Maximum variance of the
+background, as a share of the total.
+"""
 PAD = 12
-"""Samples around an exemplar that repeats, for distances: beyond this a sample is as deep inside as any."""
+"""Number of samples added around a periodic exemplar before distances are measured. Larger depths count the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,9 +45,9 @@ class Instances:
     Attributes
     ----------
     labels : uint32 array
-        Number of the element of each sample, 0 for none. Samples that two elements touch by have none.
+        Number of the element of each sample, 0 for none. Samples where two elements touch are 0.
     depth : float32 array
-        Distance of each sample to the background, 0 in it.
+        Distance of each sample to the background, 0 in the background.
 
     """
 
@@ -55,12 +58,12 @@ class Instances:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of elements."""
         return int(self.labels.max(initial=0))
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the arrays."""
+        """Size of the arrays in bytes."""
         return self.labels.nbytes + self.depth.nbytes
 
 
@@ -76,14 +79,14 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     Parameters
     ----------
     colours : (..., C) float32
-        The exemplar, of two or three axes.
+        Exemplar with two or three axes.
     wrap : one bool an axis
-        Axes along which it repeats.
+        Axes along which the exemplar is periodic.
 
     Returns
     -------
     Instances or None
-        None where no background hangs together and leaves bounded pieces.
+        None if no connected background leaves bounded areas.
 
     Examples
     --------
@@ -96,7 +99,7 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     """
     from scipy import ndimage
 
-    # A little smoother than it is: grain would tear pieces.
+    # Smooth slightly, because grain would split areas.
     modes = ["wrap" if closed else "nearest" for closed in wrap]
     smooth = np.stack([ndimage.gaussian_filter(colours[..., c], 0.7, mode=modes) for c in range(colours.shape[-1])], -1)
     palette = classify(smooth, COLOURS)
@@ -124,7 +127,10 @@ def _measure_depth(mask: Bools, wrap: Sequence[bool]) -> Floats:
 
 
 def _try_background(palette: NDArray[np.uint8], colours: list[int], wrap: Sequence[bool]) -> _Pieces:
-    """Return the pieces that are left without some colours: as they are, or apart where they touch by a sample."""
+    """Return the areas that are left without some colours.
+
+    They are taken as they are, or eroded so that areas in contact by one sample separate.
+    """
     from scipy import ndimage
 
     ask()
@@ -149,7 +155,10 @@ def _score_pieces(mask: Bools, apart: Bools, whole: float, wrap: Sequence[bool])
 
 
 def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
-    """Whether pieces are elements: few samples of all, short, and in a plain background of another colour."""
+    """Return whether areas are elements.
+
+    They must cover few samples and be short, in a plain background of another colour.
+    """
     from scipy import ndimage
 
     if pieces.score < FAIR or pieces.mask.mean() > SHARE:
@@ -173,7 +182,7 @@ def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
 
 
 def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
-    """Return the connected parts of a mask, numbered from 1, around the axes that repeat."""
+    """Return the connected parts of a mask, numbered from 1, across the periodic axes."""
     from scipy import ndimage
 
     labels, count = ndimage.label(mask)
@@ -198,7 +207,10 @@ def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
 
 
 def as_instances(classes: Array, wrap: Sequence[bool]) -> Instances | None:
-    """Return the elements of an exemplar of labels: connected parts of any class but that which hangs together most."""
+    """Return the elements of a label image: connected areas of all classes except the background.
+
+    The background is the most connected class.
+    """
     parts = {int(c): label_components(classes == c, wrap) for c in np.unique(classes)}
     largest = {c: np.bincount(p.ravel())[1:].max() / classes.size for c, p in parts.items()}
     ground = max(largest, key=lambda c: (largest[c], -c))

@@ -1,7 +1,8 @@
-"""Layers of an exemplar: regions of one colour, clustered.
+"""Divide an exemplar into layers: clusters of regions of one colour.
 
-A mean-shift filter (Comaniciu and Meer, IEEE PAMI 2002), the graph-based merge of Felzenszwalb and Huttenlocher (IJCV
-2004), and a k-means of the regions' mean colours.
+The image is first smoothed by a mean-shift filter (Comaniciu and Meer, IEEE PAMI 2002). It is then merged into regions
+by the graph-based method of Felzenszwalb and Huttenlocher (IJCV 2004). The mean colours of regions are clustered by
+k-means.
 """
 
 from __future__ import annotations
@@ -21,29 +22,34 @@ from texrs.kernels.regions import merge
 __all__ = ["Regions", "mark_smooth"]
 
 SPATIAL_RADIUS, RANGE_RADIUS = 6, 14 / 255
-"""Of the mean-shift filter: pixels, and colour units of [0, 1]."""
+"""Radii of the mean-shift filter: in pixels, and in colour units of [0, 1]."""
 MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60 / 255, 0.4, 24
-"""Of the graph-based merge: scale in colour units of [0, 1], pixels, and pixels of area."""
+"""Parameters of the graph-based merge: scale in colour units of [0, 1], blur in pixels, and minimum area in pixels."""
 
 FINE, AROUND = 1.0, 2.0
-"""Standard deviations in pixels of the Gaussians below which changes are grain, and over which its amount is averaged."""
+"""Standard deviations of two Gaussians, in pixels: finer changes count as grain, and the amount of grain is averaged
+over the second.
+"""
 TWO_KINDS = 0.75
-"""Share of the variance of the amount of grain that is between two classes, from which on there are two; a bell has 0.64."""
+"""Minimum share of the variance of the amount of grain between two classes for two kinds of area.
+
+A normal distribution has 0.64.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Regions:
-    """An image in regions of one colour."""
+    """An image divided into regions of one colour."""
 
     region: Labels
-    """(H, W): the region of each pixel, from 0."""
+    """(H, W): region of each pixel, from 0."""
     area: NDArray[np.float64]
     colour: NDArray[np.float64]
-    """(n, 3): mean CIE Lab colour of each."""
+    """(n, 3): mean CIE Lab colour of each region."""
 
     @classmethod
     def of(cls, rgb: Floats, watch: Callable[[], object] = int) -> Regions:
-        """Filter an image, and merge what is alike; ``watch`` is called along the way."""
+        """Filter an image and merge similar pixels. ``watch`` is called during the work."""
         filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS, progress=lambda stage, share: watch())
         watch()
         region = merge(filtered, MERGE_SCALE, blur=MERGE_BLUR, least=MERGE_MINIMUM)
@@ -65,7 +71,10 @@ class Regions:
 
 
 def _cluster(points: NDArray[np.float64], weight: NDArray[np.float64], count: int) -> NDArray[np.intp]:
-    """Cluster weighted points; starts at the heaviest and then the farthest ones, so it needs no randomness."""
+    """Cluster weighted points.
+
+    The centres start at the heaviest point and then at the farthest ones, so the result does not depend on chance.
+    """
     centres = points[[int(np.argmax(weight))]]
     while len(centres) < count:
         distance = ((points[:, None] - centres[None]) ** 2).sum(axis=-1).min(axis=1)
@@ -86,9 +95,11 @@ def _cluster(points: NDArray[np.float64], weight: NDArray[np.float64], count: in
 
 
 def mark_smooth(rgb: Floats) -> Bools | None:
-    """Mark what is smooth where the rest is of fine grain, as stones are on sand; None where there are no two such kinds.
+    """Mark smooth areas among fine grain, such as stones on sand.
 
-    The amount of grain is relative to the lightness: of one material in light and in shade it is the same.
+    Returns None if the image does not have both kinds.
+
+    The amount of grain is relative to the lightness, so that one material has the same amount in light and in shade.
     """
     from scipy.ndimage import gaussian_filter
     from skimage.filters import threshold_otsu
@@ -103,5 +114,5 @@ def mark_smooth(rgb: Floats) -> Bools | None:
     between = share * (1 - share) * float(amount[smooth].mean() - amount[~smooth].mean()) ** 2
     if between < TWO_KINDS * float(amount.var()):
         return None
-    # Grain is averaged beyond outlines, so what is smooth comes out smaller.
+    # The average includes grain beyond outlines, so smooth areas come out too small.
     return np.asarray(widen(smooth), bool)

@@ -1,8 +1,8 @@
-"""Parts of labelled planes joined until all that are left are parted by evidence.
+"""Join parts of labelled planes until evidence supports all separations that are left.
 
-What the evidence is, is for the caller to say: of parts of a mask it is `texrs.exemplar.components`. Here are parts of a
-tessellation, where the whole plane is parted: there is no ground whose outline could say what is solid, and a union of many
-cells is as solid as one. So size speaks too: what others agree on.
+The caller defines the evidence. `texrs.exemplar.components` defines it for parts of a mask. This module defines it for
+a tessellation, which divides the whole plane. A tessellation has no background whose outline could show what is solid,
+and a union of many cells is as solid as one cell. The usual size of cells is therefore evidence as well.
 """
 
 from __future__ import annotations
@@ -20,46 +20,53 @@ from texrs.exemplar.shapes import Shapes, list_borders
 __all__ = ["join_least_parted", "join_parts", "measure_usual_area"]
 
 Weigh: TypeAlias = Callable[[Any, Any, Any, Any], Any]
-"""What speaks for parting some pairs: from their labels, the sum of the relief along their borders, and how long these are."""
+"""Function that returns the evidence against joining pairs, from their labels, the sum of the relief along their
+borders and the border lengths.
+"""
 Join: TypeAlias = Callable[[int, int, int], object]
-"""Takes note that the second label is now the first one's, and how long the border between them was."""
+"""Function that records a join of the second label into the first, with the length of the border between them."""
 
 PARTED = 0.5
-"""Evidence below which two parts are joined: the mean strength of the joint between them, and what shape and size add."""
+"""Evidence below which two parts are joined: the mean strength of their joint plus terms for shape and size."""
 DEEP = 1.0
-"""Strength from which on a joint is no stronger: marks are strong in places, joints all along."""
+"""Maximum strength of joints.
+
+Strengths are clipped to it because marks are strong in places only, joints along their whole length.
+"""
 CONVEXITY, CONSENSUS, MOST = 1.5, 0.12, 0.25
-"""Weight of the solidity that is lost by joining two, and of the logarithm by which their union is nearer to the usual area
-than the smaller one of them; the most that the latter may say."""
+"""Weight of the solidity that is lost by joining two parts.
+
+Weight of the log ratio of the smaller part's area error to that of the union, and maximum of this term.
+"""
 HUGE = 3.0
-"""Usual areas beyond which nothing is joined any more."""
+"""Area, in usual areas, above which no parts are joined."""
 
 
 def measure_usual_area(area: NDArray[np.float64]) -> float:
-    """Return the area of the cell in which a place taken at random lies, at the median: crumbs hardly count."""
+    """Return the median area of the cell at a random place. Fragments hardly affect it."""
     order = np.sort(area)
     total = np.cumsum(order)
     return float(order[np.searchsorted(total, 0.5 * total[-1])])
 
 
 def join_parts(parts: Labels, relief: Floats, usual: float | None = None, *, least: float = 0.0) -> Labels:
-    """Join the parts of a tessellation, those with the least between them first.
+    """Join the parts of a tessellation, weakest separation first.
 
     Parameters
     ----------
     parts : (H, W) int32
-        Labels from 1, everywhere.
+        Labels from 1. Every pixel has one.
     relief : (H, W) float32
-        Strength of the joints, about 1 in them.
+        Strength of the joints, about 1 in joints.
     usual : float, optional
-        Area in pixels that cells are said to have; nothing is said of it by default.
+        Expected area of a cell in pixels. By default the area is not used as evidence.
     least : float
-        Area below which a part is joined with the neighbour that the least parts it from, whatever the evidence.
+        Area in pixels below which a part always joins the neighbour with the weakest separation.
 
     Returns
     -------
     (H, W) int32
-        Labels from 1, without gaps.
+        Labels from 1, consecutive.
 
     """
     shapes = Shapes.of(parts)
@@ -82,26 +89,27 @@ def join_parts(parts: Labels, relief: Floats, usual: float | None = None, *, lea
 
 
 def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *, below: float) -> NDArray[np.int32]:
-    """Join the labels of a plane that the least parts, again and again, until all that are left are parted by so much.
+    """Join the least separated labels of a plane until all separations reach a limit.
 
     Parameters
     ----------
     parts : (H, W) int32
-        Labels; 0 is no part, and is joined with none.
+        Labels. 0 is not a part, and is not joined.
     relief : (H, W) float32
-        What parts pixels: of two at a border the higher counts.
+        Strength of the separation at each pixel. The larger of the two values at a border counts.
     weigh : callable
-        ``weigh(one, other, total, length)``: what speaks for parting pairs of labels, from the sum of the relief along their
-        borders and how many pairs of pixels these have. Called for all pairs, then for one label and its neighbours.
+        ``weigh(one, other, total, length)`` returns the evidence against joining pairs of labels. ``total`` is the sum
+        of the relief along their border, and ``length`` is its number of pixel pairs. Called for all pairs, then for
+        one label and its neighbours.
     join : callable
-        ``join(one, other, length)``: called before the other label becomes the first.
+        ``join(one, other, length)`` is called before the other label becomes the first.
     below : float
-        What ``weigh`` must say at least for a pair to stay parted.
+        Minimum value of ``weigh`` for a pair to stay separate.
 
     Returns
     -------
     (labels,) int32
-        What each label, from 0, has become: the lowest of those that it is joined with.
+        New label of each label, from 0: the lowest label among those joined with it.
 
     """
     a, b = list_borders(parts)
@@ -119,7 +127,7 @@ def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *
         borders.setdefault(q, {})[p] = (total, length)
     into = np.arange(int(parts.max()) + 1, dtype=np.int32)
     scores = dict(zip(pairs, weigh(one, other, sums, lengths).tolist(), strict=True))
-    # Entries of pairs that were weighed anew, or are no more, stay behind and are passed over.
+    # The queue keeps outdated entries of pairs that have a new score or no longer exist. They are skipped.
     queue = [(score, pair) for pair, score in scores.items()]
     heapify(queue)
     while queue:

@@ -1,4 +1,4 @@
-"""How regular an exemplar is: the lattice that it repeats on, its directions, and whether its mirror image is like it."""
+"""Measure the regularity of an exemplar: its lattice, its directions and its mirror symmetry."""
 
 from __future__ import annotations
 
@@ -29,45 +29,50 @@ __all__ = [
 Vector = tuple[int, int]
 
 WINDOW = 512
-"""Side of the middle of an image that is looked at."""
+"""Side of the central part of an image that is analysed, in pixels."""
 REACH = 0.45
-"""Longest shift that is tried, as a share of a side: beyond it too little of the image overlaps itself."""
+"""Maximum shift, as a share of a side. For longer shifts the overlap of the image with itself is too small."""
 SHORTEST, PEAKS = 6, 8
-"""Length of the shortest period in pixels, and the number of peaks that periods are made of."""
+"""Minimum period in pixels, and number of correlation peaks that are candidates for periods."""
 REGULAR = 0.3
-"""Mean correlation on a lattice from which on it is believed; scattered things have up to 0.2."""
+"""Minimum mean correlation of an accepted lattice. Scattered elements reach 0.2."""
 DIP = 0.75
-"""A correlation falls below this share of its peak on the way to it, else it is a stripe and no period."""
+"""Maximum ratio of the smallest correlation on the way to a peak to the peak.
+
+Above it, the peak belongs to a stripe and is not a period.
+"""
 NEAR = 2
-"""Pixels around where the multiple of a period is expected, within which it is looked for."""
+"""Search distance around the expected multiple of a period, in pixels."""
 OFTEN = 64
-"""Periods are fitted anew after each of so many peaks, and after that once a ring of them."""
+"""Number of first peaks. Periods are fitted again after each of them. Later they are fitted once per ring of peaks."""
 BENT = 0.15
-"""By how much an image may be stretched or sheared for its lattice to close on a torus."""
+"""Maximum stretch or shear of an image that makes its lattice close on a torus."""
 PARTS, FRACTIONS = 2.0**8, 2.0**20
-"""Of a pixel to which periods are known, and of 1 to which matrices are: what is calculated with them is exact on every
-processor."""
+"""Numbers of parts to which periods (of a pixel) and matrices (of 1) are rounded, so that results are the same on
+every processor.
+"""
 FARTHEST = 4096.0
-"""Pixels up to which shifts are listed."""
+"""Maximum length of listed shifts, in pixels."""
 LEANS = 3.0
-"""Standard errors of a lattice that leans for one that counts: a wall that was taken a little aslant leans by up to 10."""
+"""Standard errors of a leaning lattice that count as one. A wall photographed slightly obliquely leans by up to 10."""
 FINE, BLOCKS = (0.7, 1.5), 4
-"""Standard deviations of the Gaussians under which an image is compared with its mirror image; parts of a side that its spread
-is known from."""
+"""Standard deviations of the Gaussians for comparing an image with its mirror image, and number of parts per side that
+give the standard error.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """The shifts by which an image repeats itself: all sums of multiples of two vectors.
+    """The translations that map an image to itself: all integer combinations of two vectors.
 
     Attributes
     ----------
     a, b : (int, int)
         The vectors, (row, column) in pixels.
     correlation : float
-        Mean over the lattice of the correlation of the image with itself, shifted; -1 to 1.
+        Mean autocorrelation of the image over the lattice, -1 to 1.
     exact : ((float, float), (float, float)), optional
-        The two vectors to parts of a pixel, from how far their multiples go.
+        The two vectors to a fraction of a pixel, from the positions of their multiples.
 
     Examples
     --------
@@ -80,9 +85,9 @@ class Lattice:
     a: Vector
     b: Vector
     correlation: float
-    """Mean over the lattice of the correlation of the image with itself, shifted."""
+    """Mean autocorrelation of the image over the lattice, -1 to 1."""
     exact: tuple[tuple[float, float], tuple[float, float]] | None = None
-    """The two vectors to parts of a pixel, from how far their multiples go."""
+    """The two vectors to a fraction of a pixel, from the positions of their multiples."""
 
     __repr__ = brief
 
@@ -91,26 +96,28 @@ class Lattice:
 
     @property
     def vectors(self) -> NDArray[np.float64]:
-        """The two vectors as columns, (2, 2), to parts of a pixel."""
+        """The two vectors as columns, (2, 2), to a fraction of a pixel."""
         return np.array(self.exact or (self.a, self.b), np.float64).T
 
     def shifts(self, reach: float) -> list[Vector]:
-        """Return the shifts within a distance, and those to the next places in any case; the shortest first.
+        """Return the lattice translations up to `reach`, shortest first.
+
+        The nearest neighbours are always included.
 
         Parameters
         ----------
         reach : float
-            The distance, in pixels.
+            Maximum length, in pixels.
 
         Returns
         -------
         list of (int, int)
-            Rows and columns, in pixels, each shift with its opposite.
+            Rows and columns in pixels. Each translation is included together with its opposite.
 
         Raises
         ------
         InvalidInput
-            Not a number from 0 to 4096.
+            The value is not a number from 0 to 4096.
 
         Examples
         --------
@@ -127,27 +134,28 @@ class Lattice:
         return [(int(v[0]), int(v[1])) for v in found if v @ v <= reach**2 + 0.5]
 
     def close(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> NDArray[np.float64] | None:
-        """Return the linear map of (row, column), near the identity, after which the lattice closes on a torus.
+        """Return the linear map near the identity after which the lattice closes on a torus.
 
-        Its image has the height and the width of the torus among its shifts, along the axes that wrap: without it courses
-        and joints that leave a texture on one side do not come in again on the other.
+        The map acts on (row, column). After it, the height and the width of the torus are lattice translations, along
+        the axes that wrap. Without it, courses and joints that leave a texture on one side would not continue on the
+        other side.
 
         Parameters
         ----------
         size : (rows, columns)
-            Of the torus.
+            Size of the torus.
         wrap : (bool, bool)
-            Axes along which it goes around.
+            Axes along which the torus wraps.
 
         Returns
         -------
         (2, 2) float64, or None
-            None where the lattice would have to be changed by more than `BENT`.
+            None if the lattice would have to change by more than `BENT`.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            Vectors along one line.
+            The vectors are parallel.
 
         Examples
         --------
@@ -160,17 +168,17 @@ class Lattice:
         lengths = [as_int(n, "size", 1, 2**31) for n in as_tuple(size, "size", 2, "2 integers, rows and columns")]
         cyclic = as_wrap(wrap)
         sides = np.diag(np.array(lengths, np.float64))
-        # The shift of the lattice that is nearest to each side.
+        # Find the lattice translation nearest to each side.
         nearest = np.where(cyclic, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
         if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):
             return None
-        # Without a negative zero.
+        # Adding 0 removes negative zeros.
         turned = np.rint(sides @ np.linalg.inv(nearest) * FRACTIONS) / FRACTIONS + 0.0
         return turned if np.abs(turned - np.eye(2)).max() <= BENT else None
 
 
 def find_lattice(guide: Floats) -> Lattice | None:
-    """Find the lattice that an image repeats on, by the correlation of its lightness, or of its edges, with itself."""
+    """Find the lattice of an image, by autocorrelation of its lightness or edges."""
     from scipy.ndimage import gaussian_filter
 
     if min(guide.shape[:2]) < 4 * SHORTEST:
@@ -185,26 +193,26 @@ def find_lattice(guide: Floats) -> Lattice | None:
         ask()
         found.append(_fit_lattice(correlate(picture)))
     believed = [each for each in found if each is not None and each.correlation >= REGULAR]
-    # Edges are told apart less well than colours: two of them may be half a period apart.
+    # Edges distinguish places less well than colours: two edges may be half a period apart.
     return believed[0] if believed else None
 
 
 def crop_light(guide: Floats) -> Floats:
-    """Return the lightness of the middle of an image."""
+    """Return the lightness of the central part of an image."""
     top, left = (max(0, n - WINDOW) // 2 for n in guide.shape[:2])
     light: Floats = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
     return light
 
 
 def correlate(picture: Floats) -> Floats:
-    """Correlate a picture with itself, without its slow changes; the middle is no shift at all."""
+    """Return the autocorrelation of an image without its slow changes. The centre is the zero shift."""
     from scipy.fft import irfft2, next_fast_len, rfft2
     from scipy.ndimage import gaussian_filter, uniform_filter
 
     height, width = picture.shape
     flat = gaussian_filter(picture, 1.0) - uniform_filter(picture, min(picture.shape) // 2)
     size = tuple(next_fast_len(2 * n, real=True) for n in picture.shape)
-    # In double precision: in single, transforms end in other bits on other processors.
+    # Use double precision: single-precision transforms differ in their last bits between processors.
     spectrum = rfft2(flat.astype(np.float64), size)
     product = irfft2(spectrum.real**2 + spectrum.imag**2, size)
     rows, columns = (int(REACH * n) for n in picture.shape)
@@ -216,7 +224,10 @@ def correlate(picture: Floats) -> Floats:
 
 
 def _fit_lattice(correlation: Floats) -> Lattice | None:
-    """Find the lattice of the highest mean correlation; of those nearly as high, the one of the smallest cell."""
+    """Find the lattice of the highest mean correlation.
+
+    Among lattices that are nearly as good, the one with the smallest cell is used.
+    """
     reach = np.array(correlation.shape) // 2
     tolerant = widen(correlation, 2)
     rows, columns = (np.arange(-r, r + 1) for r in reach)
@@ -245,7 +256,10 @@ def _fit_lattice(correlation: Floats) -> Lattice | None:
 
 
 def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two periods to parts of a pixel: what fits the peaks near their multiples, from the nearest ones outwards."""
+    """Return two periods to a fraction of a pixel.
+
+    They are fitted to the peaks near their multiples, from the nearest multiples outwards.
+    """
     reach = np.array(correlation.shape) // 2
     found = np.array([a, b], np.float64)
     most = int(np.hypot(*reach) * 2 / max(1.0, min(np.hypot(*a), np.hypot(*b)))) + 1
@@ -263,10 +277,10 @@ def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, flo
         at = np.unravel_index(int(near.argmax()), near.shape)
         times.append(step)
         peaks.append(expected - NEAR + at)
-        # Peaks at the end of a window lie beyond it, or nowhere.
+        # A maximum at the border of a window belongs to a peak outside it, or to none, so it has little weight.
         inside = all(0 < place < 2 * NEAR for place in at)
         weights.append(max(float(near.max()), 0.0) * (1.0 if inside else 0.01))
-        # Of many, those of a ring are expected by what is nearer.
+        # After enough peaks, fit once per ring: the nearer peaks predict all peaks of a ring.
         if len(times) > OFTEN and number == fitted:
             continue
         fitted = number
@@ -278,7 +292,7 @@ def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, flo
 
 
 def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the shortest vectors of the lattice of two (Lagrange and Gauss)."""
+    """Return the shortest vectors of the lattice of two vectors (Lagrange and Gauss)."""
     a, b = sorted((one, other), key=lambda v: int(v @ v))
     while a.any():
         b = b - round(int(a @ b) / int(a @ a)) * a
@@ -289,7 +303,7 @@ def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.
 
 
 def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reach: NDArray[np.intp]) -> float:
-    """Average over the places of a lattice; 0 for fewer than four, which prove nothing."""
+    """Return the mean over the points of a lattice. 0 for fewer than four points, which are not enough evidence."""
     most = int(np.hypot(*reach) * 2 / max(1.0, float(np.hypot(*a)))) + 1
     times = np.arange(-most, most + 1)
     places = (times[:, None, None] * a + times[:, None] * b).reshape(-1, 2)
@@ -299,7 +313,7 @@ def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reac
 
 
 def _has_dip(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]) -> bool:
-    """Whether the correlation falls on the way to a vector, and rises again."""
+    """Return whether the correlation falls and rises again on the way to a vector."""
     if (np.abs(vector) > reach).any():
         return False
     steps = int(np.abs(vector).max())
@@ -309,10 +323,11 @@ def _has_dip(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.in
 
 
 def measure_direction(guide: Floats) -> float:
-    """Return how much an image's edges agree in direction: 0 not at all, 1 wholly.
+    """Return how much the edges of an image agree in direction, from 0 (none) to 1 (all).
 
-    The larger of two measures: of one direction (the structure tensor), as in bark, and of two at right angles (its
-    like of fourth order), which cancel in the tensor, as in brickwork.
+    The result is the larger of two measures. The first measures one direction (the structure tensor), as in bark. The
+    second measures two directions at right angles (a similar tensor of fourth order), as in brickwork. Such directions
+    cancel in the structure tensor.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -328,13 +343,14 @@ def measure_direction(guide: Floats) -> float:
 
 
 def measure_polarity(guide: Floats) -> tuple[float, float, float]:
-    """Return how surely an image differs from its mirror images, in standard errors.
+    """Return how certainly an image differs from its mirror images, in standard errors.
 
-    Three values: by what a mirror along rows turns round, by what one along columns does, and by what either does and both
-    together do not. What is lit from one side grows dark slowly and bright at once, on the way along rows or along columns:
-    slopes weighed by their square, or by that of the other slope, do not sum to 0 as they do where a mirror image is as likely.
-    What is oblique has slopes whose product does not; of what has two directions at right angles, neither of them upright, its
-    like of fourth order does not.
+    The first value measures properties that a mirror along rows reverses, the second those that a mirror along columns
+    reverses. The third measures properties that either mirror reverses but both together do not. Light from one side
+    makes the image darken slowly and brighten quickly along rows or columns. Slopes weighted by their square, or by
+    the square of the other slope, then do not sum to 0. For equally likely mirror images they would. If edges are
+    oblique, the product of the slopes does not sum to 0. If edges have two oblique directions at right angles, a
+    similar product of fourth order does not.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -356,7 +372,10 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
 
 
 def _measure_oddness(odd: Floats, scale: Floats) -> float:
-    """Return the mean of values over that of a scale, in standard errors, which equal parts of the image show."""
+    """Return the mean of values, relative to a scale, in standard errors.
+
+    Equal parts of the image give the standard error.
+    """
     rows, columns = (n // BLOCKS for n in odd.shape)
     parts = [v[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns) for v in (odd, scale)]
     sums, scales = (p.sum(axis=(1, 3), dtype=np.float64).ravel() for p in parts)
@@ -365,10 +384,10 @@ def _measure_oddness(odd: Floats, scale: Floats) -> float:
 
 
 def bend(shape: tuple[int, ...], matrix: NDArray[np.float64]) -> SourceMap:
-    """Return the map of a picture that is brought to a linear image of itself, as much of it as a rectangle holds."""
+    """Return the source map of a linearly transformed image, cropped to a rectangle without gaps."""
     inverse = np.rint(np.linalg.inv(matrix) * FRACTIONS) / FRACTIONS
     half = (np.array(shape) - 1) / 2
-    # What is sheared needs room on both sides.
+    # A sheared image needs room on both sides.
     reach = np.floor(np.maximum(np.linalg.solve(np.abs(inverse), half), 8))
     away = np.stack(np.meshgrid(*(np.arange(-r, r + 1) for r in reach), indexing="ij"), axis=-1)
     places = np.clip(away @ inverse.T + half, 0, 2 * half).astype(np.float32)

@@ -1,8 +1,8 @@
 """Split an exemplar into layers, and its layers into elements.
 
-Layers: a mean-shift filter (Comaniciu and Meer, IEEE PAMI 2002), the graph-based merge of Felzenszwalb and Huttenlocher
-(IJCV 2004), and a k-means of the regions' mean colours. Elements (child layers): components of the layers above the
-background, split where they touch; where nothing speaks for them, a jittered grid of cells.
+For layers, see `texrs.exemplar.layers`: a mean-shift filter, a graph-based merge, and k-means of the mean colours of
+regions. Elements (child layers): connected components of the layers above the background, split where they touch. If
+the components are not convincing, a jittered grid of cells is used.
 """
 
 from __future__ import annotations
@@ -34,31 +34,32 @@ Kind: TypeAlias = Literal["auto", "components", "grid", "none"]
 Marks: TypeAlias = NDArray[np.integer[Any]] | NDArray[np.bool_]
 
 GRID_SHARE = 1 / 6
-"""Side of a grid cell, as a share of the exemplar's shorter side."""
+"""Side of a grid cell, as a share of the shorter side of the exemplar."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ElementOptions:
-    """How the elements of an exemplar are found.
+    """Options for finding the elements of an exemplar.
 
     Attributes
     ----------
     layers : int, optional
-        Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours. By default two, or three or
-        four where these find clearly more elements of the same size that lie apart; where the ground is of fine grain,
-        what is smooth belongs to the layer above it.
+        Number of colour layers, 1 to 16. Fewer are used if the image has fewer colours. By default two, or three or
+        four if these find clearly more separate elements of the same size. If the background has fine grain, smooth
+        areas belong to the layer above it.
     segmentation : {"auto", "components", "grid", "none"}
-        "components": connected pieces of the layers above the background. "grid": jittered cells of 1/6 of the side,
-        for images without separate elements. "none": whole layers. "auto": components, or the grid where nothing
-        speaks for them: they cover less than 5 % of the image or one more than 25 %, they are ragged, of all sizes,
-        or their outlines stand out neither from what they hold nor from what lies around them.
+        Method for finding elements. "components": connected areas of the layers above the background. "grid": jittered
+        cells of 1/6 of the side, for images without separate elements. "none": whole layers. "auto": components, or
+        the grid if components are not convincing. Components are not convincing if they cover less than 5 % of the
+        image, or one covers more than 25 %. The same holds if they are ragged or of very different sizes. They are
+        also not convincing if their outlines have no more contrast than their inside or their surroundings.
     labels : (H, W) array of int, or a list of one an exemplar, optional
-        Elements marked by hand, 0 = background. Replaces the whole segmentation.
+        Elements marked by hand, where 0 is the background. Replaces the whole segmentation.
 
     Raises
     ------
     InvalidInput
-        A field of another type or out of range; the message names it.
+        A field has another type or is out of range. The message names it.
 
     Examples
     --------
@@ -80,27 +81,27 @@ class ElementOptions:
         for marks in as_list(self.labels):
             found = try_array(0 if marks is None else marks)
             if found.dtype.kind not in "biu":
-                raise InvalidInput(f"labels: needs integers, got {found.dtype} {found.shape}")
+                raise InvalidInput(f"labels: must be integers, got {found.dtype} {found.shape}")
             if found.size and int(found.min()) < 0:
-                raise InvalidInput(f"labels: 0 is the background and elements count from 1, got {int(found.min())}")
+                raise InvalidInput(f"labels: must be 0 (background) or more, got {int(found.min())}")
 
     @property
     def key(self) -> Hashable:
-        """What tells these options from others: the labels by their content."""
+        """Key that identifies these options. Labels are identified by their content."""
         return self.layers, self.segmentation, None if self.labels is None else content_hash(np.asarray(self.labels))
 
     def select(self, number: int) -> ElementOptions:
-        """Return the options of one of several exemplars, which may each have labels of its own.
+        """Return the options for one of several exemplars, with its own labels.
 
         Parameters
         ----------
         number : int
-            Which of the exemplars, from 0.
+            Index of the exemplar, from 0.
 
         Returns
         -------
         ElementOptions
-            With its labels alone; the same where labels are not a list.
+            The options with the labels of this exemplar. Unchanged if labels are not a list.
 
         Raises
         ------
@@ -128,18 +129,17 @@ class Segmentation:
     Attributes
     ----------
     layers : (H, W) int32
-        The layer of each pixel; 0 is the background.
+        Layer of each pixel. 0 is the background.
     elements : (H, W) int32
-        The element of each pixel, from 1; 0 is the background.
+        Element of each pixel, from 1. 0 is the background.
     kind : {"components", "grid", "none", "labels"}
-        How the elements were found.
+        Method that found the elements.
     reason : str
-        Why the grid was taken when components were asked for automatically, and what keeps elements in their places;
-        empty otherwise.
+        Reason why "auto" used the grid, or why elements stay in their places. Empty otherwise.
     lattice : Lattice, optional
-        The lattice that the exemplar repeats on, if any. Elements marked by hand are free of it.
+        Lattice of the exemplar, if any. None for elements marked by hand.
     courses : Courses, optional
-        The courses that it lies in, if any, where it does not repeat along them; there is no lattice then.
+        Courses of the exemplar, if any. The exemplar does not repeat along them, so `lattice` is None in this case.
 
     Examples
     --------
@@ -166,7 +166,7 @@ class Segmentation:
 
     @property
     def nbytes(self) -> int:
-        """Memory that the arrays take."""
+        """Size of the arrays in bytes."""
         return self.layers.nbytes + self.elements.nbytes
 
     def freeze(self) -> Segmentation:
@@ -175,7 +175,7 @@ class Segmentation:
         Returns
         -------
         Segmentation
-            Itself.
+            The same object.
 
         Examples
         --------
@@ -188,22 +188,22 @@ class Segmentation:
         return self
 
     def measure_depth(self, reach: float) -> Floats:
-        """Return how deep inside an element each pixel is.
+        """Return the depth of each pixel inside its element.
 
         Parameters
         ----------
         reach : float
-            The distance from the outline, in pixels, from which on it is 1.
+            Distance from the outline where the depth becomes 1, in pixels.
 
         Returns
         -------
         (H, W) float32
-            0 at the outlines of elements and outside, 1 from ``reach`` pixels on.
+            0 outside elements and at their outlines, 1 at ``reach`` pixels and deeper.
 
         Raises
         ------
         InvalidInput
-            No distance: numbers from 1e-6 to 1e9 are allowed.
+            The distance is not a number from 1e-6 to 1e9.
 
         Examples
         --------
@@ -232,13 +232,13 @@ def segment(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        The exemplar, any dtype; the first three channels count, or the first one when there are two.
+        Exemplar of any dtype. The first three channels are used, or the first if there are two.
     options : ElementOptions
-        How elements are found.
+        Options for finding the elements.
     progress : callable or True, optional
-        Called as ``progress("segment", share)`` along the way, with a rising share; raising stops the work.
-        True shows a bar. The longest
-        step between two calls is the splitting of what touches: 1 s for 1024 x 1024 pixels, growing with these.
+        Function that is called as ``progress("segment", share)`` with a rising share. An exception from it stops the
+        work. True shows a progress bar. The longest step between two calls splits touching elements. It takes 1 s for
+        1024 x 1024 pixels, and grows with their number.
 
     Returns
     -------
@@ -248,7 +248,7 @@ def segment(
     Raises
     ------
     InvalidInput
-        An image or labels of another shape or type.
+        The image or the labels have another shape or type.
 
     Examples
     --------
@@ -288,7 +288,7 @@ def segment(
 
 
 class Steps:
-    """Reports a share that comes nearer to the whole with each call: nobody knows how many steps there will be."""
+    """Report a share that approaches 1 with each call, because the number of steps is unknown."""
 
     def __init__(self, progress: Progress | None) -> None:
         self.progress, self.left = progress, 1.0
@@ -303,17 +303,20 @@ class Steps:
 
 
 def number_marks(labels: Marks | Sequence[Marks], shape: tuple[int, int]) -> Segmentation:
-    """Return the segmentation that elements marked by hand are, numbered without gaps."""
+    """Return the segmentation given by elements marked by hand, with consecutive numbers."""
     marks = np.asarray(labels)
     if marks.shape != shape or marks.dtype.kind not in "biu":
-        raise InvalidInput(f"labels: needs integers of shape {shape}, got {marks.dtype} {marks.shape}")
+        raise InvalidInput(f"labels: must be integers of shape {shape}, got {marks.dtype} {marks.shape}")
     values, dense = np.unique(marks, return_inverse=True)
     elements = dense.reshape(shape).astype(np.int32) + np.int32(values[0] != 0)
     return Segmentation((elements > 0).astype(np.int32), elements, "labels", "")
 
 
 def draw_cells(height: int, width: int) -> Labels:
-    """Cut an image into jittered Voronoi cells; every other cell, as on a chequerboard, is an element."""
+    """Cut an image into jittered Voronoi cells.
+
+    Every other cell, as on a chequerboard, is an element.
+    """
     from scipy.spatial import KDTree
 
     side = max(6.0, GRID_SHARE * min(height, width))

@@ -1,7 +1,7 @@
-"""A sheet: an exemplar laid out so that any place of it can be shown in any size by shifting patches.
+"""Lay out an exemplar as a sheet: shifted patches of it show any place in any size.
 
-Of a plane seen in perspective that is the plane itself, flattened: what differs between places is how they are seen. Of any
-other exemplar it is a set of resized copies, as in an atlas.
+For a plane in perspective, the sheet is the flattened plane: only the viewing scale differs between places. For any
+other exemplar, the sheet is a set of resized copies, as in an atlas.
 """
 
 from __future__ import annotations
@@ -31,59 +31,70 @@ from texrs.scale_maps._slope import Slope
 __all__ = ["OPEN", "Copies", "Flattened", "Sheet", "code", "find_plane", "measure_seen", "multiply", "round_frames"]
 
 OPEN = (False, False)
-"""A sheet repeats along no axis."""
+"""A sheet is not periodic along any axis."""
 GAP = 8
-"""Samples between copies: patches that lie across it cost too much."""
+"""Number of samples between copies. Patches that cross the gap cost too much."""
 BLURRED = 1.8
-"""Of a flattened plane what would be enlarged by more is left out where there is enough else."""
+"""Maximum enlargement of parts of a flattened plane. Parts above it are left out if enough others are left."""
 NEAR = 0.7
-"""Of the largest scale: what has at least so much of it is always there."""
+"""Share of the largest scale above which parts are always included."""
 FAR = 3.0
-"""What would be enlarged by more is never laid out: next to the horizon lies more of a plane than anywhere else."""
+"""Maximum enlargement of any part of a plane. The area near the horizon is larger than any other and is left out."""
 MOST = 1 << 19
-"""Samples of a flattened plane."""
+"""Maximum number of samples of a flattened plane."""
 STEEP = 7.9
-"""Steps in a sheet from pixel to pixel, at most: what fixed point can hold."""
+"""Maximum step in a sheet from pixel to pixel. Fixed-point numbers cannot represent more."""
 FLAT, COPIED = 0.4, 0.3
-"""Side of a patch, as a share of the square root of the samples of the exemplar."""
+"""Side of a patch, as a share of the square root of the number of samples (flattened plane, copies)."""
 VARIES = 0.4
-"""Natural logarithm by which scales may differ across a patch that has one size."""
+"""Maximum difference of scales across a patch of one size, as a natural logarithm."""
 GOOD, FAIR = 0.03, 0.08
-"""Residuals of a scale map that is a plane's beyond doubt, and of one that may be."""
+"""Maximum residual of a scale map that certainly is a plane, and of one that may be a plane."""
 FORESHORTENED = 0.2
-"""How much steeper edges must get with distance where there is doubt: less than 1, for few lie just across the slope."""
+"""Minimum increase of edge steepness with distance for a fair fit.
+
+It is less than 1 because few edges are exactly across the slope.
+"""
 FRONTAL = 0.05
-"""Where they get less steep than this it is no plane, however well the map fits: round things, each seen from the front."""
+"""Minimum increase of edge steepness for a good fit.
+
+Below it the map does not show a plane, but round elements that are each seen from the front.
+"""
 BETTER, SURE = 0.5, 1e-3
-"""How much better a map must fit as one of areas to be taken for one."""
+"""A map contains areas if its residual as areas is below this factor times the other residual, minus this margin."""
 BANDS = 8
-"""Bands of scales that edges are compared in."""
+"""Number of bands of scales for comparing edges."""
 PLANAR = 0.02
-"""How far a target may be from one that grows along a line."""
+"""Maximum deviation of a target from one that grows along a line."""
 ALIGNED = 0.8
-"""Cosine of that line with the exemplar's slope: elements are foreshortened along that, and look odd along another."""
+"""Minimum cosine between that line and the slope of the exemplar.
+
+Elements are foreshortened along the slope and look wrong along other lines.
+"""
 HALF = 0.5
-"""Power of the foreshortening where sizes come and go: no surface shows that, and patches are sheared the less."""
+"""Power of the foreshortening if sizes rise and fall. No surface looks so, and a lower power shears patches less."""
 EXCESS = 38
-"""What showing what is larger, so shrunk, counts, in 1/256 of what showing what is smaller does: that is blurred."""
+"""Weight of showing larger parts, which are reduced, in 1/256 of the weight of showing smaller parts, which are
+blurred.
+"""
 FINE = 0.05
-"""Share of a target that may be finer, or coarser, than what the resolution of a sheet is chosen for."""
+"""Share of a target that may be finer, or coarser, than the sizes for which the resolution of a sheet is chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet(ABC):
-    """What patches are cut from.
+    """The array that patches are cut from.
 
     Attributes
     ----------
     shape : (int, int)
-        Of the exemplar.
+        Sides of the exemplar.
     colours : (rows, columns, C) float32
-        Of its samples.
+        Colours of the samples.
     logs : (rows, columns) float32
-        Logarithm of the scale of each.
+        Logarithm of the scale of each sample.
     free : (rows, columns) bool
-        Which of them may be shown.
+        Samples that may be shown.
 
     """
 
@@ -93,32 +104,31 @@ class Sheet(ABC):
     free: Bools
 
     weight: ClassVar[float]
-    """Cost of another scale than the wanted one, a squared natural logarithm: 1 is as much as of surroundings that have nothing
-    to do with each other."""
+    """Cost of a scale error, per squared natural logarithm. 1 is the cost of unrelated surroundings."""
     guide: ClassVar[float]
-    """How much of it counts in cuts."""
+    """Weight of the scale error in cuts."""
     excess: ClassVar[int]
-    """What a larger scale than the wanted one counts, in 1/256 of a smaller one."""
+    """Cost of a larger scale than the requested one, in 1/256 of the cost of a smaller one."""
     heal: ClassVar[bool]
-    """Whether torn elements are mended: of planes, mending takes longer than all the rest, and tears as much as it mends."""
+    """True if torn elements are healed. On planes, healing takes most of the time and tears as much as it heals."""
 
     @property
     def elements(self) -> Instances | None:
-        """The separate elements of what may be shown."""
+        """Separate elements of the samples that may be shown."""
         return self.stitcher[1]
 
     @cached_property
     def stitcher(self) -> tuple[Stitcher, Instances | None]:
-        """The sheet as patches are cut from it, and its elements."""
+        """The sheet prepared for cutting patches, with its elements."""
         found, beside = self.analyse()
         return make_stitcher(self.colours, OPEN, found, beside=beside), found
 
     @abstractmethod
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Find the separate elements of what may be shown, and which colours lie side by side."""
+        """Find the separate elements of the usable samples, and the costs of neighbouring colours."""
 
     def values(self, strength: float) -> NDArray[np.int16]:
-        """Return what a demand compares: scales, by how much they count, and what is barred: (samples * 4)."""
+        """Return the values that a demand compares: weighted scales and barred samples, (samples * 4)."""
         values = np.zeros((*self.free.shape, 4), np.int16)
         values[..., 0] = code(self.logs, strength)
         values[..., 1] = np.where(self.free, 0, BARRED)
@@ -126,31 +136,34 @@ class Sheet(ABC):
 
     @abstractmethod
     def show(self, image: Array) -> Array:
-        """Return a picture in register with the exemplar laid out as the sheet is, black where there is nothing."""
+        """Return an image, in register with the exemplar, laid out like the sheet.
+
+        Unused samples are black.
+        """
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Return what kind of sheet it is, as JSON types."""
+        """Return the kind of the sheet and its figures, as JSON types."""
 
     @abstractmethod
     def side(self, target: Floats) -> float:
-        """Return the side of a patch for an output that is to follow a map, in samples of the sheet."""
+        """Return the side of a patch for an output that follows a scale map, in samples of the sheet."""
 
     @abstractmethod
     def frames(
         self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
     ) -> NDArray[np.int16]:
-        """Return the Jacobians of an output whose elements are to be as large as a map says, in fixed point.
+        """Return the Jacobians of an output whose element sizes follow a scale map, in fixed point.
 
-        They are turned by rotations (rows, columns, 2, 2), if there are any: of a plane on it.
+        Rotations (rows, columns, 2, 2), if given, turn them. For a plane they act on the plane.
         """
 
     @abstractmethod
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
         """Return the Jacobians of an output that shows a surface, in fixed point.
 
-        Those of the surface, (rows, columns, 2, 2), take steps in the picture to steps on a texture in its normal size; the
-        target holds the sizes that they make.
+        The Jacobians of the surface, (rows, columns, 2, 2), map steps in the image to steps on a texture in its normal
+        size. The target contains the resulting sizes.
         """
 
     @abstractmethod
@@ -159,21 +172,21 @@ class Sheet(ABC):
 
     @abstractmethod
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median of how far the logarithms of the scales at places (rows, columns, 2) are from a target's."""
+        """Return the median error of the log scales at places (rows, columns, 2) against a target."""
 
 
 @dataclass(frozen=True, eq=False)
 class Flattened(Sheet):
-    """A plane seen in perspective, flattened.
+    """A plane in perspective, flattened.
 
     Attributes
     ----------
     plane : Plane
-        How it lies.
+        Position of the plane.
     origin : (float, float)
         Point of the plane that the first sample shows.
     resolution : float
-        Samples for each unit of the plane: the scale at which one is a pixel.
+        Samples per unit of the plane. A sample is as large as a pixel at this scale.
 
     """
 
@@ -185,12 +198,15 @@ class Flattened(Sheet):
 
     @classmethod
     def of(cls, colours: Floats, plane: Slope, target: Floats, known: Bools | None = None) -> Flattened:
-        """Flatten an exemplar, as finely as a target needs; all of it where only part is known."""
+        """Flatten an exemplar, as finely as a target needs.
+
+        If only part of it is known, the whole plane is flattened.
+        """
         shape = (colours.shape[0], colours.shape[1])
         resolution = min(float(np.sqrt(np.prod(np.quantile(target, [FINE, 1 - FINE])))), plane.largest)
         least = min(resolution / BLURRED, NEAR * plane.largest)
         grid = np.moveaxis(np.indices(shape), 0, -1)
-        # What is held must be there too, though it is not copied.
+        # Constrained pixels outside the known part must also have a place in the sheet, although they are not copied.
         spread = plane.flatten(grid)[plane.scales(grid) >= (least if known is None else min(least, resolution / FAR))]
         low, high = spread.min(axis=0), spread.max(axis=0)
         resolution = min(resolution, float(np.sqrt(MOST / np.prod(high - low + 1e-9))))
@@ -205,16 +221,16 @@ class Flattened(Sheet):
         return cls(shape, shown, log_single(scales), inside, plane, (float(low[0]), float(low[1])), resolution)
 
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Analyse the plane as it lies flattened: there its elements have one size."""
+        """Analyse the flattened plane, where elements have one size."""
         found = find_instances(self.colours, OPEN)
         if found is not None:
-            # What is cut off by a border is another element than what goes on beyond it.
+            # A part that the border cuts off is a separate element.
             labels = label_components((found.labels > 0) & self.free, OPEN)
             found = Instances(labels.astype(np.uint32), found.depth) if labels.any() else None
         return found, measure_adjacency(self.colours, OPEN)
 
     def show(self, image: Array) -> Array:
-        """Return the plane flattened."""
+        """Return the flattened plane."""
         rows, columns = np.nonzero(self.free)
         shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
         places = np.stack([rows, columns], axis=-1).astype(np.int32) * ONE
@@ -222,7 +238,7 @@ class Flattened(Sheet):
         return shown
 
     def describe(self) -> dict[str, Any]:
-        """Return how the plane lies: the tilt in degrees as `texrs.scale_maps`, the ratio of its scales, and the fit."""
+        """Return the position of the plane: tilt in degrees as in `texrs.scale_maps`, scale ratio and fit."""
         tilt = degrees(atan2(self.plane.down[0], -self.plane.down[1])) % 360
         ratio = self.plane.largest / self.plane.least
         return {
@@ -234,22 +250,22 @@ class Flattened(Sheet):
         }
 
     def steps_at(self, scale: float) -> float:
-        """Return how many samples elements have, across the slope, for each pixel of an output that shows them in a scale."""
+        """Return the samples across the slope per output pixel, for elements shown in a given scale."""
         return self.resolution / scale
 
     def side(self, target: Floats) -> float:
-        """Return a share of what there is: patches bend with the map."""
+        """Return a share of the sheet's side. Patches bend with the map."""
         return FLAT * float(np.sqrt(np.count_nonzero(self.free)))
 
     def frames(
         self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
     ) -> NDArray[np.int16]:
-        """Return the Jacobians of the plane, seen as large as a map says."""
+        """Return the Jacobians of the plane, seen at the sizes of a scale map."""
         other = None if any(wrap) or min(target.shape) < 2 else Slope.fit(target)
         if other is None or other.order(target) > PLANAR:
             frames = self.plane.jacobians(target, foreshortened=HALF)
         else:
-            # A target that grows along a line is seen as the plane itself, if that is its own slope.
+            # A target that grows along a line looks like the plane itself, if the line is along the plane's own slope.
             aligned = abs(float(np.dot(other.down, self.plane.down))) > ALIGNED
             frames = self.plane.jacobians(target, other if aligned else None)
         if turn is not None:
@@ -258,7 +274,7 @@ class Flattened(Sheet):
         return self.fix(frames)
 
     def fix(self, frames: NDArray[np.float64]) -> NDArray[np.int16]:
-        """Return Jacobians (..., 2, 2), in units of the plane, as steps of the sheet in fixed point: (N, 2, 2)."""
+        """Return Jacobians (..., 2, 2) in units of the plane as fixed-point steps of the sheet, (N, 2, 2)."""
         fixed = np.clip(np.rint(frames * (self.resolution * ONE)), -STEEP * ONE, STEEP * ONE)
         return np.ascontiguousarray(fixed.astype(np.int16).reshape(-1, 2, 2))
 
@@ -267,30 +283,30 @@ class Flattened(Sheet):
         return round_frames(multiply(self.plane.upright, jacobians) * self.resolution)
 
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
-        """Return the coordinates, and how the plane is seen there."""
+        """Return the coordinates in the exemplar, and the Jacobians of the plane there."""
         points = places / (ONE * self.resolution) + np.array(self.origin)
         at = np.clip(self.plane.project(points), 0, np.array(self.shape) - 1)
         seen = self.plane.projection_jacobians(points) / self.resolution
         return at.astype(np.float32), seen.astype(np.float32)
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median, by the area of the plane that each pixel shows."""
+        """Return the median scale error, weighted by the area of the plane that each pixel shows."""
         return measure_seen(places, frames)
 
     def place(self, coordinates: Floats) -> NDArray[np.int32]:
-        """Return where the plane shows what lies at coordinates."""
+        """Return the places of the plane that show given coordinates."""
         points = (self.plane.flatten(coordinates) - np.array(self.origin)) * self.resolution
         return np.asarray(np.rint(np.clip(points, -1e5, 1e5) * ONE), np.int32)
 
 
 @dataclass(frozen=True, eq=False)
 class Copies(Sheet):
-    """Copies of an exemplar in several sizes, side by side.
+    """Copies of an exemplar in several sizes, in one array.
 
     Attributes
     ----------
     copies : tuple of Copy
-        Where each lies; the first is the exemplar as it is.
+        The copies. The first is the exemplar in its own size.
     owner : (rows, columns) uint16
         The copy of each sample.
 
@@ -303,7 +319,10 @@ class Copies(Sheet):
 
     @classmethod
     def of(cls, colours: Floats, scale: Floats, sizes: Sequence[float], target: Floats) -> Copies:
-        """Resize an exemplar; of other copies than the first only what has scales of the target is kept."""
+        """Resize an exemplar.
+
+        Copies other than the first keep only the parts with scales of the target.
+        """
         shape, logs = (colours.shape[0], colours.shape[1]), log_single(scale)
         wanted = float(target.min()), float(target.max())
         parts = [(size, find_box(logs, size, wanted, GAP)) for size in sizes]
@@ -320,7 +339,7 @@ class Copies(Sheet):
         return cls(shape, shown, sized, free, copies, owner)
 
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Analyse the exemplar, and look up in its copies what has been found: they are many times as large."""
+        """Analyse the exemplar, and look up the result in its copies, which are many times as large."""
         colours = self.colours[self.copies[0].window]
         found, beside = find_instances(colours, OPEN), measure_adjacency(colours, OPEN)
         classes = np.zeros(self.free.shape, np.uint8)
@@ -330,9 +349,9 @@ class Copies(Sheet):
             classes[here] = gather(beside.classes, at, interpolation="nearest")
             if found is not None:
                 own = gather(found.labels, at, interpolation="nearest")
-                # An element and its copies are different ones.
+                # An element gets another number in each copy.
                 labels[here] = np.where(own > 0, own + number * found.count, 0)
-                # What is interpolated reaches over their borders.
+                # Interpolated depths extend beyond the borders of elements, so they are masked.
                 inside = gather(found.depth > 0, at, interpolation="nearest")
                 depth[here] = gather(found.depth, at) * inside * np.float32(np.sqrt(np.prod(copy.factor)))
         fill_gaps(classes, self.copies, 1)
@@ -343,7 +362,7 @@ class Copies(Sheet):
         return found, Adjacency(classes, beside.costs)
 
     def show(self, image: Array) -> Array:
-        """Return the copies side by side."""
+        """Return the copies in one array."""
         shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
         for copy in self.copies:
             shown[copy.window] = gather(image, lay_out(copy))
@@ -354,7 +373,7 @@ class Copies(Sheet):
         return {"kind": "copies", "sizes": [round(float(np.sqrt(np.prod(c.factor))), 4) for c in self.copies]}
 
     def side(self, target: Floats) -> float:
-        """Return a share of the exemplar; less where the map changes by much within that."""
+        """Return a share of the exemplar's side, or less if the map varies much within it."""
         logs = log_single(target)
         down, right = (np.gradient(logs, axis=k) if n > 1 else np.zeros_like(logs) for k, n in enumerate(logs.shape))
         steep = hypot_single(down, right)
@@ -363,15 +382,15 @@ class Copies(Sheet):
     def frames(
         self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
     ) -> NDArray[np.int16]:
-        """Return the identity, or rotations: sizes are those of the copies."""
+        """Return the identity or the rotations. Sizes come from the copies."""
         return np.eye(2, dtype=np.int16)[np.newaxis] * np.int16(ONE) if turn is None else round_frames(turn)
 
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
-        """Return the Jacobians without their sizes, which are those of the copies."""
+        """Return the Jacobians without their sizes, which come from the copies."""
         return round_frames(jacobians * target[..., np.newaxis, np.newaxis].astype(np.float64))
 
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
-        """Return the coordinates, and the sizes of the copies there."""
+        """Return the coordinates in the exemplar, and the sizes of the copies there."""
         at = (places / np.float32(ONE)).astype(np.float32)
         own = self.owner[self._nearest(places)]
         factor, origin, first = (
@@ -383,7 +402,7 @@ class Copies(Sheet):
         return found, np.eye(2, dtype=np.float32) / factor[:, np.newaxis]
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median, by the scales of the samples."""
+        """Return the median error of the scales of the samples."""
         return float(np.median(np.abs(self.logs[self._nearest(places)] - log_single(target))))
 
     def _nearest(self, places: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
@@ -393,19 +412,20 @@ class Copies(Sheet):
 
 
 def lay_out(copy: Copy) -> Floats:
-    """Return where in the exemplar the samples of a copy lie: (rows, columns, 2)."""
+    """Return the coordinates in the exemplar of the samples of a copy, (rows, columns, 2)."""
     at = [(np.arange(n) + 0.5) / f - 0.5 + o for n, f, o in zip(copy.shape, copy.factor, copy.first, strict=True)]
     return np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
 
 
 def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -> Slope | None:
-    """Return the plane that an exemplar is a picture of, if the evidence is good enough.
+    """Return the plane that an exemplar shows, if the evidence is good enough.
 
-    A map may hold the widths of elements, or the square roots of their areas, which are the 3/2 power of those; the plane is
-    one of widths (see `Plane.power`). If neither the caller nor the map says which, it is what fits. Maps that are measured are
-    not quite those of a plane, and those of round things that get smaller are not far from it. So edges decide: on a plane they
-    get steeper along the slope with distance. Where the fit is good a little of that is enough; without any, a plane may have
-    been fitted to what is none.
+    A scale map contains the widths of elements, or the square roots of their areas. The square roots of areas are the
+    3/2 power of the widths in perspective, and the plane describes widths (see `Plane.power`). If neither the caller
+    nor the map specifies the kind, the kind that fits better is used. Measured maps deviate from a plane, and maps of
+    round elements that get smaller are close to one. Edges therefore decide: on a plane, they get steeper along the
+    slope with distance. A good fit needs only a small increase. Without any increase, the plane may have been fitted
+    to an exemplar that does not show one.
     """
     holds = find_kind(scale) if scale_kind is None else scale_kind
     plane = Slope.fit(scale, AREAS if holds == "area" else 1.0)
@@ -419,7 +439,10 @@ def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -
 
 
 def _measure_foreshortening(colours: Floats, plane: Slope) -> float:
-    """Return by how much steeper edges get along the slope than across it where scales fall: 1 where they lie that way."""
+    """Return how fast edges get steeper along the slope as scales fall.
+
+    It is 1 if edges are along or across the slope.
+    """
     from scipy import ndimage
 
     grey = ndimage.gaussian_filter(colours.mean(axis=-1, dtype=np.float64), 1.0)
@@ -437,7 +460,7 @@ def _measure_foreshortening(colours: Floats, plane: Slope) -> float:
 
 
 def measure_seen(places: NDArray[np.int32], frames: NDArray[np.int16]) -> float:
-    """Return the median of how far logarithms of sizes are from those asked, by the area of a sheet that each pixel shows."""
+    """Return the median error of log sizes, weighted by the area of a sheet that each pixel shows."""
     if min(places.shape[:2]) < 2:
         return 0.0
     steps = np.stack([np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]], axis=-1) / ONE
@@ -447,12 +470,15 @@ def measure_seen(places: NDArray[np.int32], frames: NDArray[np.int16]) -> float:
 
 
 def measure_areas(frames: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the absolute values of the determinants of Jacobians (..., 2, 2)."""
+    """Return the absolute determinants of Jacobians (..., 2, 2)."""
     return np.asarray(np.abs(frames[..., 0, 0] * frames[..., 1, 1] - frames[..., 0, 1] * frames[..., 1, 0]), np.float64)
 
 
 def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return products of matrices (..., 2, 2): the last bits of those of libraries hang on the processor."""
+    """Return products of matrices (..., 2, 2).
+
+    The last bits of library functions would depend on the processor.
+    """
     return np.asarray(a[..., :, :1] * b[..., :1, :] + a[..., :, 1:] * b[..., 1:, :], np.float64)
 
 
@@ -463,18 +489,21 @@ def invert(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def round_frames(frames: NDArray[np.float64]) -> NDArray[np.int16]:
-    """Return Jacobians in fixed point, (points, 2, 2); those that are too steep for that are made smaller as a whole."""
+    """Return Jacobians in fixed point, (points, 2, 2).
+
+    Jacobians that are too large for fixed point are reduced as a whole.
+    """
     steepest = np.abs(frames).max(axis=(-2, -1), keepdims=True)
     held = frames * np.minimum(1, STEEP / np.maximum(steepest, 1e-9))
     return np.ascontiguousarray(np.rint(held * ONE).astype(np.int16).reshape(-1, 2, 2))
 
 
 def code(logs: Floats, strength: float) -> NDArray[np.int16]:
-    """Return logarithms of scales in the 12 bits of a demand, by how much they count."""
+    """Return weighted logarithms of scales in the 12 bits of a demand."""
     return np.asarray(np.clip(np.rint(logs * (NAT * strength**0.5)), -2048, 2047), np.int16)
 
 
 def mirror(at: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Return coordinates beyond the borders of a picture, mirrored into it."""
+    """Return coordinates, mirrored into the image if they are outside its borders."""
     ends = np.array([max(n - 1, 1) for n in shape])
     return np.asarray(np.abs((at + ends) % (2 * ends) - ends), np.float64)

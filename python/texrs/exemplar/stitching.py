@@ -1,4 +1,4 @@
-"""What the stitcher must know of an exemplar."""
+"""Collect the facts about an exemplar that the stitcher needs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from texrs.exemplar.segmentation import Segmentation
 __all__ = ["guess_instances", "make_stitcher"]
 
 REACH, DEEP = 3.0, 8.0
-"""Depth in pixels from which on cuts cost the same everywhere inside of what may be an element, and what it counts as."""
+"""Depth in pixels beyond which all cuts inside a possible element cost the same, and the depth that it counts as."""
 
 
 def make_stitcher(
@@ -26,7 +26,10 @@ def make_stitcher(
     sure: bool = True,
     beside: Adjacency | None = None,
 ) -> Stitcher:
-    """Return an exemplar as patches are cut from it: with its elements, and which colours lie side by side if that is known."""
+    """Return an exemplar prepared for cutting patches, with its elements and colour costs.
+
+    The costs of neighbouring colours are measured if they are not given.
+    """
     beside = beside or measure_adjacency(colours, wrap)
     return Stitcher(
         colours,
@@ -40,7 +43,10 @@ def make_stitcher(
 
 
 def guess_instances(parts: Segmentation) -> Instances | None:
-    """Return what may be the elements of a picture, as in a heap, whose things no background parts; None without any."""
+    """Return the possible elements of an image, such as a heap without a background between them.
+
+    None if there are none.
+    """
     if parts.kind != "components":
         return None
     depth = np.asarray(DEEP * parts.measure_depth(REACH), np.float32)
