@@ -232,7 +232,7 @@ def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> No
     for name in ("bad.glb", "bad.mtlx"):
         Path(name).write_bytes(b"something else")
         assert main(["info", name]) == 2
-        assert f"{name}: is no " in capsys.readouterr().err
+        assert f"{name}: not a " in capsys.readouterr().err
 
 
 def test_variants_go_to_folders_of_their_own(here: Path) -> None:
@@ -260,7 +260,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock rock/rock_albedo.png -o new", "either all are materials or none is"),
         ("design rock -o mine", "mine/rock_albedo.png is there already"),
         ("design same -o same", "--out: same is read, and would then contain other maps"),
-        ("tile rock -o new --mipmaps links/../rock", "rock is read, and would hold other maps"),
+        ("tile rock -o new --mipmaps links/../rock", "rock is read, and would then contain other maps"),
         ("tile uneven -o new", "uneven: all must have one size; height has"),
         ("design rock -o links", "is read as rock/rock_albedo.png, and would be lost"),
         ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is read"),

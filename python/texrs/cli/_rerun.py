@@ -360,7 +360,7 @@ def describe_document(file: str) -> str:
     try:
         root = ElementTree.fromstring(Path(file).read_bytes())
     except ElementTree.ParseError:
-        raise FileError(f"{file}: is no MaterialX document, or is damaged") from None
+        raise FileError(f"{file}: not a MaterialX document, or damaged") from None
     names = [each.get("value", "") for each in root.iter("input") if each.get("type") == "filename"]
     return f"material: MaterialX {root.get('version', '')}, of {', '.join(dict.fromkeys(names))}"
 
