@@ -57,7 +57,8 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
     lines = err.splitlines()
     assert lines[0] == "texrs: segment"
     assert "texrs: stitch" in lines
-    assert re.fullmatch(r"texrs: wrote out.png: 56 x 40, 3 channels, uint8, borders of columns [0-9.]+ .*, in [0-9.]+ s", lines[-1])
+    wrote = r"texrs: wrote out.png: 56 x 40, 3 channels, uint8, borders of columns [0-9.]+ .*, in [0-9.]+ s"
+    assert re.fullmatch(wrote, lines[-1])
 
 
 def test_same_command_same_bytes(here: Path, capsys: Capture) -> None:
