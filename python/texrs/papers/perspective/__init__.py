@@ -1,36 +1,37 @@
-"""PERSPECTIVE: textures whose elements have the size that a map asks for.
+"""PERSPECTIVE: textures whose elements have the sizes of a scale map.
 
 W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", The Visual Computer 24, 2008. The
-flow:
+steps are:
 
-1. a scale map of the exemplar, from a mask of features or from angles, edited where need be (section 3;
+1. Make a scale map of the exemplar, from a mask of features or from angles, and edit it if needed (section 3;
    `texrs.scale_maps`);
-2. the scale map of the output: the exemplar's, brought to its size, or any other (section 4);
-3. the exemplar laid out as a sheet: a plane flattened, anything else as copies in several sizes, with the elements that are
+2. Make the scale map of the output: the exemplar's map, resized, or any other map (section 4).
+3. Prepare the exemplar as a sheet: a flattened plane, or copies in several sizes, with the elements that are
    found on the exemplar (`texrs.exemplar.sheet`);
-4. patches of the sheet, each seen in the wanted scale, stitched along minimum cuts (section 4; `texrs.growth.sheets`);
-5. the exemplar looked up through the coordinates, smoothed where it is shrunk.
+4. Stitch patches of the sheet, each at the requested scale, along minimum cuts (section 4; `texrs.growth.sheets`).
+5. Look the exemplar up through the coordinates, with smoothing where it is reduced.
 
 Departures, with their reasons:
 
-- Patches that are cut in whole stand in for windows that are corrected point by point (Eq. 5 to 7), which tear things
-  larger than a window: by four fifths fewer cells of the pictures look torn.
-- An exemplar that is a plane is flattened. Its elements are the same everywhere then, and any of them can be seen at any
-  depth; without that a ramp finds only a strip of the exemplar for each of its rows, and repeats it. Whether it is a plane is
-  told by the fit of S, or of its power 2/3 where the map is one of areas, to a linear function and by edges,
-  which get steeper with distance there, and said in the report. A target that grows along the plane's slope shows that
-  plane; along another line elements are seen straight ahead; where sizes come and go they are half as foreshortened.
-- What is no plane is offered in several sizes, which add to what there is of a scale. The scale is a cost of showing a patch
-  at a place, (log S_e - log S_o)^2, not a channel of windows: ratios of scales are what is seen. Of planes it counts a
-  seventh where elements are shrunk: what is magnified is blurred. The output's map stays as asked.
-- What is found are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
-- A target may be a surface: another plane, normals, texture coordinates, Jacobians (`targets`). Patches are bent to it, so that
-  elements are foreshortened as the surface is; its sizes stand in for S_o.
-- Directions of elements, which section 6 leaves to the future: fields turn what is copied, on the surface that it lies on
+- Patches that are cut in whole replace windows that are corrected point by point (Eq. 5 to 7), which tear elements
+  larger than a window. The number of cells that look torn falls by four fifths.
+- An exemplar that is a plane is flattened. Its elements then have the same size everywhere, and any of them can be
+  shown at any depth. Without flattening, a ramp finds only a strip of the exemplar for each of its rows, and repeats
+  it. The test for a plane uses the fit of S to a linear function (of its power 2/3 for a map of areas). It also uses
+  edges, which get steeper with distance on a plane. The report contains the result. A target that grows along the
+  plane's slope shows this plane. Along another line elements are seen from the front. If sizes increase and decrease,
+  elements are half as foreshortened.
+- Other exemplars are used in several sizes, which add samples of each scale. The scale is a cost of showing a patch at
+  a place, (log S_e - log S_o)^2, and not a channel of windows, because ratios of scales are visible. For planes it
+  counts a seventh where elements are reduced, because enlarged elements are blurred. The output's map is not changed.
+- The result is a set of coordinates, so the final step is a copy and not a weighted mean. Nothing is blurred.
+- A target may be a surface: another plane, normals, texture coordinates, or Jacobians (`targets`). Patches are bent to
+  it, so that elements are foreshortened like the surface. The sizes on it replace S_o.
+- Directions of elements, which section 6 leaves to future work: fields rotate the copied texture on its surface
   (`directions`).
-- In place of the histograms of Eq. 8, places are charged for what has been shown often, and for classes of colour in excess.
+- Instead of the histograms of Eq. 8, places that were shown often and overrepresented classes of colour have a cost.
 
-``method="paper"`` leaves the departures out (`texrs.papers.perspective.literal`).
+``method="paper"`` omits the departures (`texrs.papers.perspective.literal`).
 """
 
 from __future__ import annotations
@@ -82,69 +83,72 @@ def perspective(
     interpolation: Interpolation = "cubic",
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Grow a picture whose elements are as large as a map says.
+    """Make an image whose elements have the sizes of a scale map.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16.
     scale_map : (H, W) float array, Plane, "auto" or "front"
-        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`).
-        `texrs.Plane` or its words ``"plane:slant=50,tilt=90,fov=60"`` give the sizes on a plane. "auto": those of the
-        plane that is found in it (`texrs.planes.find`), or else measured (`texrs.planes.measure_scale`). "front": all alike.
+        Size of the exemplar's elements at each pixel, positive. Only ratios count (`texrs.scale_maps`). `texrs.Plane`
+        or its words ``"plane:slant=50,tilt=90,fov=60"`` give the sizes on a plane. "auto": the sizes on the plane in
+        the image (`texrs.planes.find`), or else measured sizes (`texrs.planes.measure_scale`). "front": one size.
     size : int or (int, int), optional
-        Size of the result in pixels: by default that of the ``target``, else twice the exemplar's.
+        Size of the result in pixels. By default the size of the ``target``, else twice the exemplar's.
     target : array or Plane, optional
-        How large they are to be at each pixel of the result, in the units of ``scale_map``: a scale map; or a surface that the
-        texture is to lie on. `texrs.Plane` or its words give another plane, with elements of size 1 in its middle.
-        Normals (rows, columns, 3) of a curved surface, seen from far away. Coordinates (rows, columns, 2) on a surface, or
-        Jacobians (rows, columns, 2, 2): for each pixel the step on the texture that a step in the picture is
-        (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`, `texrs.Plane.jacobians`). One of
-        another size is stretched to that of the result, its borders on the borders (`texrs.scale_maps.resample`). None:
-        ``scale_map``, stretched.
+        Requested size of elements at each pixel of the result, in the units of ``scale_map``. It is a scale map, or a
+        surface that the texture is placed on. `texrs.Plane` or its words give another plane, with elements of size 1
+        in its middle. Normals (rows, columns, 3) describe a curved surface, seen from far away. Coordinates (rows,
+        columns, 2) on a surface, or Jacobians (rows, columns, 2, 2), give the step on the texture of a step at each
+        pixel (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`,
+        `texrs.Plane.jacobians`). A target of another size is stretched to the result, borders on borders
+        (`texrs.scale_maps.resample`). None: ``scale_map``, stretched.
     target_green : {"up", "down"}
         Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX).
     scale_kind : {"width", "area"}, optional
-        What maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope; "area",
-        square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
+        Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
+        "area", square roots of areas. None: the quantity that fits the scale map best as a map of a plane. The target
+        has the same quantity.
     fov : float, optional
-        Degrees that the longer side of the exemplar spans, 1 to 170; 60 by default (`texrs.planes.FOV`). How much a plane is
-        foreshortened besides what a scale map says; a ``target`` that is a surface, and ``direction``, need it. Not of a
-        ``scale_map`` that is a plane, which has its own.
+        Angle of view of the longer side of the exemplar in degrees, 1 to 170. Default: 60 (`texrs.planes.FOV`). It
+        determines the foreshortening of a plane, in addition to a scale map. A ``target`` that is a surface, and
+        ``direction``, need it. Ignored if ``scale_map`` is a plane, which has its own.
     direction : float, (rows, columns) array or Field, optional
-        By how many degrees, counter-clockwise, what is copied is turned: everywhere, or at each pixel; an array of another size
-        is stretched. Of a `texrs.fields.Field` of two axes, or its words, as ``"circular"`` or ``"zigzag:period=64,angle=30"``,
-        how it turns. On a plane or another surface it turns there.
+        Counter-clockwise rotation of the copied texture in degrees: one number, or one a pixel. An array of another
+        size is stretched. A `texrs.fields.Field` of two axes, or its words such as ``"circular"`` or
+        ``"zigzag:period=64,angle=30"``, gives the rotation of the field. On a plane or another surface the texture
+        rotates on it.
     scale_measurement : Measuring, optional
-        How the ``scale_map`` "auto" is measured in a mask of features (`texrs.scale_maps.Measuring`), rather than by a plane.
+        Measurement of a ``scale_map`` "auto" in a mask of features (`texrs.scale_maps.Measuring`), instead of by a
+        plane.
     method : {None, "paper"}
-        Which algorithm. "paper": the literal one, kept for comparison: averages, and slow. It does not wrap, and
+        Algorithm. "paper": the literal one, for comparison. It averages windows and is slow. It does not wrap, and
         takes up to four channels.
     scale_weight : float
-        How much it counts beside looking like the exemplar that elements come from where they have about the wanted scale,
-        0 to 16. Copies are chosen by that alone; what is seen on a plane has its size anyway, but another sharpness. 0
-        synthesises without regard to scales.
+        Weight of the requested scale compared with similarity to the exemplar, 0 to 16. Copies are chosen by this
+        weight only. Elements on a plane have their size in any case, but another sharpness. If 0, scales are ignored.
+        Default: 1.
     augment_scales : {"auto", True, False} or sequence of float
-        Whether the exemplar may be resized. True: a plane is flattened and seen at any depth, anything else is copied in
-        other sizes. "auto": as True, but without copies if the exemplar has enough of every wanted scale. False: wanted
-        scales that it lacks are brought to the nearest that it has, with a warning. Sizes, 1/8 to 4: these copies, no plane.
+        Resizing of the exemplar. True: a plane is flattened and shown at any depth, and other exemplars are copied in
+        other sizes. "auto": as True, but without copies if the exemplar has enough of every requested scale. False:
+        requested scales that it lacks become the nearest existing ones, with a warning. Numbers of 1/8 to 4: copies in
+        these sizes, no plane.
     wrap : bool or (rows, columns), optional
-        Axes along which the result is to repeat; None: neither. The target must repeat, too.
+        Axes along which the result is periodic. The target must also be periodic. Default: none.
     seed : int
-        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     interpolation : {"nearest", "linear", "cubic"}
-        Between the exemplar's samples, where it is resized.
+        Interpolation between the exemplar's samples, where it is resized.
     progress : callable or True, optional
-        Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
-        True shows a bar.
+        Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
+        the work. True shows a bar.
 
     Returns
     -------
     Synthesis
-        The picture; its source map, whose labels tell the patches and whose frames how the exemplar is seen at each pixel:
-        ``source.render(map, antialias=True)`` brings any map in register along; the stages, of which ``"sheet"`` is what
-        patches are cut from and ``"target"`` the scale map that was followed; and a report, in which ``"measured"`` tells
-        of a ``scale_map`` "auto" what it is of, as `texrs.planes.ScaleEstimate` has it, and how sure that is.
+        The image and its source map. The labels of the source map are the patches, and its frames describe how the
+        exemplar is seen at each pixel. ``source_map.render(map, antialias=True)`` applies the result to any map in
+        register.
 
         Stages:
 
@@ -157,7 +161,7 @@ def perspective(
         - ``method``: "default" or "paper".
         - ``seed``: The seed.
         - ``scale_weight``: Weight of the scale.
-        - ``measured``: What a ``scale_map`` "auto" found, as `texrs.planes.ScaleEstimate`; else None.
+        - ``measured``: The result of a ``scale_map`` "auto", as `texrs.planes.ScaleEstimate`; else None.
         - ``sheet``: ``kind`` and ``resolution`` of the flattened example.
         - ``surface``: Whether the target is a surface.
         - ``turned``: Whether a direction was given.
@@ -172,15 +176,15 @@ def perspective(
     Raises
     ------
     InvalidInput
-        Maps of other shapes, or with scales that are not positive; an exemplar that is too small; a target of which the
-        exemplar has nothing, or that does not repeat where the result is to.
+        If maps have other shapes, or scales that are not positive, or the exemplar is too small. Also if the exemplar
+        has no scale of the target, or the target is not periodic like the result.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     Warns
     -----
     UserWarning
-        A plane that was not found surely, or scales that the exemplar does not have.
+        If a plane is uncertain, or the exemplar lacks requested scales.
 
     References
     ----------
@@ -250,7 +254,7 @@ def perspective(
 
 
 def describe(asked: Request, laid: Laid, found: FromSheet) -> dict[str, Any]:
-    """Return the report: JSON types."""
+    """Return the report as JSON types."""
     elements = laid.sheet.elements
     return {
         "method": "default",

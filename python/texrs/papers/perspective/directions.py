@@ -1,4 +1,4 @@
-"""Directions of elements, which the paper leaves to the future (section 6): by how much what is copied is turned."""
+"""Directions of elements, which the paper leaves to future work (section 6): rotation of the copied texture."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from texrs.scale_maps._resample import stretch
 __all__ = ["as_turn"]
 
 FARTHEST = 1e6
-"""Degrees."""
+"""Maximum angle, in degrees."""
 
 
 def as_turn(direction: object, size: tuple[int, int], wrap: Sequence[bool]) -> Surface:
-    """Return rotations (rows, columns, 2, 2), by which elements are turned counter-clockwise as they are seen."""
+    """Return rotations (rows, columns, 2, 2) that turn elements counter-clockwise as seen in the image."""
     if isinstance(direction, str):
         direction = parse(direction, 2, size)
     if isinstance(direction, Field):
@@ -41,7 +41,7 @@ def as_turn(direction: object, size: tuple[int, int], wrap: Sequence[bool]) -> S
 
 
 def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return cosines and sines of one angle, or of angles stretched to a size."""
+    """Return cosines and sines of one angle, or of angles resized to the output."""
     if isinstance(direction, Real | np.floating):
         direction = np.full((1, 1), as_float(direction, "direction", -FARTHEST, FARTHEST))
     given = try_array(direction)
@@ -52,14 +52,14 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
     angles = given.astype(np.float64)
     if not (np.abs(angles) <= FARTHEST).all():
         raise InvalidInput(f"direction: needs finite degrees within {FARTHEST:g}")
-    # Whole turns first: those of large angles would be rounded.
+    # Remove whole turns first, because the remainder of large angles would be rounded.
     angles = np.radians(angles % 360)
     parts = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return normalise(*np.moveaxis(parts if angles.shape == size else stretch(parts, size), -1, 0))
 
 
 def follow_field(field: Field, size: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return cosines and sines of the rotations that are nearest to the frames of a field."""
+    """Return cosines and sines of the rotations nearest to the frames of a field."""
     if field.axes != 2:
         raise InvalidInput(f"direction: needs a field of 2 axes, got one of {field.axes}")
     j = field.over(size).lattice(size).astype(np.float64)
@@ -69,7 +69,7 @@ def follow_field(field: Field, size: tuple[int, int]) -> tuple[NDArray[np.float6
 def normalise(
     cosine: NDArray[np.float64], sine: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return both divided by their length; where they have none, no turn."""
+    """Return both divided by their length. Zero vectors give no rotation."""
     length = np.sqrt(cosine * cosine + sine * sine)
     there = length > 1e-6
     safe = np.where(there, length, 1.0)

@@ -1,4 +1,4 @@
-"""What patches are cut from, and how they are to be seen: the exemplar laid out for an output (see the verb's departures)."""
+"""Preparation of the exemplar for an output: the sheet to cut patches from, and its view (see the verb's departures)."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ __all__ = ["Laid", "lay_out"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Laid:
-    """An exemplar laid out.
+    """A prepared exemplar.
 
     Attributes
     ----------
     sheet : Sheet
-        What patches are cut from.
+        Sheet that patches are cut from.
     target : (rows, columns) float32
-        How large elements are to be, in the measure of the sheet.
+        Requested size of elements, in the units of the sheet.
     wanted : (rows, columns) float32
-        The same as it was asked for, as far as there is any.
+        The same as the caller requested it, if given.
     frames : (points, 2, 2) int16, optional
-        How the sheet is to be seen; None where the target says all of it.
+        View of the sheet. None if the target determines it.
     outside : Outside
-        What was asked for and is not there.
+        Requested scales that do not exist.
     sizes : sequence of float
-        Of the copies, or those that a plane can be seen in.
+        Sizes of the copies, or the possible sizes of a plane.
 
     """
 
@@ -51,7 +51,7 @@ class Laid:
 
 
 def lay_out(asked: Request) -> Laid:
-    """Lay an exemplar out for the output that is asked for."""
+    """Prepare an exemplar for the requested output."""
     colours = asked.exemplar.guidance
     plane = find_slope(asked, colours)
     if asked.surface is not None:
@@ -75,17 +75,17 @@ def lay_out(asked: Request) -> Laid:
 
 
 def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Slope | None) -> Laid:
-    """Lay an exemplar out under a surface: the plane that it shows flattened, as it is from the front, or in copies."""
+    """Prepare an exemplar for a surface: its plane flattened, the image as it is from the front, or copies."""
     areas = asked.target.astype(np.float64)
     front = plane is None and is_frontal(asked)
     scale, target, power = asked.scale, asked.target, 1.0
     if plane is not None:
-        # Of a plane elements of a width have an area: the width that has the wanted one is asked for.
+        # Elements on a plane have an area for each width. Request the width with the requested area.
         scale, power = power_single(scale, plane.power), 1.5
         target = np.cbrt(areas * areas * (plane.scale / plane.lean)).astype(np.float32)
     sizes = (1.0, SMALLEST, LARGEST) if front else choose_sizes(scale, target, asked.sizes, plane)
     held, outside = bring_within(scale, target, sizes)
-    # Where there is nothing so small, or so large, the surface is shown nearer or farther away.
+    # If elements of this size do not exist, move the surface nearer or farther away.
     share = np.power(target.astype(np.float64) / held, power)[..., np.newaxis, np.newaxis]
     shown = np.where(share == 1, surface, surface * share)
     wanted = (areas / share[..., 0, 0]).astype(np.float32)
@@ -100,18 +100,18 @@ def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, pla
 
 
 def turned(asked: Request, surface: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a surface with a texture that is turned on it."""
+    """Return a surface with a rotated texture."""
     return surface if asked.turn is None else multiply(asked.turn, surface)
 
 
 def is_frontal(asked: Request) -> bool:
-    """Return whether an exemplar may be resized, and has elements of one size."""
+    """Return whether an exemplar may be resized and has elements of one size."""
     free = asked.strength > 0 and asked.sizes in (True, "auto")
     return free and float(asked.scale.max()) < LEVEL * float(asked.scale.min())
 
 
 def find_slope(asked: Request, colours: Floats) -> Slope | None:
-    """Return the plane that an exemplar shows: the one that was given, or the one that its scale map is of."""
+    """Return the plane of an exemplar: the given one, or the plane of its scale map."""
     if asked.strength == 0 or asked.sizes not in (True, "auto"):
         return None
     if asked.plane is not None:
@@ -119,6 +119,6 @@ def find_slope(asked: Request, colours: Floats) -> Slope | None:
     found = find_plane(colours, asked.scale, asked.kinds[0])
     if found is None:
         return None
-    # A map of widths does not say how long things are, but the angle of view does.
+    # A map of widths does not determine lengths, but the angle of view does.
     lean = cos(atan(found.slope / found.scale * find_focal(asked.exemplar.shape, asked.fov)))
     return replace(found, lean=lean)

@@ -1,9 +1,9 @@
-"""PERSPECTIVE as printed: window averages, re-weighted, with the scale as one more channel (section 4).
+"""PERSPECTIVE as printed: averages of windows, re-weighted, with the scale as another channel (section 4).
 
-Kept for comparison. What the paper leaves open: windows of 8 x 8 at three resolutions, every second one; the scale as
-wide as the colours together; histograms of 16 bins, in units of an even spread, counted anew in each round. Distances
-are kept from zero, where Eq. 6 has no weight; and Eq. 8 is read as a sum over histograms (its k is not the number of
-bins), for each pixel of a window.
+For comparison only. The paper leaves these details open: windows are 8 x 8 at three resolutions, every second one. The
+scale has the variance of all colours together. Histograms have 16 bins, in units of a uniform distribution, and are
+counted again in each round. Distances are kept above zero, where Eq. 6 has no weight. Eq. 8 is read as a sum over
+histograms (its k is not the number of bins), separately at each pixel of a window.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ SIDE, SPACING = 8, 2
 ROUNDS = (20, 10, 6)
 BINS = 16
 R = 0.8
-"""The exponent of Eq. 5."""
+"""Exponent of Eq. 5."""
 AT_ONCE = 256
-"""Windows that are looked for before anyone is asked whether to go on."""
+"""Number of windows that are searched between two checks for cancellation."""
 NEAREST = 1e-3
-"""Squared distances are at least this share of the windows' variance."""
+"""Minimum squared distance, as a share of the windows' variance."""
 
 Doubles = NDArray[np.float64]
 
 
 def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
-    """Do what the paper prints; the composite shows what the averages were made of."""
+    """Run the algorithm of the paper. The stage ``before_blending`` shows the sources of the averages."""
     image, target = asked.exemplar.pixels, asked.target
     if any(asked.wrap):
         raise InvalidInput("wrap: the paper's method knows none; leave out wrap, or method='paper'")
@@ -115,12 +115,12 @@ def bring_back(x: Doubles, like: Array) -> Array:
 
 
 def scatter(e: Doubles, scale: Floats, target: Floats, seed: int) -> Doubles:
-    """Return each point the colour of one that is drawn from those of about its scale: the nearest 4 in 100, at least 12."""
+    """Return for each point a random colour among the samples of nearest scale: 4 in 100, at least 12."""
     order = np.argsort(scale, axis=None, kind="stable")
     some = min(order.size, max(12, order.size // 25))
     rank = np.searchsorted(scale.ravel()[order], target.ravel())
     first = np.clip(rank - some // 2, 0, order.size - some)
-    # One number a point, by its place: no stream.
+    # One random number a point, from its position and not from a stream.
     share = np.random.Philox(key=seed).random_raw(target.size) >> np.uint64(32)
     drawn = order[first + (share * np.uint64(some) >> np.uint64(32)).astype(np.intp)]
     picked: Doubles = e.reshape(-1, e.shape[-1])[drawn].reshape(*target.shape, -1)
@@ -128,7 +128,7 @@ def scatter(e: Doubles, scale: Floats, target: Floats, seed: int) -> Doubles:
 
 
 def double(x: Doubles, shape: tuple[int, ...]) -> Doubles:
-    """Return an image at twice the resolution, linear between its pixels."""
+    """Return an image at twice the resolution, by linear interpolation."""
     for axis, n in enumerate(shape):
         place = np.clip((np.arange(n) + 0.5) / 2 - 0.5, 0, x.shape[axis] - 1)
         low = np.floor(place).astype(np.intp)
@@ -140,7 +140,7 @@ def double(x: Doubles, shape: tuple[int, ...]) -> Doubles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Search:
-    """The exemplar's windows, projected, ready to be searched."""
+    """Projected windows of the exemplar, ready for search."""
 
     e: Doubles
     bases: list[tuple[Doubles, Doubles]]
@@ -151,7 +151,7 @@ class Search:
 
     @classmethod
     def of(cls, e: Doubles, scale: Doubles) -> Search:
-        """Project the windows: colours to 95 % of their variance and scales to 99 %, apart (section 4.2)."""
+        """Project the windows: colours to 95 % of their variance and scales to 99 %, separately (section 4.2)."""
         from scipy.spatial import cKDTree
 
         parts, bases, variance = [], [], 0.0
@@ -179,13 +179,13 @@ class Search:
             variance += float(total[-1])
         vectors = np.concatenate(parts, axis=1)
         ask()
-        # Of windows that are the same the first is found.
+        # The first of equal windows is used.
         first = np.sort(np.unique(vectors, axis=0, return_index=True)[1])
         ask()
         return cls(e, bases, cKDTree(vectors[first]), first, NEAREST * max(variance, 1e-12), e.shape[1] - SIDE + 1)
 
     def step(self, x: Doubles, scale: Doubles) -> tuple[Doubles, NDArray[np.intp], float]:
-        """Search the nearest window for each of the output's, then average them: a round."""
+        """Search the nearest window for each window of the output, then average them: one round."""
         seen = []
         for values, (mean, axes) in zip((x, scale[..., np.newaxis]), self.bases, strict=True):
             ask()
@@ -222,7 +222,7 @@ class Search:
 
 
 def _find_starts(n: int, spacing: int) -> NDArray[np.intp]:
-    """Return where windows begin: every so many pixels, and at the end."""
+    """Return the starts of windows: at regular distances, and at the end."""
     return np.unique(np.append(np.arange(0, n - SIDE + 1, spacing), n - SIDE))
 
 
@@ -238,7 +238,7 @@ def _find_bins(colour: Doubles) -> NDArray[np.intp]:
 
 
 def _measure_excess(x: Doubles, e: Doubles) -> Doubles:
-    """Return, for each channel and bin, how much more often the output shows it, in units of an even spread."""
+    """Return the excess of the output's frequency in each channel and bin, in units of a uniform distribution."""
     counts = [
         [np.bincount(_find_bins(v[..., c]).ravel(), minlength=BINS) / v[..., c].size for c in range(e.shape[-1])]
         for v in (x, e)

@@ -1,4 +1,4 @@
-"""What a caller asks of `texrs.perspective`, checked before anything is done."""
+"""Arguments of `texrs.perspective`, checked before the work begins."""
 
 from __future__ import annotations
 
@@ -40,45 +40,45 @@ __all__ = ["Method", "Request"]
 Method: TypeAlias = Literal["paper"] | None
 
 LEAST = 16
-"""Least side of an exemplar."""
+"""Minimum side of an exemplar."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Request:
-    """The arguments of a synthesis, checked.
+    """Checked arguments of a synthesis.
 
     Attributes
     ----------
     exemplar : Exemplar
-        What it grows from.
+        Exemplar.
     scale : (H, W) float32
-        How large its elements are.
+        Size of its elements.
     target : (rows, columns) float32
-        How large those of the output are to be.
+        Requested size of the output's elements.
     kinds : (kind, kind)
-        What the two maps hold; None where nobody says.
+        Quantities in the two maps. None if unknown.
     measured : texrs.planes.ScaleEstimate, optional
-        How large its elements are as that was measured in the picture alone, and how sure that is.
+        Element sizes measured in the image, and their confidence.
     plane : texrs.Plane, optional
-        That the exemplar shows, where it is given.
+        Plane that the exemplar shows, if given.
     surface : (rows, columns, 2, 2) float64, optional
-        That the output is to show; the target holds the sizes that it makes.
+        Surface that the output shows. The target contains the resulting sizes.
     turn : (rows, columns, 2, 2) float64, optional
-        Rotations of what is copied.
+        Rotations of the copied texture.
     fov : float
-        Degrees that the longer side of the exemplar spans.
+        Angle of view of the exemplar's longer side in degrees.
     method : {None, "paper"}
-        Which algorithm.
+        Algorithm.
     strength : float
-        How much the scale counts.
+        Weight of the scale.
     sizes : {"auto", True, False} or sequence of float
-        The copies that may be copied from.
+        Sizes of the copies.
     wrap : (bool, bool)
-        Axes along which the output is to repeat.
+        Axes along which the output is periodic.
     seed : int
-        Chooses the texture.
+        Seed of the random choices.
     interpolation : {"nearest", "linear", "cubic"}
-        Between the exemplar's samples, in the last look-up.
+        Interpolation between the exemplar's samples in the final look-up.
 
     """
 
@@ -118,9 +118,9 @@ class Request:
         seed: int,
         interpolation: Interpolation,
     ) -> Request:
-        """Return the request of a caller, or raise what is wrong with it."""
+        """Return the checked arguments of a call, or raise an error."""
         known = as_exemplar(exemplar, minimum=LEAST)
-        # What is cheap to check comes before what is measured.
+        # Do cheap checks before measurements.
         strength = as_float(scale_weight, "scale_weight", 0, 16)
         as_method(method, None, "paper")
         as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
@@ -172,11 +172,11 @@ class Request:
         )
 
     def describe_measured(self) -> dict[str, Any] | None:
-        """Return how the exemplar's sizes were measured, as JSON types, or None where they were said."""
+        """Return the measurement of the exemplar's sizes as JSON types, or None if they were given."""
         return None if self.measured is None else self.measured.as_dict()
 
     def match_kinds(self, power: float) -> Request:
-        """Return the request with a target that holds what the exemplar's map does: a power of it holds widths."""
+        """Return the arguments with a target of the exemplar map's quantity: a power converts to widths."""
         theirs = {None: power, "width": 1.0, "area": AREAS}[self.kinds[1]]
         return self if theirs == power else replace(self, target=power_single(self.target, theirs / power))
 
@@ -184,7 +184,7 @@ class Request:
 def find_scale(
     exemplar: Exemplar, scale_map: Array | Plane | str, scale_measurement: Measuring | None
 ) -> tuple[Plane | None, Array, Measured | None]:
-    """Return the plane that an exemplar shows, if it is given, how large its elements are, and how that was measured."""
+    """Return the given plane of an exemplar, the size of its elements, and the measurement."""
     if scale_measurement is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
         raise InvalidInput(
             "scale_measurement: a scale map is given, so that nothing is measured; leave out one of them"
@@ -210,7 +210,7 @@ def find_scale(
 
 
 def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
-    """Refuse a target whose ends do not meet where the output is to repeat, by values that must not jump there."""
+    """Refuse a target that is not periodic along the output's periodic axes, by values that must not jump there."""
     for axis, closed in enumerate(wrap):
         if not closed:
             continue

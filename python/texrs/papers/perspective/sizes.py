@@ -1,4 +1,4 @@
-"""Whether an exemplar is a plane, which copies of it are made if not, and what of a target they cannot give."""
+"""Sizes of copies of an exemplar that is not a plane, and the parts of a target that they cannot give."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
 FACTORS = (1.0, 0.8, 0.64, 1.25, 1.5625)
 """Sizes of the copies in an atlas, the exemplar first."""
 PLENTY = 0.75
-"""Samples of about the wanted scale for each point of the output at which the exemplar alone will do."""
+"""Minimum number of samples of about the requested scale for each output point, if the atlas has the exemplar only."""
 ALIKE = 0.1
-"""Natural logarithm of a ratio of scales that are about the same."""
+"""Natural logarithm of the ratio of scales that count as equal."""
 
 
 def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Slope | None) -> tuple[float, ...]:
-    """Return the sizes of the copies, the exemplar's own first; those that a plane can be seen in."""
+    """Return the sizes of the copies, the exemplar's own first, or the possible sizes of a plane."""
     if plane is not None:
         return (1.0, SMALLEST, LARGEST)
     given = check_sizes(asked)
@@ -39,20 +39,20 @@ def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Slope | Non
 
 
 def check_sizes(asked: object) -> tuple[float, ...] | None:
-    """Return the sizes that were given, 1 first; None where they are to be chosen."""
+    """Return the given sizes, 1 first. None if they will be chosen."""
     if isinstance(asked, bool | np.bool_):
         return None if asked else (1.0,)
     if isinstance(asked, str) and asked == "auto":
         return None
     if isinstance(asked, Sequence) and not isinstance(asked, str) and 1 <= len(asked) <= 16:
         sizes = [as_float(s, "augment_scales", SMALLEST, LARGEST) for s in asked]
-        # The exemplar itself is always there.
+        # The exemplar itself is always included.
         return (1.0, *dict.fromkeys(s for s in sizes if s != 1))
     raise InvalidInput(f"augment_scales: needs 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
 
 
 def count_samples(scale: Floats, target: Floats) -> float:
-    """Return how many samples of about the wanted scale the exemplar has for each point, where it has the fewest."""
+    """Return the minimum over points of the number of exemplar samples of about the requested scale."""
     mine, theirs = np.sort(log_single(scale), axis=None), log_single(target).ravel()
     bins = np.arange(theirs.min(), theirs.max() + ALIKE, ALIKE)
     asked = np.histogram(theirs, np.append(bins, bins[-1] + ALIKE))[0]
@@ -64,13 +64,13 @@ def count_samples(scale: Floats, target: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Outside:
-    """How much of a target was beyond the scales that there are: its share, and by what factor at most."""
+    """Part of a target beyond the existing scales: its share, and the maximum factor."""
 
     share: float
     factor: float
 
     def describe(self, sizes: Sequence[float]) -> str:
-        """Return what to tell the caller."""
+        """Return the text for the caller."""
         way = "augment_scales='auto' would resize it" if len(sizes) == 1 else "nor have its resized copies"
         return (
             f"target: {self.share:.1%} of it asks for scales that the exemplar has not, by a factor of up to "
@@ -79,7 +79,7 @@ class Outside:
 
 
 def bring_within(scale: Floats, target: Floats, sizes: Sequence[float]) -> tuple[Floats, Outside]:
-    """Bring a target to the scales that the copies have, and say how much of it was beyond them."""
+    """Limit a target to the scales of the copies, and return the part beyond them."""
     low, high = float(scale.min()) * min(sizes), float(scale.max()) * max(sizes)
     slack = 1 + 1e-3
     beyond = (target < low / slack) | (target > high * slack)

@@ -1,8 +1,8 @@
-"""What an output is to show (section 4): how large elements are at each pixel, or a surface that the texture lies on.
+"""Target of an output (section 4): the size of elements at each pixel, or a surface below the texture.
 
-The paper knows a scale map. A surface says more: along one direction elements are foreshortened more than along another. It
-is given as another plane, by its normals, by its texture coordinates, or by Jacobians; in the end it is always those: for each
-pixel the step on the texture that a step in the picture is.
+The paper has scale maps only. A surface also states that elements are foreshortened more along one direction than
+along another. It is given as a plane, by its normals, by its texture coordinates, or by Jacobians. All become
+Jacobians: the step on the texture for a step in the image, at each pixel.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from texrs.scale_maps._resample import stretch
 __all__ = ["Surface", "as_surface", "as_target", "find_size", "is_map", "is_words", "read_plane"]
 
 PREFIX = "plane:"
-"""Before the words that say how a plane lies."""
+"""Prefix of the words that describe a plane."""
 WORDS = ("slant", "tilt", "fov", "rotation")
 NEAREST = 0.02
-"""Of the middle's scale: nearer to its horizon nothing of a plane is shown."""
+"""Minimum scale of a plane that is shown, as a share of the scale in the middle. Smaller scales are near the horizon.
+"""
 
 Surface: TypeAlias = NDArray[np.float64]
 """Jacobians (rows, columns, 2, 2)."""
@@ -57,7 +58,7 @@ def as_target(target: object, green: Literal["up", "down"] = "up") -> Plane | st
 
 
 def find_size(target: Plane | str | Array | None) -> tuple[int, int] | None:
-    """Return the size that a target has of its own."""
+    """Return the size of a target, if it has one."""
     if target is None or isinstance(target, str):
         return None
     return target.shape[0], target.shape[1]
@@ -69,12 +70,12 @@ def is_map(target: Plane | str | Floats | Surface) -> TypeGuard[Floats]:
 
 
 def is_words(value: object) -> TypeGuard[str]:
-    """Return whether a value is a text that says how a plane lies."""
+    """Return whether a value is the text of a plane."""
     return isinstance(value, str) and value.startswith(PREFIX)
 
 
 def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) -> Surface:
-    """Return the Jacobians of a surface in a picture of a size: planes are seen by a finer camera, others are stretched."""
+    """Return the Jacobians of a surface in an image of a size: planes get a finer camera, others are stretched."""
     if isinstance(target, str):
         target = read_plane(target, size, "target")
     if not isinstance(target, Plane):
@@ -92,7 +93,7 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
 
 
 def read_plane(words: str, shape: Sequence[int], name: str) -> Plane:
-    """Return the plane that words describe: ``plane:slant=50,tilt=90,fov=60``."""
+    """Return the plane in words: ``plane:slant=50,tilt=90,fov=60``."""
     form = (
         f"{name}: needs plane:slant=DEGREES and, if they are known, tilt=, fov= and rotation=, with commas between them"
     )

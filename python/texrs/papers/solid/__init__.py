@@ -1,51 +1,55 @@
-"""SOLID: textures grown in two and three dimensions under a frame field.
+"""SOLID: textures of two and three dimensions under a frame field.
 
 Y.-L. Su, C.-C. Chang, Z.-C. Shih and W.-K. Tai, "Vector-field-based deformations for three-dimensional texture
 synthesis" (appearance vectors, similarity sets and a pyramid of corrections after Lefebvre and Hoppe, SIGGRAPH 2005
-and 2006). The flow:
+and 2006). The steps are:
 
-1. what is known of the exemplar: its separate elements, and which colours lie side by side (`texrs.Exemplar.stitcher`);
-2. patches of it, each pulled into the output through the field around its centre, and
-3. cut in at the best of several places; torn elements are healed (`texrs._engine.stitcher`);
-4. look the exemplar up through the coordinates.
+1. Analyse the exemplar: its separate elements, and its adjacent colours (`texrs.Exemplar.stitcher`).
+2. Map patches of it into the output through the field around their centres.
+3. Cut each in at the best of several places, and repair torn elements (`texrs._engine.stitcher`).
+4. Look the exemplar up through the coordinates.
 
-With ``quality="fast"`` steps 2 and 3 are those of the paper: coordinates are upsampled from level to level with the field's
-Jacobian (Eq. 1 and 2), and corrected by the windows around each point, warped by the field (Eq. 3 and 4). Both are the engine
-of `texrs.growth`. Unbounded textures lay patches over each other in tilings of the world (`texrs.papers.solid.layers`), so
-that a patch hangs on few others; with ``quality="fast"`` they are a chain of corrections (`texrs.papers.solid.world`).
+With ``quality="fast"`` steps 2 and 3 are those of the paper. Coordinates are upsampled from level to level with the
+field's Jacobian (Eq. 1 and 2). They are corrected by the windows around each point, warped by the field (Eq. 3 and 4).
+Both are the engine of `texrs.growth`. Unbounded textures place patches over each other in tilings of the world
+(`texrs.papers.solid.layers`), so that a patch depends on few others. With ``quality="fast"`` they are a chain of
+corrections (`texrs.papers.solid.world`).
 
 Departures, with their reasons:
 
-- Patches stitched along minimum cuts stand in for the pyramid of corrections: where points are corrected one by one, things
-  that are larger than a window are torn and fused. Of the particles of `texrs.samples.particles`, 29 % were torn when wound
-  round an axis, and none are now (`texrs.volume.integrity`); cells in walls gain more.
-- A cut judges the pair that results, the old voxel at p beside the new one at q, not how far the two pictures differ at both.
-- Patches of separate elements are turned as a whole, and those of textures with a direction bend with the field.
-- Of a picture whose elements are not found for sure, as in a heap, those of `texrs.exemplar.segmentation` are kept from being
-  cut, if not healed: seams inside of them fall to a quarter.
-- Where seams show most, half as many patches again are tried, which need not fit what lies there: they may take it if less
-  shows then.
-- Places are charged for what has been shown often, and for classes of colour in excess: cuts are cheapest where rare things
-  are left out.
+- Patches stitched along minimum cuts replace the pyramid of corrections. Correcting single points tears and fuses
+  elements larger than a window. When the particles of `texrs.samples.particles` are wound round an axis, 29 % of them
+  were torn, and none are torn now (`texrs.volume.integrity`). Cells in walls gain more.
+- The cost of a cut depends on the resulting pair, the old voxel at p next to the new one at q, and not on the
+  difference of the two textures at both.
+- Patches of separate elements are rotated as a whole, and patches of textures with a direction bend with the field.
+- If the elements of an image are not reliable, as in a heap, the elements of `texrs.exemplar.segmentation` still have
+  a cost for cuts, but are not repaired. Seams inside them fall to a quarter.
+- At the most visible seams half as many patches again are tried, which need not fit the existing ones. They are used
+  if less is visible then.
+- Places that were shown often and overrepresented classes of colour have a cost, because cuts are cheapest if rare
+  elements are left out.
 
-Of the corrections:
+Departures of the corrections:
 
-- The start is a lattice of hashed coherent blocks that are chosen to fit, not one coordinate that is jittered at every
-  level: from jitter, sparse particles never form, whatever the correction does.
-- A block is credited for its own contrast: by squared differences alone bland blocks win, and rare things get fewer.
-- The correction changes a point for a drawn match only if that gains more than twice the exemplar's own spacing:
-  otherwise repeated corrections wash rare things out.
-- A pass corrects every other point, as on a chess board, and only where pieces of the exemplar meet. When all points
-  change at once, neighbours on either side of a seam swap and nothing is gained; votes, which mended that, cost a third
+- The start is a lattice of hashed coherent blocks that fit each other, not one coordinate with jitter at every level.
+  From jitter, sparse particles never form, whatever the correction does.
+- The cost of a block is divided by its own contrast. With squared differences alone blocks of low contrast win, and
+  rare elements become rarer.
+- The correction changes a point for a drawn match only if the gain is more than twice the exemplar's own spacing.
+  Otherwise repeated corrections remove rare elements.
+- A pass corrects every other point, as on a chess board, and only where pieces of the exemplar meet. If all points
+  change at once, neighbours on both sides of a seam swap and nothing is gained. Votes, which solved this, cost a third
   of the low-frequency features.
-- Windows are compensated for where the lattice makes them look (o - J step), which the paper leaves out: without it
-  turned textures come out at the wrong scale (``method="paper-compensated"`` adds that alone).
-- A row vector in Eq. 1 and a column vector in Eq. 3 turn in opposite ways; here J is the inverse of the frame in both.
-- The pyramid is decimated, windows are 5^3 at each level and full colour windows are compared, not eight diagonal
-  neighbours, which fall apart into lattices that exchange nothing.
-- Where the exemplar repeats, as measured, its coordinates go around.
+- Windows are compensated for the offset of the lattice (o - J step), which the paper omits. Without it rotated
+  textures have the wrong scale (``method="paper-compensated"`` adds only this).
+- A row vector in Eq. 1 and a column vector in Eq. 3 rotate in opposite directions. Here J is the inverse of the frame
+  in both.
+- The pyramid is decimated, windows are 5^3 at each level, and full colour windows are compared. The paper's eight
+  diagonal neighbours separate into lattices that exchange nothing.
+- If the exemplar is measured to be periodic, its coordinates are periodic.
 
-``method="paper"`` leaves the departures out (`texrs.papers.solid.literal`).
+``method="paper"`` omits the departures (`texrs.papers.solid.literal`).
 """
 
 from __future__ import annotations
@@ -93,55 +97,57 @@ def solid(
     memory_limit: int | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Grow a volume from a volume, under a frame field.
+    """Synthesise a volume from an example volume, under a frame field.
 
     Parameters
     ----------
     exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
-        Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
-        are labels and along which axes it repeats, which are measured otherwise.
+        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` with ``axes=3`` states whether its
+        values are labels and along which axes it is periodic. Otherwise this is measured.
     size : int or (planes, rows, columns)
-        Size of the result in voxels; one number is a cube.
+        Size of the result in voxels. One number is a cube.
     field : Field, str, array_like or path_like, optional
-        Frame field that turns and scales the texture at each voxel (`texrs.fields`); none leaves it as it is. A field, its
-        words, or directions (P, R, C, 3) or frames (P, R, C, 3, 3), spread over the output, as an array or a file.
+        Frame field that rotates and scales the texture at each voxel (`texrs.fields`). It is a field or its words.
+        Directions (P, R, C, 3) or frames (P, R, C, 3, 3) over the output may be an array or a file. None leaves the
+        texture as it is.
     seed : int
-        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     wrap : bool or (planes, rows, columns), optional
-        Axes along which the result is to repeat; None: none of them.
+        Axes along which the result is periodic. Default: none.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
+        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
+        elements.
     bend_patches : bool, optional
-        Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
-        elements do; None goes by whether the exemplar has separate elements.
+        If True, patches bend with the field, as courses and nets need. If False, they are rotated and scaled as a
+        whole, as separate elements need. By default chosen by whether the exemplar has separate elements.
     method : {None, "paper", "paper-compensated"}
-        Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of
-        Lefebvre and Hoppe, which the paper leaves out. They have no ``quality``, take no constraints
-        and no guide, and look the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
+        Algorithm. "paper": the literal one, for comparison. "paper-compensated": the same with the windows of Lefebvre
+        and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and look up
+        the nearest sample by default.
     constraints : Constraints, optional
-        Voxels that are given, by their values or by where they look in the exemplar (`texrs.Constraints`).
+        Given voxels, by their values or by their source coordinates (`texrs.Constraints`).
     guide : Guide, optional
-        A map that the result is to follow, for exemplars with a trend, such as grains that grow downwards
+        A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
         (`texrs.Guide`).
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
-        sample whatever it says.
+        Interpolation between the exemplar's samples in the final look-up. None is "cubic". Labels always use the
+        nearest sample.
     spacing : (plane, row, column) float, optional
-        Voxel size along each axis of the exemplar and of the result, in any unit. The field turns and
-        scales the texture in space, not in voxels; its places and lengths are in that unit. Default: voxels are cubes of
-        side 1.
+        Voxel size along each axis of the exemplar and of the result, in any unit. The field rotates and scales the
+        texture in space, not in voxels, and its places and lengths are in this unit. Default: voxels are cubes of side
+        1.
     memory_limit : int, optional
-        Bytes that the work may take. None: all that the limits in force allow (`texrs.limits`).
+        Maximum bytes of the work. By default the limits in force (`texrs.limits`).
     progress : callable or True, optional
-        Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
-        True shows a bar.
+        Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
+        the work. True shows a bar.
 
     Returns
     -------
     Synthesis
-        The volume, in the exemplar's dtype; its source map, whose frames are those of its patches; as stages, pictures of the
-        middle plane at each level; and a report.
+        The volume in the exemplar's dtype, and its source map with the frames of its patches. The stages are images of
+        the middle plane at each level.
 
         Stages:
 
@@ -161,23 +167,23 @@ def solid(
         - ``constrained_points``: Number of constrained points.
         - ``guided``: Whether a guide was given.
         - ``elements``: Number of separate elements that were found, or None.
-        - ``stitched``: Number of ``patches``, whether they were ``bent``, mean cost of the ``seams`` and number of ``healed``
-          patches; None if points were corrected.
+        - ``stitched``: Number of ``patches``, whether they were ``bent``, mean cost of the ``seams`` and number of
+          ``healed`` patches; None if points were corrected.
         - ``levels``: For each level: its ``shape``, number of ``passes`` and the share of points that ``changed``.
         - ``spacing``: (plane, row, column) distances, if they were given.
         - ``patches``: How patches were chosen; only if they were.
-        - ``candidates``: The figures of each way that was tried, or None. They are ``score`` (0 is best), ``torn``, ``broken``,
-          ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
+        - ``candidates``: The figures of each method that was tried, or None. They are ``score`` (0 is best), ``torn``,
+          ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
 
     Raises
     ------
     InvalidInput
-        An exemplar that is too small or not finite, a field of other axes or singular somewhere, constraints or maps
-        of other shapes, or an option out of its range.
+        If the exemplar is too small or not finite, or a field has other axes or is singular somewhere. Also if
+        constraints or maps have other shapes, or an option is out of its range.
     LimitExceeded
-        The work would take more memory than allowed.
+        If the work would take more memory than allowed.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     See Also
     --------
@@ -237,66 +243,68 @@ def synthesize(
     memory_limit: int | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Grow a picture from a picture, under a frame field.
+    """Synthesise an image from an example image, under a frame field.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
-        Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
-        along which axes it repeats, which are measured otherwise.
+        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` states whether its values are labels and
+        along which axes it is periodic. Otherwise this is measured.
     size : int or (int, int)
-        Size of the result in pixels; one number is a square.
+        Size of the result in pixels. One number is a square.
     field : Field, str, array_like or path_like, optional
-        Frame field that turns and scales the texture at each pixel (`texrs.fields`); none leaves it as it is. A field, its
-        words, or directions (R, C, 2) or frames (R, C, 2, 2), spread over the output, as an array or a file.
+        Frame field that rotates and scales the texture at each pixel (`texrs.fields`). It is a field or its words.
+        Directions (R, C, 2) or frames (R, C, 2, 2) over the output may be an array or a file. None leaves the texture
+        as it is.
     seed : int
-        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     wrap : bool or (rows, columns), optional
-        Axes along which the result is to repeat; None: neither.
+        Axes along which the result is periodic. Default: none.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
+        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
+        elements.
     bend_patches : bool, optional
-        Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
-        elements do; None goes by whether the exemplar has separate elements.
+        If True, patches bend with the field, as courses and nets need. If False, they are rotated and scaled as a
+        whole, as separate elements need. By default chosen by whether the exemplar has separate elements.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
-        How patches are put together. "large": a quarter larger than the default, which tears fewer things and copies more in
-        one piece. "unmasked": seams may run through elements. "auto": each is tried twice at the exemplar's size and judged
-        (`texrs.metrics`), and what is clearly better than the default is taken; the report's "candidates" contains the
-        figures of each.
+        Method of stitching. "large": patches a quarter larger than the default, which tear fewer elements and copy
+        more in one piece. "unmasked": seams may cross elements. "auto": each method is tried twice at the exemplar's
+        size and evaluated (`texrs.metrics`). A clearly better one replaces the default. The report key "candidates"
+        contains the figures of each.
     method : {None, "paper", "paper-compensated"}
-        Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of
-        Lefebvre and Hoppe, which the paper leaves out. They have no ``quality``, take no constraints
-        and no guide, and look the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
+        Algorithm. "paper": the literal one, for comparison. "paper-compensated": the same with the windows of Lefebvre
+        and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and look up
+        the nearest sample by default.
     constraints : Constraints, optional
-        Pixels that are given, by their values or by where they look in the exemplar (`texrs.Constraints`).
+        Given pixels, by their values or by their source coordinates (`texrs.Constraints`).
     guide : Guide, optional
-        A map that the result is to follow, for exemplars with a trend, such as grains that grow downwards
+        A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
         (`texrs.Guide`).
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
-        sample whatever it says.
+        Interpolation between the exemplar's samples in the final look-up. None is "cubic". Labels always use the
+        nearest sample.
     memory_limit : int, optional
-        Bytes that the work may take. None: all that the limits in force allow (`texrs.limits`).
+        Maximum bytes of the work. By default the limits in force (`texrs.limits`).
     progress : callable or True, optional
-        Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
-        True shows a bar.
+        Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
+        the work. True shows a bar.
 
     Returns
     -------
     Synthesis
-        The image, in the exemplar's dtype; its source map, whose frames are those of its patches. The stages and the keys of
-        the report are as in `solid`, without ``spacing``.
+        The image in the exemplar's dtype, and its source map with the frames of its patches. The stages and the keys
+        of the report are as in `solid`, without ``spacing``.
 
     Raises
     ------
     InvalidInput
-        An exemplar that is too small or not finite, a field of other axes or singular somewhere, constraints or maps
-        of other shapes, or an option out of its range.
+        If the exemplar is too small or not finite, or a field has other axes or is singular somewhere. Also if
+        constraints or maps have other shapes, or an option is out of its range.
     LimitExceeded
-        The work would take more memory than allowed.
+        If the work would take more memory than allowed.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     See Also
     --------
@@ -338,7 +346,7 @@ def synthesize(
 
 
 def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
-    """Grow the source map, coarse to fine or from patches, and look the exemplar up through it."""
+    """Compute the source map, coarse to fine or from patches, and look the exemplar up through it."""
     said: dict[str, Any] = {"patches": None, "candidates": None}
     show = partial(show_places, asked.exemplar.pixels)
     if asked.method is not None:
@@ -365,7 +373,7 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
 
 
 def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown, dict[str, Any]]:
-    """Put patches together along minimum cuts, at full resolution: nothing has to be corrected. Say by which plan."""
+    """Stitch patches along minimum cuts, at full resolution, without corrections. Return the method too."""
     name, tried = choose_plan(asked.exemplar, asked.patches, asked.quality, partial(try_plan, asked, progress))
     start = PLANS[name].start(asked.exemplar, asked.seed, asked.quality, asked.bend_patches)
     frames = partial(to_fixed, asked.field)
@@ -374,7 +382,7 @@ def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown
 
 
 def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:
-    """Put a picture of the exemplar's size together by a plan, without a field or anything else that is asked."""
+    """Make an image of the exemplar's size by a method, without a field or constraints."""
     stage(progress, "try")
     region = Region.whole(asked.exemplar.shape, (False, False))
     grown = grow(region, 1, plan.start(asked.exemplar, seed, asked.quality, None), keep, partial(to_fixed, None))
@@ -382,12 +390,12 @@ def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -
 
 
 def analyse(asked: Request) -> Windows:
-    """Return the exemplar's pyramid of windows, and how much is done at each level."""
+    """Return the exemplar's pyramid of windows, and the settings of each level."""
     return Windows(asked.exemplar.analyse(FAST.radii).levels, FAST, asked.seed, asked.field)
 
 
 def as_source(asked: Request, grown: Grown) -> SourceMap:
-    """Return places as a source map: its frames are those of rigid patches, else the field's."""
+    """Return places as a source map, with the frames of rigid patches or of the field."""
     coordinates, shape = as_coordinates(grown.places, asked.region), asked.exemplar.shape
     if grown.patches is None:
         return SourceMap.from_coordinates(coordinates, shape, jacobian=asked.field)
@@ -404,7 +412,7 @@ def as_coordinates(places: Places, region: Region) -> Array:
 
 
 def show_places(image: Array, places: Places, region: Region, spacing: int) -> Array:
-    """Return a picture of places: all of a picture, the middle plane of a volume, through the exemplar itself."""
+    """Return an image of places: a whole image, or the middle plane of a volume, looked up in the exemplar."""
     axes = len(region.shape)
     shown = places.reshape(*region.shape, axes)
     if axes == 3:
@@ -415,7 +423,7 @@ def show_places(image: Array, places: Places, region: Region, spacing: int) -> A
 
 
 def describe(asked: Request, grown: Grown) -> dict[str, Any]:
-    """Return the report: JSON types."""
+    """Return the report as JSON types."""
     levels = [done.report() for done in grown.levels]
     if asked.method is not None:
         levels = [{"shape": level["shape"], "passes": level["passes"]} for level in levels]
@@ -439,7 +447,7 @@ def describe(asked: Request, grown: Grown) -> dict[str, Any]:
 
 
 def _count_elements(asked: Request) -> int | None:
-    """Return how many separate elements were found, where they were looked for."""
+    """Return the number of separate elements, if they were searched for."""
     if asked.method is not None or asked.quality == "fast":
         return None
     found = asked.exemplar.instances

@@ -1,4 +1,4 @@
-"""Finished boxes of an unbounded texture, packed: what they show follows from the patches and their table."""
+"""Packed finished boxes of an unbounded texture: their content follows from the patches and their table."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ __all__ = ["Box", "intersect", "join"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
-    """What a box shows.
+    """Content of a box.
 
     Attributes
     ----------
     region : Region
-        Where it is.
+        Region of the box.
     patches : (...) array
-        The patch that each point shows, in as few bytes as they take.
+        Patch of each point, in as few bytes as possible.
     table : (patches, K) int32
-        As in `texrs._engine.stitcher.Shown`, with centres as seen from the first point.
+        Table as in `texrs._engine.stitcher.Shown`, with centres relative to the first point.
     cut : (M,) uint32
-        Positions in the row of all seams that cost something.
+        Flat positions of all seams with a cost.
     costs : (M,) float32
-        What they cost.
+        Their costs.
     places : (..., A) int32
-        Where each point looks; empty where all patches are rigid, and it follows from their frames.
+        Coordinates of each point. Empty if all patches are rigid, because they follow from their frames.
     distortion : (...) float32
-        Likewise.
+        Distortion of each point. Empty in the same case.
 
     """
 
@@ -48,7 +48,7 @@ class Box:
 
     @classmethod
     def pack(cls, region: Region, shown: Shown, *, bent: bool) -> Box:
-        """Return a box in few bytes; bent patches cannot be told from their table."""
+        """Return a box in few bytes. The table does not determine bent patches."""
         cut = np.flatnonzero(shown.seams)
         kind = np.min_scalar_type(len(shown.table))
         return cls(
@@ -67,14 +67,14 @@ class Box:
         return sum(a.nbytes for a in (self.patches, self.table, self.cut, self.costs, self.places, self.distortion))
 
     def show(self, there: tuple[slice, ...]) -> Places:
-        """Return the places of a part, (..., A) int32."""
+        """Return the coordinates of a part, (..., A) int32."""
         if self.places.size:
             return self.places[there]
         patches = self.patches[there]
         axes = patches.ndim
         centre, place = self.table[:, :axes], self.table[:, axes : 2 * axes]
         frame = self.table[:, 2 * axes : -2].reshape(-1, axes, axes)
-        # S(p) = place + J (p - centre), of which all but J p is the patch's own.
+        # S(p) = place + J (p - centre). Everything except J p is constant within a patch.
         out: Places = (place - np.einsum("kij,kj->ki", frame, centre)).astype(np.int32)[patches]
         for axis in range(axes):
             line = np.arange(there[axis].start, there[axis].stop, dtype=np.int32)
@@ -86,7 +86,7 @@ class Box:
         return out
 
     def seams(self) -> NDArray[np.float32]:
-        """Return what all seams cost, (..., A)."""
+        """Return the costs of all seams, (..., A)."""
         axes = self.patches.ndim
         out = np.zeros(self.patches.size * axes, np.float32)
         out[self.cut] = self.costs
@@ -94,7 +94,7 @@ class Box:
 
 
 def join(box: Region, parts: Sequence[Box]) -> Shown:
-    """Return what a box shows that parts hold together; patches of several parts that are the same are one."""
+    """Return the content of a box assembled from parts. Equal patches of several parts become one."""
     axes = len(box.shape)
     places: Places = np.empty((*box.shape, axes), np.int32)
     seams: NDArray[np.float32] = np.empty((*box.shape, axes), np.float32)
@@ -121,7 +121,7 @@ def join(box: Region, parts: Sequence[Box]) -> Shown:
 
 
 def intersect(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Return what two regions have in common as slices of the one and of the other."""
+    """Return the intersection of two regions as slices of both."""
     starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
     stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
     here, there = (

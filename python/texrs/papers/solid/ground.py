@@ -1,4 +1,4 @@
-"""What lies under the layers of an unbounded texture: boxes of the exemplar, each from a hashed place."""
+"""Lowest layer of an unbounded texture: boxes of the exemplar, each from a hashed place."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from texrs.growth.engine import Places
 __all__ = ["Ground"]
 
 BENT = 0.7
-"""Boxes in which frames differ by more are divided: by the root mean square over the axes."""
+"""Maximum difference of frames in a box before it is divided: root mean square over the axes."""
 LEAST = 4
-"""Boxes of such a side are not divided for that."""
+"""Side of the smallest boxes, which are not divided for this reason."""
 
 Row = tuple[tuple[int, ...], tuple[int, ...], NDArray[np.int64]]
-"""The centre of a box, where that looks, and the Jacobian there."""
+"""Centre of a box, its source coordinates, and the Jacobian there."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Boxes that tile the world; what a box shows hangs on the seed, its number and the field inside alone.
+    """Boxes that tile the world. Their content depends only on the seed, the box number and the field inside.
 
     Attributes
     ----------
     shape : tuple of int
-        Of the exemplar.
+        Shape of the exemplar.
     repeat : tuple of bool
-        Axes along which it repeats.
+        Axes along which it is periodic.
     side : int
-        Of a box.
+        Side of a box.
     seed : int
-        Chooses the places.
+        Seed that chooses the places.
     field : Field, optional
-        How boxes are turned and scaled.
+        Rotation and scale of boxes.
     lattice : (A, A) array, optional
-        Rows by which the exemplar repeats itself, in samples: where one frame serves all, boxes are in step.
+        Lattice vectors of the exemplar as rows, in samples. With one frame for all boxes they are in step.
 
     """
 
@@ -54,7 +54,7 @@ class Ground:
     lattice: NDArray[np.int64] | None = None
 
     def show(self, region: Region) -> tuple[Places, NDArray[np.uint32], NDArray[np.int32]]:
-        """Return the places of a region, the box of each point, and the table of boxes (`texrs._engine.stitcher.Shown`)."""
+        """Return the coordinates of a region, the box of each point, and the table of boxes."""
         axes = len(self.shape)
         places = np.empty((*region.shape, axes), np.int32)
         boxes = np.empty(region.shape, np.uint32)
@@ -80,7 +80,7 @@ class Ground:
         return places.reshape(-1), boxes.reshape(-1), np.array(table, np.int32)
 
     def boxes(self, index: Sequence[int]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], Row]]:
-        """Return a box of the lattice, from its first point to one beyond its last; in parts, where it does not fit."""
+        """Return a box of the lattice, from its first point to one after its last, in parts if it does not fit."""
         low = tuple(i * self.side for i in index)
         parts = self._divide(low, tuple(a + self.side for a in low))
         for number, (start, stop, centre, frame, ends) in enumerate(parts):
@@ -92,15 +92,16 @@ class Ground:
 
     @property
     def _varying(self) -> Field | None:
-        """The field, unless one frame serves all."""
+        """Return the field, or None if all boxes have one frame."""
         return None if self.field is None or self.field.constant is not None else self.field
 
     def _divide(
         self, low: tuple[int, ...], high: tuple[int, ...]
     ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], NDArray[np.int64], list[tuple[int, int]]]]:
-        """Return the parts of a box, with their centres, frames, and the samples that the centre may look at.
+        """Return the parts of a box, with their centres, frames, and the allowed samples of the centre.
 
-        A box is cut in two where its frames differ, across the axis along which they do so most: at a fold, or in the middle.
+        A box whose frames differ is cut in two, across the axis of the largest difference: at a fold, or in the
+        middle.
         """
         axes = len(low)
         sides = [b - a for a, b in zip(low, high, strict=True)]
@@ -128,7 +129,7 @@ class Ground:
     def _frames(
         self, low: tuple[int, ...], high: tuple[int, ...], centre: tuple[int, ...]
     ) -> tuple[NDArray[np.int64], list[float], list[int]]:
-        """Return the Jacobian in the middle of a box; along each axis how far others are from it, and where to cut."""
+        """Return the Jacobian in the middle of a box, the maximum difference along each axis, and the place for a cut."""
         axes, varying = len(low), self._varying
         if varying is None:
             frame = to_fixed(self.field, Region.whole((1,) * axes))[0]
@@ -141,7 +142,7 @@ class Ground:
             frame = along[centre[axis] - low[axis]]
             apart.append(float(_measure(along - frame).max()))
             jumps = _measure(np.diff(along, axis=0))
-            # From one voxel to the next frames change little, unless there is a fold.
+            # Frames change little from one voxel to the next, unless there is a fold.
             sharp = len(jumps) > 0 and jumps.max() > 0.5 * BENT
             folds.append(low[axis] + 1 + int(jumps.argmax()) if sharp else centre[axis])
         return frame, apart, folds
@@ -155,7 +156,10 @@ def _measure(frames: NDArray[np.int64]) -> NDArray[np.float64]:
 def _step_in(
     place: tuple[int, ...], ahead: NDArray[np.int64], lattice: NDArray[np.int64], ends: list[tuple[int, int]]
 ) -> tuple[int, ...]:
-    """Return the place nearest to one that is a multiple of a lattice from where one frame leads, if there is one."""
+    """Return the nearest place in step with the lattice, if there is one.
+
+    It is a multiple of the lattice away from the place that a frame predicts.
+    """
     near = np.rint(np.linalg.solve(lattice.T.astype(np.float64), (np.array(place) - ahead).astype(np.float64)))
     steps = np.array(list(product((-1, 0, 1), repeat=len(place))))
     found = ahead + (near.astype(np.int64) + steps) @ lattice

@@ -1,15 +1,15 @@
-"""Unbounded textures put together from patches: tilings of the world by boxes, each laid over the one before.
+"""Unbounded textures assembled from patches: tilings of the world by boxes, each placed over the previous one.
 
-The lowest layer are boxes of the exemplar from hashed places (`texrs.papers.solid.ground`). Each layer above is the same
-tiling, shifted. A box of it is a patch, of the best of several places, cut into what the layer before shows there
-(`Stitcher.cover`); in the last layer the worst seams inside a box are covered again, and elements that are torn there are
-healed. The ends of a box stay as they are, so that boxes of a layer do not know of each other: what a box becomes hangs on
-the boxes of the layer before that it meets, 2^A of them, and on the field inside. So any part can be made by itself, and is
-the same however it is asked for.
+The lowest layer consists of boxes of the exemplar from hashed places (`texrs.papers.solid.ground`). Each higher layer
+is the same tiling, shifted. Its boxes are patches. The best of several places is cut into the content of the previous
+layer (`Stitcher.cover`). The last layer covers the worst seams inside a box again, and repairs torn elements. The
+borders of a box stay unchanged, so that boxes of a layer are independent. A box depends only on the 2^A boxes of the
+previous layer that it meets, and on the field inside. Any part can therefore be computed by itself, and is always the
+same.
 
-In rows and columns, or in classes of centres as corners, edges and interiors, a patch would hang on many more: in three
-dimensions a window of 32^3 on some 900 instead of 75. Cuts into what is covered already are no worse for it: a patch is
-free to take where it fits, and to leave where it does not.
+A patch would depend on many more boxes in rows and columns, or in classes of centres such as corners, edges and
+interiors. A window of 32^3 would depend on about 900 instead of 75. Cuts into covered areas are not worse, because a
+patch may cover the parts where it fits, and leave the others.
 """
 
 from __future__ import annotations
@@ -42,20 +42,25 @@ SHIFTS = {
     2: ((0.0, 0.0), (0.5, 0.5), (0.5, 0.0), (0.0, 0.5)),
     3: ((0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (0.25, 0.25, 0.25)),
 }
-"""By how much of a side each layer is shifted: the ends of one lie in the middle of others. In three dimensions each more
-doubles what a window hangs on."""
+"""Shift of each layer, as a share of a side: the borders of one layer are in the middle of others.
+
+Each further layer doubles the boxes that a window of a volume depends on.
+"""
 LARGER = 1.2
-"""How much larger boxes are than patches in rows: less of each is left."""
+"""Factor on the side of boxes compared with patches in rows, because less of each remains."""
 RECOVER = {2: 2.0, 3: 0.5}
-"""Share of as many patches as fill a box that cover its worst seams again: in three dimensions more gain nothing."""
+"""Number of patches that cover the worst seams of a box again, as a share of the patches that fill it.
+
+More patches gain nothing in volumes.
+"""
 LARGEST = {2: 512, 3: 80}
-"""Side of a box at most, where a field enlarges."""
+"""Maximum side of a box where a field enlarges."""
 FITS = 0.9
-"""Patches are as large as so much of the exemplar, at most: there are places to choose from."""
+"""Maximum side of a patch as a share of the exemplar, so that there are several places to choose from."""
 WORK = 256 << 20
-"""Bytes of boxes that a window keeps while it is made, about."""
+"""Approximate bytes of boxes that a window keeps while it is computed."""
 BESIDE = 8
-"""Boxes that are made side by side: each takes some memory of its own."""
+"""Number of boxes that are computed in parallel. Each takes memory of its own."""
 _PROBES, _FAR = 64, 512
 
 Key: TypeAlias = tuple[int, ...]
@@ -63,16 +68,16 @@ Key: TypeAlias = tuple[int, ...]
 
 
 class Seen(NamedTuple):
-    """What a window shows.
+    """Content of a window.
 
     Attributes
     ----------
     places : (..., A) int32
-        In units of 1/4096 of a sample.
+        Source coordinates, in units of 1/4096 of a sample.
     labels : (...) uint32
-        The patch of each point, counted within the window.
+        Patch of each point, counted within the window.
     frames : (patches, A, A) float32
-        The Jacobian in the middle of each.
+        Jacobian in the middle of each patch.
 
     """
 
@@ -82,18 +87,18 @@ class Seen(NamedTuple):
 
 
 class Layers:
-    """The places of an endless texture, layer by layer.
+    """Source coordinates of an unbounded texture, layer by layer.
 
     Parameters
     ----------
     exemplar : Exemplar
-        What patches are cut from.
+        Exemplar that patches are cut from.
     field : Field, optional
-        How the texture is turned and scaled; none leaves it as it is.
+        Rotation and scale of the texture. None leaves it as it is.
     seed : int
-        Chooses the texture.
+        Seed of the random choices.
     candidates : int
-        Places that are tried for each patch.
+        Number of places that are tried for each patch.
     cache_bytes : int
         Memory for finished boxes.
 
@@ -112,15 +117,15 @@ class Layers:
 
     @property
     def cached(self) -> int:
-        """Bytes of finished boxes that are kept."""
+        """Bytes of finished boxes in memory."""
         return self._kept.used
 
     def clear(self) -> None:
-        """Forget what is kept."""
+        """Drop the finished boxes."""
         self._kept.clear()
 
     def read(self, box: Region, progress: Progress | None = None) -> Places:
-        """Return the places of a box, (..., A) int32."""
+        """Return the coordinates of a box, (..., A) int32."""
         out = np.empty((*box.shape, self.axes), np.int32)
         for part in self._make_all(self._meeting(len(self.shifts) - 1, box), progress):
             here, there = intersect(box, part.region)
@@ -128,7 +133,7 @@ class Layers:
         return self._bring_around(out)
 
     def look(self, box: Region, progress: Progress | None = None) -> Seen:
-        """Return the places of a box with the patches that they come from."""
+        """Return the coordinates of a box with their patches."""
         parts = list(self._make_all(self._meeting(len(self.shifts) - 1, box), progress))
         shown = join(box, parts)
         frames = shown.table[:, 2 * self.axes : -2].reshape(-1, self.axes, self.axes) / np.float32(ONE)
@@ -136,7 +141,7 @@ class Layers:
         return Seen(places, shown.patches.reshape(box.shape), frames.astype(np.float32))
 
     def pick(self, points: NDArray[np.int64], progress: Progress | None = None) -> Places:
-        """Return the places of single points (N, A) of the world: (N, A) int32."""
+        """Return the exemplar coordinates, (N, A) int32, at N points (N, A) of the unbounded texture."""
         last = len(self.shifts) - 1
         cells, number = np.unique((points - np.array(self.shifts[last])) // self.side, axis=0, return_inverse=True)
         number = number.reshape(-1)
@@ -151,7 +156,7 @@ class Layers:
         return self._bring_around(out)
 
     def _make_all(self, keys: Sequence[Key], progress: Progress | None) -> Iterator[Box]:
-        """Return some boxes, one after the other; those of a layer are made side by side."""
+        """Return some boxes one after the other. Those of a layer are computed in parallel."""
         advance = stage(progress, "patches")
         total = len(self._find_missing(keys)) if advance else 0
         work: Cache[Key, Box] = Cache(WORK, lambda box: box.nbytes)
@@ -172,7 +177,7 @@ class Layers:
             for start in range(0, len(keys), BESIDE):
                 some = keys[start : start + BESIDE]
                 missing = self._find_missing(some)
-                # Below first, so that no two of a layer wait for the same box.
+                # Compute lower layers first, so that no two boxes of a layer wait for the same one.
                 for layer in sorted({key[0] for key in missing}):
                     group = sorted(key for key in missing if key[0] == layer and work.get(key) is None)
                     beside.do(make, group, watch)
@@ -181,7 +186,7 @@ class Layers:
                     yield self._get(key, work, lambda share: watch(0, 0.0))
 
     def _find_missing(self, keys: Sequence[Key]) -> set[Key]:
-        """Return the boxes that must be made for some."""
+        """Return the boxes that are needed for some boxes and are missing."""
         found: set[Key] = set()
         todo = list(keys)
         while todo:
@@ -192,7 +197,7 @@ class Layers:
         return found
 
     def _get(self, key: Key, work: Cache[Key, Box], advance: Callable[[float], object]) -> Box:
-        """Return a box: one that is kept, or made from those below it."""
+        """Return a box from memory, or computed from the boxes below it."""
         box = work.get(key) or self._kept.get(key)
         if box is None:
             below = [self._get(k, work, advance) for k in self._below(key)]
@@ -202,10 +207,10 @@ class Layers:
         return box
 
     def _make(self, key: Key, below: Sequence[Box], advance: Callable[[float], object]) -> Box:
-        """Cut a patch into what the layer below shows in a box."""
+        """Cut a patch into the content of the layer below in a box."""
         region = self._region(key)
         frames, last = to_fixed(self.field, region), key[0] == len(self.shifts) - 1
-        # Boxes are made sooner than a kernel looks up from its work.
+        # A box is finished before a kernel would check for cancellation.
         advance(0.0)
         with answering(advance, 0.0):
             stitcher = self.exemplar.stitcher
@@ -216,7 +221,7 @@ class Layers:
             patch=max(6.0, FITS * min(self.exemplar.shape)),
             candidates=self.candidates,
             bend=self.bent,
-            # What lies below is cut again: seams are covered, and elements healed, in the end.
+            # Lower layers are cut again later, so only the last layer recovers seams and repairs elements.
             recover=RECOVER[self.axes] if last else 0.0,
             heal=last,
             weights=weights_of(self.exemplar),
@@ -225,8 +230,8 @@ class Layers:
         return Box.pack(region, shown, bent=self.bent)
 
     def _show_ground(self, region: Region) -> Shown:
-        """Return what the lowest layer shows, with its seams."""
-        # One point more, for the seams at the far ends.
+        """Return the content of the lowest layer, with its seams."""
+        # Take one point more to get the seams at the far borders.
         larger = Region(tuple(n + 1 for n in region.shape), region.origin, region.wrap)
         places, boxes, table = self.ground.show(larger)
         seams = self.exemplar.stitcher.judge(larger, places, boxes, weights_of(self.exemplar))
@@ -236,7 +241,7 @@ class Layers:
         return Shown(shown, boxes.reshape(larger.shape)[here].reshape(-1), near, np.zeros(0, np.float32), table)
 
     def _below(self, key: Key) -> list[Key]:
-        """Return the boxes of the layer below that a box is cut into; none above the ground."""
+        """Return the boxes of the layer below that a box is cut into, or none above the ground."""
         return [] if key[0] == 1 else self._meeting(key[0] - 1, self._region(key))
 
     def _meeting(self, layer: int, box: Region) -> list[Key]:
@@ -252,7 +257,7 @@ class Layers:
         return Region((self.side,) * self.axes, origin, (False,) * self.axes)
 
     def _bring_around(self, places: Places) -> Places:
-        """Bring places around the axes along which the exemplar repeats."""
+        """Wrap coordinates along the periodic axes of the exemplar."""
         for axis, (n, closed) in enumerate(zip(self.exemplar.shape, self.exemplar.repeat, strict=True)):
             if closed:
                 places[..., axis] = (places[..., axis] + ONE // 2) % (n * ONE) - ONE // 2
@@ -260,9 +265,9 @@ class Layers:
 
 
 def _find_side(exemplar: Exemplar, field: Field | None, seed: int) -> int:
-    """Return the side of the boxes: that of a patch, as large as the field makes it at most places around the origin.
+    """Return the side of the boxes: the side of a patch, scaled by the field at most places around the origin.
 
-    Where it makes things smaller a box is divided where it must be; where it made boxes too small, elements would be torn.
+    Boxes are divided where the field reduces, if needed. Boxes that are too small would tear elements.
     """
     side, axes = LARGER * patch_side(exemplar.shape), exemplar.axes
     if field is not None:
@@ -273,7 +278,7 @@ def _find_side(exemplar: Exemplar, field: Field | None, seed: int) -> int:
 
 
 def _find_rows(exemplar: Exemplar, field: Field | None) -> NDArray[np.int64] | None:
-    """Return the vectors by which a picture repeats itself, where boxes can be in step: one frame serves all."""
+    """Return the lattice vectors of an exemplar if boxes can be in step, which needs one frame for all."""
     if exemplar.axes != 2 or (field is not None and field.constant is None):
         return None
     lattice = find_lattice(exemplar.guidance)

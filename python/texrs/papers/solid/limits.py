@@ -1,4 +1,4 @@
-"""Memory, known before it is used."""
+"""Memory of a synthesis, estimated in advance."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ LARGER = {
     2: "texrs.PlaneTexture.to_zarr and to_dask make it in parts",
     3: "texrs.SolidTexture.to_zarr and to_dask make it in parts",
 }
-"""How larger ones are made, by the number of axes."""
+"""Methods for larger results, by the number of axes."""
 
 
 def estimate_bytes(image: Array, region: Region, field: Field | None, quality: str) -> int:
-    """Return the bytes that a synthesis takes, about."""
+    """Return the approximate bytes of a synthesis."""
     verb = "solid" if len(region.shape) == 3 else "synthesize"
     varies = field is not None and field.constant is None
     return estimate_memory(verb, image.shape, region.shape, dtype=image.dtype, method=quality, field=varies)
@@ -27,7 +27,7 @@ def estimate_bytes(image: Array, region: Region, field: Field | None, quality: s
 def check_region(
     image: Array, region: Region, field: Field | None, quality: str, limit: object, beside: int = 0
 ) -> None:
-    """Refuse what would take more memory than allowed, with so many bytes beside it, before anything is allocated."""
+    """Refuse a synthesis that would take more memory than allowed, before anything is allocated."""
     most = None if limit is None else as_int(limit, "memory_limit", 1, 1 << 62)
     needed = estimate_bytes(image, region, field, quality) + beside
     check_memory(needed, "size", limit=most, way=LARGER[len(region.shape)])

@@ -1,19 +1,19 @@
 """SOLID as printed (``method="paper"``): one coordinate, upsampled, jittered and corrected level by level.
 
-Section 3 of Su, Chang, Shih and Tai, with its misprints repaired:
+Section 3 of Su, Chang, Shih and Tai, with its misprints corrected:
 
-- Eq. 1 has a row vector, Delta A, and Eq. 3 a column vector, A^-1 Delta, which for a rotation turn in opposite ways. Both
-  are columns here: J Delta in Eq. 1 and F Delta in Eq. 3, where F is the frame that the field gives and J, the
-  paper's A, its inverse;
-- H: Z^2 -> [-1, +1]^2 of Eq. 2 is H: Z^3 -> [-1, +1]^3, and of two axes in a picture;
-- similar voxels are said to be searched within the n^3 neighbourhood of p, and none may lie within it: the whole exemplar
-  is searched, outside of the neighbourhoods of all that are already chosen.
+- Eq. 1 has a row vector, Delta A, and Eq. 3 a column vector, A^-1 Delta. For a rotation these turn in opposite
+  directions. Both are columns here: J Delta in Eq. 1 and F Delta in Eq. 3, where F is the frame of the field and J,
+  the paper's A, its inverse.
+- H: Z^2 -> [-1, +1]^2 of Eq. 2 is H: Z^3 -> [-1, +1]^3, and has two axes in an image.
+- The paper searches similar voxels within the n^3 neighbourhood of p, and forbids all of them. Here the whole exemplar
+  is searched, outside the neighbourhoods of all chosen voxels.
 
-Where the paper is silent: the appearance space is that of the level (C^l and A_l bear a level, V' none), in a pyramid
-whose coarsest level has 16 samples a side, so levels coarser than that are upsampled and jittered alone. Warped
-neighbours are rounded to the lattice. A coordinate that leaves the exemplar, less the border that the paper drops,
-comes back on its other side; a candidate that does is no candidate. Two passes of 2^D classes of points, one of each
-parity.
+The paper leaves other details open. The appearance space is that of the level (C^l and A_l have a level, V' has none).
+The coarsest level of the pyramid has 16 samples a side, so coarser levels are only upsampled and jittered. Warped
+neighbours are rounded to the lattice. A coordinate that leaves the exemplar, without the border that the paper drops,
+returns on the other side. A candidate that leaves it is not used. There are two passes of 2^D classes of points, one
+for each parity.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from texrs.growth.engine import Places, Show
 __all__ = ["JITTER", "NUMBERS", "K", "N", "grow_as_printed"]
 
 K, N = 3, 7
-"""Voxels of a similarity set, and the side of the neighbourhood around each from which no other comes (section 4)."""
+"""Number of voxels in a similarity set, and side of the neighbourhood around each that excludes others (section 4)."""
 NUMBERS = 8
-"""Numbers of an appearance vector (section 4)."""
+"""Number of components of an appearance vector (section 4)."""
 JITTER = 0.7
-"""r_l, at every level (section 4)."""
+"""Jitter r_l at every level (section 4)."""
 PASSES = 2
-"""Corrections at each level: as Lefebvre and Hoppe do, the paper is silent."""
+"""Number of corrections at each level, as Lefebvre and Hoppe do. The paper does not state it."""
 
 
 def grow_as_printed(
@@ -64,20 +64,20 @@ def grow_as_printed(
     Parameters
     ----------
     exemplar : Exemplar
-        Analysed with windows of 5^D.
+        Exemplar analysed with windows of 5^D.
     field : Field, optional
-        The frames; none leaves the texture as it is.
+        Frame field. None leaves the texture as it is.
     seed : int
-        Of the hash H.
+        Seed of the hash H.
     region : Region
-        The output.
+        Region of the output.
     show : callable
-        Makes pictures of the levels that are corrected.
+        Function that makes images of the corrected levels.
     compensated : bool
-        Whether windows are compensated for where the lattice makes them look, as Lefebvre and Hoppe (2006) do and the
-        paper does not.
+        If True, windows are compensated for the offset of the lattice, as Lefebvre and Hoppe (2006) do and the paper
+        does not.
     progress : callable, optional
-        Called with the stage and the share of it that is done.
+        Called with the stage and its completed share.
 
     Returns
     -------
@@ -98,12 +98,12 @@ def grow_as_printed(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correction:
-    """What the paper does at each level after upsampling: jitter (Eq. 2), and the correction of voxels (section 3.2.4)."""
+    """Steps of the paper at each level after upsampling: jitter (Eq. 2), and the correction of voxels (section 3.2.4)."""
 
     exemplar: Exemplar
     seed: int
     first: int
-    """Number of the coarsest level of the output; below zero where the exemplar has none so coarse."""
+    """Number of the coarsest level of the output. Below zero if the exemplar has no level as coarse."""
     compensated: bool
 
     def __call__(
@@ -115,7 +115,7 @@ class Correction:
         asked: Asked,
         progress: Progress | None,
     ) -> Corrected:
-        """Return the places of a level: only jittered where it is coarser than all levels of the exemplar."""
+        """Return the coordinates of a level. Levels coarser than all levels of the exemplar are only jittered."""
         levels = self.exemplar.analyse().levels
         if level > self.first:
             # Eq. 2: S_l[p] = S_l[p] + h_l H(p) r_l; here h_l is the unit.
@@ -142,7 +142,7 @@ class Correction:
 
 
 def bring_inside(places: Places, exemplar: Appearance, above: int) -> Places:
-    """Bring back on the other side what leaves the exemplar, so many levels above the one that is given."""
+    """Wrap coordinates that leave the exemplar, at a number of levels above the given one."""
     axes = len(exemplar.shape)
     out = places.reshape(-1, axes)
     for axis, (n, closed) in enumerate(zip(exemplar.shape, exemplar.wrap, strict=True)):

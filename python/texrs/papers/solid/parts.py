@@ -1,4 +1,4 @@
-"""A texture without borders as maps of which any part can be read."""
+"""An unbounded texture as maps that can be read in parts."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ IMAGE = "image"
 
 
 class Endless(InParts):
-    """A texture of which parts of any size can be had, chunk by chunk."""
+    """A texture that can be read in parts of any size, chunk by chunk."""
 
     @property
     @abstractmethod
     def exemplar(self) -> Exemplar:
-        """What it is made from."""
+        """Exemplar of the texture."""
 
     @property
     @abstractmethod
     def material(self) -> Material | None:
-        """The material that it is made from, if it is one."""
+        """Material of the texture, if it is made from one."""
 
     @property
     @abstractmethod
     def key(self) -> str | None:
-        """Digest of all that decides it."""
+        """Digest of all data that determine the texture."""
 
     @abstractmethod
     def __getitem__(self, index: Any) -> Array:
@@ -52,7 +52,7 @@ class Endless(InParts):
         """Return some maps of a material in a window."""
 
     def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
-        """Check where a part begins, and that it lies within the world; return what reads it."""
+        """Check that a part begins within the world. Return its reader."""
         start, sides = as_origin(origin, self.axes), as_sides(shape, "shape", self.axes)
         if any(o + n > MAX_COORDINATE for o, n in zip(start, sides, strict=True)):
             raise InvalidInput(f"origin, shape: need to lie within {MAX_COORDINATE}, got {start} and {sides}")
@@ -61,14 +61,14 @@ class Endless(InParts):
 
 @dataclass(frozen=True)
 class _Windows:
-    """Reads parts of a texture, whose first sample is at an origin."""
+    """Reads parts of a texture with its first sample at an origin."""
 
     texture: Endless
     origin: tuple[int, ...]
 
     @property
     def maps(self) -> Mapping[str, Channel]:
-        """The maps of a material, or the only one."""
+        """Maps of the material, or the only map."""
         texture = self.texture
         if texture.material is None:
             image = texture.exemplar.image

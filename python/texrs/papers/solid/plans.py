@@ -1,7 +1,8 @@
-"""How a picture is put together from patches: a few plans, each tried at a small size and judged.
+"""Methods of stitching an image from patches, each tried at a small size and evaluated.
 
-Larger patches tear fewer things, and copy more of the exemplar in one piece. Seams that keep out of what may be a thing are
-longer than they need be where it is none. Which matters more is seen in what comes of it (`texrs.metrics`).
+Larger patches tear fewer elements, and copy more of the exemplar in one piece. Seams that avoid supposed elements are
+longer than necessary if there are none. The evaluation of small results (`texrs.metrics`) shows which of the two
+matters more.
 """
 
 from __future__ import annotations
@@ -28,15 +29,15 @@ Choice: TypeAlias = Literal["auto", "default", "large", "unmasked", "unmasked-la
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How patches are cut and put together."""
+    """A method of cutting and stitching patches."""
 
     larger: float = 1.0
-    """Side of the patches, in usual ones."""
+    """Factor on the usual side of the patches."""
     plain: bool = False
-    """Whether elements play no part in what seams cost."""
+    """If True, elements do not change the costs of seams."""
 
     def start(self, exemplar: Exemplar, seed: int, quality: Quality, bend: bool | None) -> Start:
-        """Return what patches are put together by."""
+        """Return the start from patches."""
         return from_patches(
             exemplar,
             0,
@@ -49,7 +50,7 @@ class Plan:
 
 
 LARGE = 1.25
-"""Half as large again, patches copy more than a fifth of what they make in one piece."""
+"""Patches half as large again copy more than a fifth of the result in one piece."""
 PLANS: Mapping[str, Plan] = {
     "default": Plan(),
     "large": Plan(LARGE),
@@ -57,13 +58,13 @@ PLANS: Mapping[str, Plan] = {
     "unmasked-large": Plan(LARGE, plain=True),
 }
 TRIALS = (0, 1)
-"""Seeds of the textures by which a plan is judged: one alone says more of the draw than of the plan."""
+"""Seeds of the textures that evaluate a method. A single one depends more on chance than on the method."""
 CLEARLY = 0.85
-"""Share of the usual plan's score below which another one is taken."""
+"""Share of the default method's score below which another method is used."""
 
 
 def check_plan(patches: object, method: object, quality: Quality) -> Choice:
-    """Check the name of a plan, and that there are patches."""
+    """Check the name of a method, and that patches are used."""
     name: Choice = as_choice(patches, "patches", (*PLANS, "auto"))  # type: ignore[assignment]
     if name != "default" and (method is not None or quality == "fast"):
         what = f"method={method!r}" if method is not None else "quality='fast'"
@@ -74,22 +75,22 @@ def check_plan(patches: object, method: object, quality: Quality) -> Choice:
 def choose_plan(
     exemplar: Exemplar, patches: Choice, quality: Quality, make: Callable[[Plan, int], SourceMap]
 ) -> tuple[str, Mapping[str, Mapping[str, float]] | None]:
-    """Return the name of the plan, as was said or as is judged the best, and how each was judged that was tried.
+    """Return the name of the method, as given or best evaluated, and the figures of each that was tried.
 
     Parameters
     ----------
     exemplar : Exemplar
-        The example.
+        Exemplar.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
-        What was said.
+        The given name.
     quality : {"preserve", "optimise"}
-        How many places are tried for a patch.
+        Number of places that are tried for a patch.
     make : callable
-        Makes a small texture by a plan and a seed. Neither the seed nor the size of the result plays a part, so that all
-        textures of an exemplar are made alike.
+        Function that makes a small texture by a method and a seed. It does not depend on the seed or the size of the
+        result, so that all textures of an exemplar use the same method.
 
     """
-    # Classes without an order have no colours to judge by.
+    # Unordered classes have no colours to evaluate.
     if patches != "auto" or exemplar.labels:
         return ("default" if patches == "auto" else patches), None
     stitcher = exemplar.stitcher

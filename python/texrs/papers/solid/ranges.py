@@ -1,4 +1,4 @@
-"""What stands between the brackets of a texture without borders."""
+"""Indices of an unbounded texture: the ranges between brackets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from texrs.papers.solid.limits import LARGER
 __all__ = ["MAX_COORDINATE", "as_origin", "as_region"]
 
 MAX_COORDINATE = 10**9
-"""Coordinates of the world are within so many voxels."""
+"""Maximum absolute coordinate of the world, in voxels."""
 _ORDER = {2: "[y0:y1, x0:x1]", 3: "[z0:z1, y0:y1, x0:x1]"}
 
 
@@ -30,7 +30,7 @@ def as_origin(origin: object, axes: int) -> tuple[int, ...]:
 
 
 def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
-    """Return the region of an index, and which of its axes a single number takes away."""
+    """Return the region of an index, and a mask of the axes that a single number removes."""
     parts = index if isinstance(index, tuple) else (index,)
     if len(parts) != axes:
         raise InvalidInput(f"texture: needs {axes} ranges, {_ORDER[axes]}; got {len(parts)}")
@@ -59,7 +59,7 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
 
 
 def _as_end(value: object) -> int | None:
-    """Return an integer of the world; none where it is not one."""
+    """Return an integer of the world, or None for other values."""
     if (
         isinstance(value, bool)
         or not isinstance(value, numbers.Integral)

@@ -1,4 +1,4 @@
-"""What a caller asks of `texrs.solid` and `texrs.synthesize`, checked before anything is done."""
+"""Arguments of `texrs.solid` and `texrs.synthesize`, checked before the work begins."""
 
 from __future__ import annotations
 
@@ -30,30 +30,30 @@ Method: TypeAlias = Literal["paper", "paper-compensated"] | None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Request:
-    """The arguments of a synthesis, checked.
+    """Checked arguments of a synthesis.
 
     Attributes
     ----------
     exemplar : Exemplar
-        What it grows from.
+        Exemplar.
     region : Region
-        The output.
+        Region of the output.
     field : Field, optional
-        Over the output; none where it leaves everything in place.
+        Frame field over the output. None is the identity.
     seed : int
-        Chooses the texture.
+        Seed of the random choices.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done.
+        Amount of work.
     bend_patches : bool, optional
-        Whether patches bend with the field; none leaves it to the exemplar.
+        If True, patches bend with the field. None: chosen by the exemplar.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
-        How patches are put together.
+        Method of stitching.
     method : {None, "paper", "paper-compensated"}
-        Which algorithm.
+        Algorithm.
     conditions : Conditions
-        What is asked beside the texture.
+        Constraints and guide.
     interpolation : {"nearest", "linear", "cubic"}
-        Between the exemplar's samples, in the last look-up.
+        Interpolation between the exemplar's samples in the final look-up.
     spacing : sequence of float, optional
         Distances between voxels.
 
@@ -91,7 +91,7 @@ class Request:
         patches: Choice = "default",
         spacing: Sequence[float] | None = None,
     ) -> Request:
-        """Return the request of a caller, or raise what is wrong with it."""
+        """Return the checked arguments of a call, or raise an error."""
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
         region = Region.whole(as_size(size, axes=axes, way=LARGER[axes]), as_wrap(wrap, axes=axes, usual=False))
         as_method(method, None, "paper", "paper-compensated")
@@ -126,7 +126,7 @@ class Request:
 def as_field(
     field: object, axes: int, extent: Sequence[int] | None = None, spacing: Sequence[float] | None = None
 ) -> Field | None:
-    """Check a field, or make it of what was given, for voxels of a spacing; the identity is none."""
+    """Check a field, or make it from a value, for voxels of a spacing. The identity gives None."""
     as_distances(spacing, axes)
     known = make_field(field, axes, extent, spacing=spacing)
     still = known is None or (
@@ -136,7 +136,7 @@ def as_field(
 
 
 def as_interpolation(value: Interpolation | None, exemplar: Exemplar, default: Interpolation) -> Interpolation:
-    """Check how the exemplar is looked up; labels are always at the nearest sample."""
+    """Check the interpolation. Labels always use the nearest sample."""
     if value is not None:
         as_choice(value, "interpolation", ("nearest", "linear", "cubic"))
     return "nearest" if exemplar.labels else value or default

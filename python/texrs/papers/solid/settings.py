@@ -1,4 +1,4 @@
-"""How much work each quality does at each level."""
+"""Amount of work of each quality at each level."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ __all__ = ["CANDIDATES", "FAST", "ON_DEMAND", "Quality", "as_quality"]
 Quality: TypeAlias = Literal["preserve", "fast", "optimise"]
 
 FAST = replace(Settings(), passes=(4, 2, 2), reaches=(2, 2, 1), rounds=4, candidates=256, settled=0.0)
-"""Fixed counts: what a point becomes hangs on what is near it alone."""
+"""Fixed numbers of passes, so that a point depends only on its surroundings."""
 
 ON_DEMAND = replace(FAST, passes=(2, 1, 2), reaches=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
-"""What a point can see of its surroundings is paid for at the border of every window: it sees little."""
+"""Settings for windows. The reach of a point is computed again at the border of every window, so it is small."""
 
 CANDIDATES: dict[Quality, int] = {"preserve": 4, "optimise": 12}
-"""Places that are tried for each patch."""
+"""Number of places that are tried for each patch."""
 
 
 def as_quality(quality: object) -> Quality:

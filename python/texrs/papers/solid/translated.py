@@ -1,4 +1,4 @@
-"""A field as it lies over a window."""
+"""A field relative to a window."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Translated"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Translated(Field):
-    """A field as it lies over a window: seen from its first voxel."""
+    """A field relative to the first voxel of a window."""
 
     field: Field
     by: tuple[int, ...]
@@ -36,5 +36,5 @@ class Translated(Field):
         return None if self.field.key is None else (self.field.key, self.by)
 
     def describe(self) -> str:
-        """Say what it is, and from where it is seen."""
+        """Return the description of the field and of the window's origin."""
         return f"{self.field.describe()}; seen from ({', '.join(map(str, self.by))})"

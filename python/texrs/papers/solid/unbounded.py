@@ -1,4 +1,4 @@
-"""What textures without borders have in common: any part, any point, when it is asked for, in any process."""
+"""Common part of unbounded textures: any part and any point on request, in any process."""
 
 from __future__ import annotations
 
@@ -41,12 +41,13 @@ from texrs.synthesis import Synthesis
 __all__ = ["Texture"]
 
 ARRIVED = 4
-"""Textures that came from another process and are kept: work in parts brings the same one with every part."""
+"""Textures received from another process. They are kept, because parallel work receives the same one with every part.
+"""
 _BAND = 1 << 20
 
 
 class Texture(Endless):
-    """What pictures and volumes without borders have in common."""
+    """Common part of unbounded images and volumes."""
 
     def __init__(
         self,
@@ -82,31 +83,31 @@ class Texture(Endless):
 
     @property
     def exemplar(self) -> Exemplar:
-        """What it is made from, and what is known of that."""
+        """Exemplar with its analysis."""
         return self._exemplar
 
     @property
     def material(self) -> Material | None:
-        """The material that it is made from, if it is one."""
+        """Material of the texture, if it is made from one."""
         return self._material
 
     @property
     def field(self) -> Field | None:
-        """The field; none where it leaves everything in place."""
+        """Frame field. None is the identity."""
         return self._field
 
     @property
     def spacing(self) -> tuple[float, ...]:
-        """Distances between samples along each axis; 1 if none are stated."""
+        """Distances between samples along each axis; 1 if none are given."""
         return self._spacing
 
     @property
     def cached(self) -> int:
-        """Bytes of finished places that are kept: never more than ``cache_bytes``."""
+        """Bytes of finished coordinates in memory, at most ``cache_bytes``."""
         return self._world.cached
 
     def clear(self) -> None:
-        """Forget what is kept: what is looked at again is made again.
+        """Drop the finished parts. They are computed again on request.
 
         Examples
         --------
@@ -121,14 +122,17 @@ class Texture(Endless):
         self._world.clear()
 
     def __repr__(self) -> str:
-        """Say what the texture is."""
+        """Return a description of the texture."""
         shape = " x ".join(map(str, self._exemplar.shape))
         how = "" if self._field is None else f", {self._field.describe()}"
         return f"<unbounded texture from {shape}, seed {self._seed}{how}>"
 
     @cached_property
     def key(self) -> str | None:
-        """Digest of all that decides the texture: the same key, the same bytes. None if its field calls a function."""
+        """Digest of all data that determine the texture: the same key means the same bytes.
+
+        None if its field calls a function.
+        """
         if self._field is not None and self._field.key is None:
             return None
         field = None if self._field is None else self._field.key
@@ -137,13 +141,13 @@ class Texture(Endless):
         return content_hash(*said).hex()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel as the exemplar's pixels and the options; see `Exemplar` for what is worked out where it arrives."""
+        """Pickle as the exemplar's pixels and the options. See `Exemplar` for the data that are computed again."""
         spacing, limits = self._spacing, (self._cache_bytes, self._memory_limit)
         options = (self._field, self._seed, self._quality, self._how, spacing, *limits)
         return _restore, (type(self), self._material or self._exemplar, options, self.key)
 
     def __getitem__(self, index: Any) -> Array:
-        """Return a part: ``texture[z0:z1, y0:y1, x0:x1]``, of any integers; a single one takes its axis away."""
+        """Return a part: ``texture[z0:z1, y0:y1, x0:x1]``, with any integers. A single number removes its axis."""
         region, single = as_region(index, self.axes)
         self._check(region)
         if self._material is None:
@@ -160,17 +164,18 @@ class Texture(Endless):
         Parameters
         ----------
         origin : int, or one an axis
-            First voxel, of the world; any integers within 10^9.
+            First voxel in the world, any integers within 10^9.
         size : int, or one an axis
-            Voxels along each axis.
+            Number of voxels along each axis.
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
+            bar.
 
         Returns
         -------
         Synthesis
-            The image, and of a material all maps; its source map, whose labels are the patches of the window, counted within
-            it, and whose frames are those of rigid patches, else the field as it lies over the window; and a report.
+            The image, and all maps of a material; its source map; and a report. The labels of the source map are the
+            patches, counted within the window. Its frames are those of rigid patches, or the field over the window.
 
             Stages:
 
@@ -188,11 +193,11 @@ class Texture(Endless):
         Raises
         ------
         InvalidInput
-            Not such an origin or size, or a field that is singular in sight of the window.
+            If the origin or size is invalid, or the field is singular near the window.
         LimitExceeded
-            The window would take more memory than allowed.
+            If the window would take more memory than allowed.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         Examples
         --------
@@ -228,32 +233,33 @@ class Texture(Endless):
         interpolation: Interpolation | None = None,
         progress: Progress | bool | None = None,
     ) -> Array:
-        """Return the texture at any points, such as those of a mesh, of a path or of a ray.
+        """Return the texture at any points, such as the points of a mesh, a path or a ray.
 
-        Between voxels it is places that are carried on, not colours that are mixed: a point q looks up
-        S(p) + J(p) (q - p), where p is the voxel nearest to it. At whole coordinates it is the pixel of any window.
+        The source coordinates are interpolated between voxels, not the colours. A point q looks up S(p) + J(p) (q -
+        p), where p is the nearest voxel. Whole coordinates give the pixel of any window.
 
         Parameters
         ----------
         points : (..., 2) or (..., 3) array_like
-            (row, column) or (plane, row, column), in voxels of the world with centres at the integers; within 10^9.
+            (row, column) or (plane, row, column), in voxels of the world with centres at the integers, within 10^9.
         interpolation : {"nearest", "linear", "cubic"}, optional
-            Between the exemplar's samples; None is the texture's own. Labels are looked up at the nearest sample
-            whatever it says.
+            Interpolation between the exemplar's samples. None is the texture's own. Labels always use the nearest
+            sample.
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
+            bar.
 
         Returns
         -------
         (...[, C]) array
-            In the exemplar's dtype; of a material the map that shows it.
+            Values in the exemplar's dtype. A material returns the map that represents it.
 
         Raises
         ------
         InvalidInput
-            Not such points, or a field that is singular at one of them.
+            If points are invalid, or the field is singular at one of them.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         See Also
         --------
@@ -284,28 +290,29 @@ class Texture(Endless):
         interpolation: Interpolation | None = None,
         progress: Progress | bool | None = None,
     ) -> dict[str, Array]:
-        """Return every map of a material at any points, as `sample` does; vectors are turned with the texture.
+        """Return all maps of a material at any points, as `sample` does. Vectors rotate with the texture.
 
         Parameters
         ----------
         points : (..., 2) or (..., 3) array_like
             As for `sample`.
         interpolation : {"nearest", "linear", "cubic"}, optional
-            As for `sample`; labels are never interpolated.
+            As for `sample`. Labels are never interpolated.
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
+            bar.
 
         Returns
         -------
         dict of str to (...[, C]) array
-            By the names of the maps.
+            Values by the names of the maps.
 
         Raises
         ------
         InvalidInput
-            The texture is not made from a material, or as for `sample`.
+            If the texture is not made from a material, or an argument is invalid for `sample`.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         Examples
         --------
@@ -321,26 +328,28 @@ class Texture(Endless):
         return self._sample_maps(as_points(points, self.axes), self._as_how(interpolation), listen(progress))
 
     def trace(self, points: ArrayLike, *, progress: Progress | bool | None = None) -> SourceMap:
-        """Return where the texture at any points comes from, so that other maps of the exemplar can be looked up there.
+        """Return the source coordinates at any points, to look up other maps of the exemplar.
 
         Parameters
         ----------
         points : (..., 2) or (..., 3) array_like
             As for `sample`.
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
+            bar.
 
         Returns
         -------
         SourceMap
-            Of a picture (or a volume) of one row, a pixel a point; `texrs.apply` interpolates as `sample` does.
+            Source map of an image or a volume of one row, a pixel for each point. `texrs.apply` interpolates as
+            `sample` does.
 
         Raises
         ------
         InvalidInput
-            As for `sample`.
+            If an argument is invalid for `sample`.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         Examples
         --------
@@ -356,17 +365,17 @@ class Texture(Endless):
         return source.with_finish((False,) * self.axes, interpolation=self._how)
 
     def estimate_memory(self, size: int | Sequence[int]) -> int:
-        """Return the bytes that a process takes at most, about, that makes windows of a size; beside those of Python itself.
+        """Return the approximate maximum bytes of a process that makes windows, in addition to Python.
 
         Parameters
         ----------
         size : int, or one an axis
-            Of a window, or a chunk.
+            Size of a window or a chunk.
 
         Returns
         -------
         int
-            The window, what is kept of the exemplar, and ``cache_bytes``.
+            Bytes of the window, of the exemplar's analysis, and ``cache_bytes``.
 
         Examples
         --------
@@ -382,7 +391,7 @@ class Texture(Endless):
     def _look_up(
         self, origin: Sequence[int], size: Sequence[int], names: Sequence[str], progress: Progress | None = None
     ) -> Material:
-        """Return some maps of a material in a window, without what else `window` makes."""
+        """Return some maps of a material in a window, without the other results of `window`."""
         assert self._material is not None
         region = Region(tuple(size), tuple(origin), (False,) * self.axes)
         self._check(region)
@@ -398,7 +407,7 @@ class Texture(Endless):
         *,
         only_base: bool = False,
     ) -> dict[str, Array]:
-        """Return maps at points, as those of a picture of one row."""
+        """Return maps at points, as those of an image of one row."""
         assert self._material is not None
         source = self._trace(at, progress)
         name, whole = self._material.base_name, self._material
@@ -407,7 +416,7 @@ class Texture(Endless):
         return {n: m.pixels.reshape((*at.shape[:-1], *m.pixels.shape[self.axes :])) for n, m in made.items()}
 
     def _trace(self, at: NDArray[np.float64], progress: Progress | None) -> SourceMap:
-        """Return where points come from, as the source map of a picture of one row."""
+        """Return the source of points, as the source map of an image of one row."""
         places, frames = self._carry_on(at.reshape(-1, self.axes), progress)
         row = (*(1,) * (self.axes - 1), len(places))
         frame = None if frames is None else frames.reshape(*row, self.axes, self.axes)
@@ -416,7 +425,10 @@ class Texture(Endless):
     def _carry_on(
         self, at: NDArray[np.float64], progress: Progress | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-        """Return the places of points between voxels, S(p) + J(p) (q - p), and the Jacobians; none where J is one."""
+        """Return the coordinates of points between voxels, S(p) + J(p) (q - p), and the Jacobians.
+
+        None if J is the identity.
+        """
         if len(at) and np.abs(at).max() > MAX_COORDINATE:
             raise InvalidInput(f"points: need to lie within {MAX_COORDINATE} of the origin, got {np.abs(at).max():g}")
         places = np.empty(at.shape, np.float32)
@@ -436,7 +448,7 @@ class Texture(Endless):
         return self._how if interpolation is None else as_interpolation(interpolation, self._exemplar, "cubic")
 
     def _look(self, region: Region, progress: Progress | None) -> tuple[Places, SourceMap]:
-        """Return the places of a window, and its source map: its frames are those of rigid patches, else the field's."""
+        """Return the coordinates of a window, and its source map with the frames of rigid patches or of the field."""
         field, start = self._field, region.origin
         varies = field is not None and field.constant is None
         if field is not None and varies and any(start):
@@ -468,7 +480,7 @@ class Texture(Endless):
 
 
 def _restore(kind: type[Texture], exemplar: Exemplar | Material, options: tuple[Any, ...], key: str | None) -> Texture:
-    """Return a texture that has travelled: the one that came here before, with what it keeps, where there is one."""
+    """Return a received texture, or the equal one that was received before with its finished parts."""
     names = ("field", "seed", "quality", "interpolation", "spacing", "cache_bytes", "memory_limit")
     given = dict(zip(names, options, strict=True))
 

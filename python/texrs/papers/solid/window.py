@@ -1,4 +1,4 @@
-"""The textures of `texrs.papers.solid` without borders: any part, when it is asked for."""
+"""Unbounded textures of `texrs.papers.solid`: any part on request."""
 
 from __future__ import annotations
 
@@ -23,42 +23,42 @@ TILE = 128
 
 
 class PlaneTexture(Texture):
-    """A texture of the plane without borders, of which any window can be had.
+    """An unbounded texture of the plane. Any window of it can be computed.
 
-    Every pixel is the same in whatever window it is seen, with any number of threads. The pixels differ from those of
-    `texrs.synthesize`, whose borders are free. It can be pickled, and is the same in every process.
+    Every pixel is the same in all windows, for any number of threads. The pixels differ from those of
+    `texrs.synthesize`, whose borders are free. The object can be pickled, and is the same in every process.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar or Material
-        Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
-        along which axes it repeats, which are measured otherwise.
+        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` states whether its values are labels and
+        along which axes it is periodic. Otherwise this is measured.
     field : Field, str, array_like or path_like, optional
-        How the texture is turned and scaled at each point of the world (`texrs.fields`), with two axes, as it stands:
-        a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
+        Frame field with two axes: rotation and scale of the texture at each point of the world (`texrs.fields`). A
+        centre or length that is not given takes the default of the unbounded field. None leaves the texture as it is.
     seed : int
-        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
-        They are different textures.
+        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
+        elements. The three give different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples. None is "cubic", or "nearest" for an exemplar of few colours, so that no colours
-        are added. Labels are looked up at the nearest sample, whatever it says.
+        Interpolation between the exemplar's samples. None is "cubic", or "nearest" for an exemplar of few colours, so
+        that no colours are added. Labels always use the nearest sample.
     spacing : sequence of 2 float, optional
-        Distances between rows and columns, in any unit. The field turns in space, where pixels need not be squares. Its places
-        and lengths are in the same unit. Windows and points stay in pixels. Default: 1.
+        Distances between rows and columns, in any unit. The field rotates in space, where pixels need not be squares.
+        Its places and lengths are in the same unit. Windows and points stay in pixels. Default: 1.
     cache_bytes : int
-        Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
+        Memory for finished parts in bytes, 0 or more. Neighbours of computed parts are then cheap.
     memory_limit : int, optional
-        Bytes that one window may take. None: all that the limits in force allow (`texrs.limits`).
+        Maximum bytes of one window. By default the limits in force (`texrs.limits`).
 
     Raises
     ------
     InvalidInput
-        An exemplar that is too small or not finite, a field of other axes, or an option out of its range.
+        If the exemplar is too small or not finite, a field has other axes, or an option is out of its range.
     LimitExceeded
-        The exemplar alone would take more memory than allowed.
+        If the exemplar alone would take more memory than allowed.
 
     Examples
     --------
@@ -75,41 +75,41 @@ class PlaneTexture(Texture):
 
 
 class SolidTexture(Texture):
-    """A texture of space without borders, of which any window and any slice can be had.
+    """An unbounded texture of space. Any window and any slice of it can be computed.
 
-    Every voxel is the same in whatever window it is seen, with any number of threads. The voxels differ from those of
-    `texrs.solid`, whose borders are free. It can be pickled, and is the same in every process.
+    Every voxel is the same in all windows, for any number of threads. The voxels differ from those of `texrs.solid`,
+    whose borders are free. The object can be pickled, and is the same in every process.
 
     Parameters
     ----------
     exemplar : (D, H, W) or (D, H, W, C) array, Exemplar or Material
-        Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
-        are labels and along which axes it repeats, which are measured otherwise.
+        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` with ``axes=3`` states whether its
+        values are labels and along which axes it is periodic. Otherwise this is measured.
     field : Field, str, array_like or path_like, optional
-        How the texture is turned and scaled at each point of the world (`texrs.fields`), with three axes, as it
-        stands: a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
+        Frame field with three axes: rotation and scale of the texture at each point of the world (`texrs.fields`). A
+        centre or length that is not given takes the default of the unbounded field. None leaves the texture as it is.
     seed : int
-        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
-        They are different textures.
+        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
+        elements. The three give different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample, whatever it says.
+        Interpolation between the exemplar's samples. None is "cubic". Labels always use the nearest sample.
     spacing : (plane, row, column) float, optional
-        Voxel size along each axis, in any unit. The field turns in space, where voxels need not be cubes.
-        Its places and lengths are in the same unit. Windows and points stay in voxels. Default: 1.
+        Voxel size along each axis, in any unit. The field rotates in space, where voxels need not be cubes. Its places
+        and lengths are in the same unit. Windows and points stay in voxels. Default: 1.
     cache_bytes : int
-        Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
+        Memory for finished parts in bytes, 0 or more. Neighbours of computed parts are then cheap.
     memory_limit : int, optional
-        Bytes that one window may take. None: all that the limits in force allow (`texrs.limits`).
+        Maximum bytes of one window. By default the limits in force (`texrs.limits`).
 
     Raises
     ------
     InvalidInput
-        An exemplar that is too small or not finite, a field of other axes, or an option out of its range.
+        If the exemplar is too small or not finite, a field has other axes, or an option is out of its range.
     LimitExceeded
-        The exemplar alone would take more memory than allowed.
+        If the exemplar alone would take more memory than allowed.
 
     Examples
     --------
@@ -135,33 +135,34 @@ class SolidTexture(Texture):
     ) -> Array:
         """Cut the texture along any plane.
 
-        Between voxels it is places that are carried on, not colours that are mixed: a point q looks up
-        S(p) + J(p) (q - p), where p is the voxel nearest to it, so that an oblique slice is as sharp as the exemplar.
+        The source coordinates are interpolated between voxels, not the colours. A point q looks up S(p) + J(p) (q -
+        p), where p is the nearest voxel. An oblique slice is therefore as sharp as the exemplar.
 
         Parameters
         ----------
         point : sequence of 3 float
-            (plane, row, column) of the picture's middle, in voxels of the world.
+            (plane, row, column) of the middle of the image, in voxels of the world.
         normal : sequence of 3 float, optional
-            Direction that the cut is across, (plane, row, column), of any length.
+            Normal of the cut, (plane, row, column), of any length.
         axes : (2, 3) array_like, optional
-            Instead of ``normal``: the steps of the picture's rows and of its columns, in voxels.
+            The steps of the image's rows and columns in voxels, instead of ``normal``.
         size : int or (rows, columns)
-            Of the picture, in pixels.
+            Size of the image, in pixels.
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
+            bar.
 
         Returns
         -------
         (rows, columns[, C]) array
-            In the exemplar's dtype.
+            Image in the exemplar's dtype.
 
         Raises
         ------
         InvalidInput
-            Not a point, a direction or a size.
+            If the point, the direction or the size is invalid.
         Cancelled
-            The work was stopped.
+            If the work was stopped.
 
         Examples
         --------

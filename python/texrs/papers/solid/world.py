@@ -1,16 +1,16 @@
-"""Unbounded textures, of which any part can be had.
+"""Unbounded textures by corrections, which can be computed in parts.
 
-What a point becomes hangs only on what is near it, so a texture without borders can be grown where it is looked at. The
-work is a chain of stages: the blocks, then one pass of the correction after the other, each on the lattice of its
-level. A box of a stage is made from a box of the stage before that is larger by what one point can see, its reach:
+A point depends only on its surroundings, so an unbounded texture can be computed where it is requested. The work is a
+chain of stages: the blocks, then one pass of the correction after the other, each on the lattice of its level. A box
+of a stage is computed from a box of the stage before. The latter is larger by the distance that one point depends on,
+its reach:
 
     blocks      2 e + rounds (2 e + 1), where e is the farthest that a point lies from the centre of its cell pass
     vote + max(n, w), where n is how far the neighbours are that propose, and w = max_i [ r sum_j |F_ij| + 1/2 ]
                 how far a window of radius r looks along an axis of the output, over all frames F in sight
 
-Places within the reach of a box's border are wrong and are cut off; those that are left are the same in whatever box
-they were made. Finished parts of every stage are kept in a bounded memory, so that a neighbour of what has been seen
-is cheap.
+Coordinates within the reach of a box's border are wrong and are cut off. The others are the same in every box.
+Finished parts of every stage are kept in a bounded memory, so that neighbours of computed parts are cheap.
 """
 
 from __future__ import annotations
@@ -35,23 +35,29 @@ from texrs.papers.solid.boxes import intersect
 __all__ = ["World", "blocks_reach", "window_reach"]
 
 MOST = 1 << 21
-"""Points of a box that is made at once: its memory is bounded, and what is seen beyond it is small beside it."""
+"""Maximum number of points of a box that is computed at once.
+
+It bounds the memory, and the margin is small compared with it.
+"""
 _SIDES = {2: (8, 64), 3: (4, 16)}
-"""Sides of the cells that are kept: of all stages but the last, about as large as what a pass can see, for each of
-them rounds up; and of the last one."""
+"""Sides of the kept cells of all stages except the last, and of the last stage. The first is about the reach of a pass,
+because each pass rounds up.
+"""
 _STRAY = 0.4
-"""How far a cell's centre strays, as a share of the cell: that of `texrs._engine.appearance.Appearance.blocks`."""
+"""Maximum distance of a cell's centre from the middle, as a share of the cell, as in
+`texrs._engine.appearance.Appearance.blocks`.
+"""
 
 Key: TypeAlias = tuple[int, ...]
 
 
 def blocks_reach(cell: int, rounds: int, repetition: float = 0.0) -> int:
-    """Return how many points away the blocks at a point can see.
+    """Return the reach of the blocks at a point, in points.
 
-    A point lies within e of the centre of its cell, for it lies so near to that of the cell it falls into. A cell is
-    chosen by its shell, e + 1 away from its centre, whose points lie within e of the centres of their own cells; each
-    round does so once more. Of the last cells all points must be there, for they tell where it may lie. Where
-    repetition has a cost, cells two steps away count too.
+    A point is within e of the centre of its cell, because it falls into this cell. A cell is chosen by its shell, at
+    the distance e + 1 from its centre. Points of the shell are within e of the centres of their own cells. Each round
+    adds the same. All points of the last cells are needed, because they determine where the cell may be. If repetition
+    has a cost, cells two steps away count too.
     """
     far = max(int((0.5 + _STRAY) * cell + 1e-6), cell - 1 - int((0.5 - _STRAY) * cell - 1e-6))
     steps = ceil(2 * (1 + _STRAY) * cell) if repetition else 0
@@ -59,9 +65,9 @@ def blocks_reach(cell: int, rounds: int, repetition: float = 0.0) -> int:
 
 
 def window_reach(frames: NDArray[np.int16], radius: int) -> int:
-    """Return how far windows look along an axis of the output: they round F o, for offsets o of up to the radius.
+    """Return the reach of windows along an axis of the output: they round F o, for offsets o up to the radius.
 
-    The frames are J, in fixed point; their inverses are rounded there, by less than 1/64 in all.
+    The frames are J, in fixed point. Their inverses are rounded by less than 1/64 in total.
     """
     inverses = np.linalg.inv(frames.astype(np.float64) / ONE)
     return int(radius * float(np.abs(inverses).sum(axis=2).max()) + 0.5 + 1 / 64)
@@ -69,7 +75,7 @@ def window_reach(frames: NDArray[np.int16], radius: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Stage:
-    """One of the chain: a pass of a level, or the blocks (pass -1)."""
+    """A stage of the chain: a pass of a level, or the blocks (pass -1)."""
 
     level: int
     number: int
@@ -77,7 +83,7 @@ class _Stage:
 
 
 class World:
-    """The places of an endless texture, stage by stage."""
+    """Source coordinates of an unbounded texture, stage by stage."""
 
     def __init__(self, windows: Windows, cache_bytes: int) -> None:
         self.windows = windows
@@ -85,23 +91,23 @@ class World:
         small, large = _SIDES[self.axes]
         chain = [(0, -1)] + [(v, i) for v in range(len(windows.levels)) for i in range(windows.step(v).passes)]
         self.stages = [_Stage(*s, large if s == chain[-1] else small) for s in chain]
-        # The stages before the last are small and dear: the last one must not crowd them out.
+        # The stages before the last are small and expensive: the last one must not displace them.
         self._kept: tuple[Cache[Key, Places], ...] = tuple(
             Cache(cache_bytes // 2, lambda p: p.nbytes) for _ in range(2)
         )
 
     @property
     def cached(self) -> int:
-        """Bytes of finished places that are kept."""
+        """Bytes of finished coordinates in memory."""
         return sum(kept.used for kept in self._kept)
 
     def clear(self) -> None:
-        """Forget what is kept."""
+        """Drop the finished parts."""
         for kept in self._kept:
             kept.clear()
 
     def reach(self, stage: int, window: int) -> int:
-        """Return how many points away a stage can see in the one before; windows look so far."""
+        """Return the reach of a stage in the stage before, in points. Windows have this reach."""
         if stage == 0:
             settings = self.windows.settings
             return blocks_reach(settings.cell, settings.rounds, settings.repetition)
@@ -111,7 +117,7 @@ class World:
         return min(step.vote, radius) + max(step.reach, window)
 
     def read(self, box: Region, progress: Progress | None = None, stage: int = -1) -> Places:
-        """Return the places of a box, (..., A) int32."""
+        """Return the coordinates of a box, (..., A) int32."""
         stage %= len(self.stages)
         out = np.empty((*box.shape, self.axes), np.int32)
         side = self.stages[stage].side
@@ -124,7 +130,7 @@ class World:
         return out
 
     def pick(self, points: NDArray[np.int64], progress: Progress | None = None) -> Places:
-        """Return the places of single points (N, A) of the world: (N, A) int32."""
+        """Return the exemplar coordinates, (N, A) int32, at N points (N, A) of the unbounded texture."""
         stage = len(self.stages) - 1
         side = self.stages[stage].side
         cells = points // side
@@ -132,7 +138,7 @@ class World:
         wanted = np.zeros(tuple((cells.max(axis=0) - low + 1).tolist()), bool)
         number = np.ravel_multi_index(tuple((cells - low).T), wanted.shape)
         wanted.reshape(-1)[number] = True
-        # The points of each cell of the kept lattice, one cell after the other.
+        # Process the points of each cell of the kept lattice, one cell after the other.
         order = np.argsort(number, kind="stable")
         first = np.searchsorted(number[order], np.arange(wanted.size + 1))
         out = np.empty((len(points), self.axes), np.int32)
@@ -148,7 +154,10 @@ class World:
     def parts(
         self, low: Sequence[int], wanted: Bools, progress: Progress | None, stage: int
     ) -> Iterator[tuple[Region, Places]]:
-        """Return boxes of places that together hold the wanted cells of the kept lattice, counted from a first one."""
+        """Return boxes of coordinates that together contain the requested cells of the kept lattice.
+
+        Cells are counted from a first one.
+        """
         side, kept = self.stages[stage].side, self._kept[stage == len(self.stages) - 1]
         missing = wanted.copy()
         for at in np.argwhere(wanted).tolist():
@@ -159,7 +168,7 @@ class World:
         radius = self.windows.levels[self.stages[stage].level].radius
         boxes = list(_divide_missing(missing, side, self.reach(stage, radius)))
         if len(boxes) > 1 and self.stages[stage].level:
-            # What the coarsest level sees beyond each box is larger than the box.
+            # The reach of the coarsest level around each box is larger than the box.
             self._prepare(missing, low, stage, progress)
         for start, stop in boxes:
             first = [a + b for a, b in zip(start, low, strict=True)]
@@ -168,12 +177,12 @@ class World:
             places = self.make(part, stage, progress)
             for step in product(*(range(n) for n in counts)):
                 cell = places[tuple(slice(i * side, (i + 1) * side) for i in step)]
-                # A view would keep all that it is a part of.
+                # Copy, because a view would keep the whole array in memory.
                 kept.put((stage, *(a + i for a, i in zip(first, step, strict=True))), cell.copy())
             yield part, places
 
     def make(self, box: Region, stage: int, progress: Progress | None = None) -> Places:
-        """Grow a box of a stage from the one before."""
+        """Compute a box of a stage from the stage before."""
         here, windows = self.stages[stage], self.windows
         if stage == 0:
             margin = self.reach(0, 0)
@@ -193,9 +202,9 @@ class World:
         return places.reshape(*region.shape, self.axes)[box.inside(region)]
 
     def _find_region(self, box: Region, stage: int) -> tuple[Region, NDArray[np.int16]]:
-        """Return the region that a box of a stage is made from, with its frames.
+        """Return the region that a box of a stage is computed from, with its frames.
 
-        How far one must look hangs on the frames in sight, so the region grows until it holds what they ask for.
+        The reach depends on the frames in the region, so the region grows until it contains the reach.
         """
         level = self.stages[stage].level
         radius = self.windows.levels[level].radius
@@ -209,7 +218,7 @@ class World:
             window = needed
 
     def _prepare(self, missing: Bools, low: Sequence[int], stage: int, progress: Progress | None) -> None:
-        """Grow the coarsest level below all that is missing, at once."""
+        """Compute the coarsest level below all missing parts at once."""
         at = np.argwhere(missing)
         first, last = at.min(axis=0), at.max(axis=0) + 1
         region = self._make_region((first + np.array(low)).tolist(), (last - first).tolist(), self.stages[stage].side)
@@ -227,10 +236,10 @@ class World:
 
 
 def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Return boxes, as first and last cells, that together hold all that is missing: few, and with little else.
+    """Return a few boxes, as first and last cells, that together contain all missing cells and little else.
 
-    A box costs its points, and those of the margin around it. It is divided where two halves, each cut down to what is
-    missing in it, cost less, and where it is too large to be made at once.
+    The cost of a box is its points, and the points of its margin. A box is divided if two halves, each reduced to its
+    missing cells, cost less. It is also divided if it is too large.
     """
     found = _find_bounds(missing)
     if found is None:
@@ -267,7 +276,7 @@ def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tu
 
 
 def _find_bounds(missing: Bools) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
-    """Return the first and the last cell along each axis, one beyond it, that are missing."""
+    """Return the first missing cell and the one after the last, along each axis."""
     start, stop = [], []
     for axis in range(missing.ndim):
         line = np.flatnonzero(missing.any(axis=tuple(a for a in range(missing.ndim) if a != axis)))
