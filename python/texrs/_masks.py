@@ -50,21 +50,16 @@ class Mask:
     Parameters
     ----------
     marks : (H, W) or (D, H, W) array, with or without channels, path_like, PIL.Image.Image, str, float or None
-                The marks: an image of the same size, or what the function that takes the mask allows instead. A bool
-        array is taken as
-        it is. A pixel of an image is marked if its largest channel is at least half of white. An image without any
-        light
-                pixel contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose
-        transparency
-        varies is a layer of a paint program: each pixel is marked that is at least half opaque.
+        The marks: an image of the same size, or another value that the function allows instead. A bool array is taken as it
+        is. A pixel of an image is marked if its largest channel is at least half of white. An image without any light pixel
+        contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency varies is
+        a layer of a paint program: each pixel that is at least half opaque is marked.
     invert : bool
         If True, the other pixels are marked.
     threshold : float, optional
-        Least share of white, or of the full opacity of a layer, that marks a pixel, 0 to 1. The value 0 marks each
-        pixel that is not black. Default: 0.5, which noise of JPEG does not reach. If the marks are "alpha", it is the
-        share of
-        transparency;
-        default: any.
+        Least share of white, or of the full opacity of a layer, that marks a pixel, 0 to 1. The value 0 marks each pixel that
+        is not black. For the marks "alpha", it is the share of transparency, and any transparency by default. Default: 0.5,
+        which noise of JPEG does not reach.
     grow : int
         Growth of the marked area on all sides in pixels, -4096 to 4096. A negative number shrinks it.
     feather : int

@@ -168,11 +168,9 @@ def cut(
 
     Notes
     -----
-    Costs are rounded to multiples of 2^-16, or coarser if the largest exceeds 2^10. Time grows with the bounding box
-        of the overlap. One connected core of B on a plane may be surrounded by pixels constrained to A. The seam is
-    then a shortest closed path on the dual of the grid [2]_. It is the same seam, found several times faster than by
-    maximum
-    flow.
+    Costs are rounded to multiples of 2^-16, or coarser if the largest exceeds 2^10. Time grows with the bounding box of the
+    overlap. One connected core of B on a plane may be surrounded by pixels constrained to A. The seam is then a shortest
+    closed path on the dual of the grid [2]_. It is the same seam, found several times faster than by maximum flow.
 
     References
     ----------
