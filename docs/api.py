@@ -276,12 +276,14 @@ def make_tables(names: tuple[str, ...], options: dict[str, dict[str, str]]) -> s
     text = ""
     for name in names:
         rows = list(list_rows(find(f"texrs.{name}"), options.get(name, {})))
-        heads = ["parameter", "option", "meaning", "unit", "range or type", "default"]
-        if not any(row[1] for row in rows):
-            heads, rows = heads[:1] + heads[2:], [row[:1] + row[2:] for row in rows]
-        text += f"{{py:obj}}`texrs.{name}`:\n\n| {' | '.join(heads)} |\n{'|---' * len(heads)}|\n"
-        for row in rows:
-            text += "| " + " | ".join(as_markdown(cell) for cell in row) + " |\n"
+        first = "parameter and option" if any(row[1] for row in rows) else "parameter"
+        text += f"{{py:obj}}`texrs.{name}`:\n\n| {first} | meaning | range and unit | default |\n|---|---|---|---|\n"
+        for parameter, option, *rest in rows:
+            meaning, unit, given, default = map(as_markdown, rest)
+            if unit and "array" not in given:
+                given += f" {unit}" if given[-1].isdigit() else f", {unit}"
+            both = "<br>".join(each for each in (parameter, option) if each)
+            text += f"| {both} | {meaning} | {given} | {default} |\n"
         text += "\n"
     return text
 

@@ -202,15 +202,17 @@ def make_messages(package: Path) -> str:
     messages = {m.text: m for m in list_messages(package)}
     groups: dict[str, list[Message]] = {}
     for message in messages.values():
-        groups.setdefault(message.argument or VALUE, []).append(message)
+        name = message.argument
+        title = "Options" if name.startswith("-") else name[:1].upper() or "Any argument"
+        groups.setdefault(title, []).append(message)
     text = f"{NOTICE}# Messages\n\n"
     text += (
-        f"All {len(messages)} error messages, by the argument at their beginning. `{VALUE}` stands for a value or a name.\n"
-        "Messages about any argument are at the end. On the command line, a message names the option or the file instead of\n"
-        "the argument. Search this page for words of your message that are not values.\n"
+        f"All {len(messages)} error messages, in the order of their argument. `{VALUE}` stands for a value or a name. Messages\n"
+        "about any argument are at the end. On the command line, a message names the option or the file instead of the\n"
+        "argument. Search this page for words of your message that are not values.\n"
     )
-    for name in sorted(groups, key=lambda n: (n == VALUE, n.lower())):
-        text += f"\n## {name if name != VALUE else 'Any argument'}\n\n```{{raw}} html\n{tabulate(groups[name])}\n```\n"
+    for title, some in sorted(groups.items(), key=lambda group: (group[0] == "Any argument", group[0])):
+        text += f"\n## {title}\n\n```{{raw}} html\n{tabulate(some)}\n```\n"
     return text
 
 

@@ -74,7 +74,7 @@ def microstructure() -> list[Panel]:
     return [
         (volume.render_block(volume.label_to_color(scan), 200), "input: labels", INPUT),
         (volume.render_block(volume.label_to_color(grown), 280), "texrs solid", RESULT),
-        (volume.label_to_color(grown[40]), "a slice of it", RESULT),
+        (volume.label_to_color(grown[40]).repeat(3, 0).repeat(3, 1), "a slice", RESULT),
     ]
 
 
