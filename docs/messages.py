@@ -208,8 +208,8 @@ def make_messages(package: Path) -> str:
     text = f"{NOTICE}# Messages\n\n"
     text += (
         f"All {len(messages)} error messages, in the order of their argument. `{VALUE}` stands for a value or a name.\n"
-        "Messages about any argument are at the end. On the command line, a message names the option or the file instead of the\n"
-        "argument. Search this page for words of your message that are not values.\n"
+        "Messages about any argument are at the end. On the command line, a message names the option or the file instead of\n"
+        "the argument. Search this page for words of your message that are not values.\n"
     )
     for title, some in sorted(groups.items(), key=lambda group: (group[0] == "Any argument", group[0])):
         text += f"\n## {title}\n\n```{{raw}} html\n{tabulate(some)}\n```\n"
