@@ -61,10 +61,13 @@ def measure_border(guide: Floats, axis: int, lattice: Lattice | None = None, *, 
     """
     side, length = guide.shape[axis], guide.shape[1 - axis]
     found: Border | None = None
+    means = guide
     for scale in SCALES:
         if side < SHORTEST * scale or length < scale or (found is not None and found.figure > enough):
             break
-        step, beside = _compare_sides(guide, axis, scale)
+        # Means of as many pixels along the border; blocks are sums of lines of these.
+        means = guide if scale == 1 else _halve(means, 1 - axis)
+        step, beside = _compare_sides(means, axis, scale)
         for count in {min(WINDOW, step.shape[1]), step.shape[1]}:
             bold = _average(step, count) / _average(beside, count)
             most = bold.max(axis=1)
@@ -95,16 +98,25 @@ def _compare_periods(guide: Floats, axis: int, lattice: Lattice) -> float:
     return most
 
 
+def _halve(guide: Floats, axis: int) -> Floats:
+    """Return the means of pairs of pixels along an axis, without an odd last one."""
+    lines = np.moveaxis(guide, axis, 0)
+    count = len(lines) // 2 * 2
+    return np.moveaxis((lines[0:count:2] + lines[1:count:2]) * np.float32(0.5), 0, axis)
+
+
 def _compare_sides(guide: Floats, axis: int, scale: int) -> tuple[Floats, Floats]:
-    """Return the steps across the border and other lines, and the mean steps on both sides: (lines, blocks) each."""
-    side, count = guide.shape[axis], guide.shape[1 - axis] // scale
+    """Return the steps across the border and other lines, and the mean steps on both sides: (lines, blocks) each.
+
+    The pixels of ``guide`` are means of ``scale`` pixels along the border.
+    """
+    side = guide.shape[axis]
     others = np.unique(np.linspace(2 * scale, side - 2 * scale, LINES).astype(np.intp))
     at = np.concatenate([np.zeros(1, np.intp), others])
     blocks = []
     for first in range(-2 * scale, 2 * scale, scale):
         lines = sum(guide.take((at + k) % side, axis) for k in range(first, first + scale))
-        lines = np.moveaxis(lines, axis, 0)[:, : count * scale]
-        blocks.append(sum(lines[:, k::scale] for k in range(scale)) * np.float32(1 / scale**2))
+        blocks.append(np.moveaxis(lines, axis, 0) * np.float32(1 / scale))
     before, across, after = (_add_channels(np.abs(b - a)) for a, b in pairwise(blocks))
     flat = np.float32(FLAT * float(across[1:].mean(dtype=np.float64)) + TINY)
     return across + flat, (before + after) * np.float32(0.5) + flat

@@ -31,6 +31,8 @@ COVERED = 1.6
 size."""
 BAND = 4
 """Length of the strip of each cut of a cover: the side divided by this."""
+MANY = 4
+"""Number of joints above which all lines of a level are copied once, because each joint would copy its lines."""
 NEAR = 6
 """Lines on either side of a seam that are searched at the next level, to measure the cost of a joint."""
 
@@ -213,17 +215,20 @@ def _refine(found: Joined, level: Level, axis: int, choice: Choice, *, closed: b
 
 def cut_joints(level: Level, axis: int, joints: Sequence[Joint], *, closed: bool = False) -> list[tuple[Cut, ...]]:
     """Cut each joint."""
-    made = iter(cut_overlaps([s for joint in joints for s in _lay_over(level, axis, joint)], closed=closed))
+    lines = Level(np.moveaxis(level.colours, axis, 0), np.moveaxis(level.depth, axis, 0))
+    if len(joints) > MANY:
+        # The kernel would copy the lines of each joint.
+        lines = Level(np.ascontiguousarray(lines.colours), np.ascontiguousarray(lines.depth))
+    made = iter(cut_overlaps([s for joint in joints for s in _lay_over(lines, joint)], closed=closed))
     return [tuple(next(made) for _ in joint.list_overlaps()) for joint in joints]
 
 
-def _lay_over(level: Level, axis: int, joint: Joint) -> list[Strip]:
+def _lay_over(lines: Level, joint: Joint) -> list[Strip]:
     """Return the strips to cut, with their lines first."""
-    colours, depth = np.moveaxis(level.colours, axis, 0), np.moveaxis(level.depth, axis, 0)
     strips = []
     for both in joint.list_overlaps():
         (a, deep), (b, other) = (
-            (colours[first : first + joint.width], depth[first : first + joint.width]) for first in both
+            (lines.colours[first : first + joint.width], lines.depth[first : first + joint.width]) for first in both
         )
         strips.append(Strip(a, b, 0, (deep + other) * np.float32(DEEP / 2)))
     return strips

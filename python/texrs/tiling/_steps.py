@@ -22,6 +22,8 @@ USUAL = 95
 """Percentile of the other places that gives the figure 1."""
 LONG = 0.25
 """Least length of a seam, as a share of the side that it crosses. Shorter seams are not measured."""
+MOST = 2048
+"""Maximum number of pairs of blocks of all seams at a level. If there are more, only every second, third or further pair is compared."""
 TINY = 0.002
 """Step that is not visible, in units of the guide. It is added to the steps at other places."""
 LEAST = 0.05
@@ -86,22 +88,27 @@ def _compare_places(guide: Floats, axis: int, at: NDArray[np.intp], seam: NDArra
     rows, columns = guide.shape[:2]
     blocks = np.minimum(at >> scale, (rows - 1, columns - 1))
     chosen = np.unique((blocks[:, 0] * columns + blocks[:, 1]) * (seam.max() + 1) + seam)
-    place, seam = np.divmod(chosen, seam.max() + 1)
-    row, column = np.divmod(place, columns)
+    place, seam = np.divmod(chosen[:: max(1, len(chosen) // MOST)], seam.max() + 1)
+    order = np.argsort(seam, kind="stable")
+    row, column = np.divmod(place[order], columns)
+    starts = np.flatnonzero(np.diff(seam[order], prepend=-1))
+    # Multiples of powers of the plastic number fill the square evenly.
+    shifts = np.arange(SHIFTS)[:, np.newaxis]
+    row, column = (
+        row + (shifts * 0.7548776662 % 1 * rows).astype(int),
+        column + (shifts * 0.5698402910 % 1 * columns).astype(int),
+    )
     # A block that contains the seam is between the two blocks that are compared.
     first, last = (0, 1) if scale == 0 else (-1, 1)
-    counts = np.bincount(seam)
     flat = guide.reshape(rows * columns, -1)
-    bold = np.zeros(SHIFTS)
-    for k in range(SHIFTS):
-        # Multiples of the plastic number's powers fill the square evenly.
-        down, across = int(k * 0.7548776662 % 1 * rows), int(k * 0.5698402910 % 1 * columns)
-        here = []
-        for step in (first, last):
-            r = (row + down + (step if axis == 0 else 0)) % rows
-            c = (column + across + (step if axis == 1 else 0)) % columns
-            here.append(flat.take(r * columns + c, axis=0))
-        change = here[1] - here[0]
-        means = sum(np.abs(np.bincount(seam, change[:, n])) for n in range(change.shape[1])) / counts
-        bold[k] = means.max()
+    before, after = (
+        flat.take(
+            (row + (step if axis == 0 else 0)) % rows * columns + (column + (step if axis == 1 else 0)) % columns,
+            axis=0,
+        )
+        for step in (first, last)
+    )
+    sums = np.add.reduceat(after - before, starts, axis=1, dtype=np.float64)
+    counts = np.diff(starts, append=len(order))
+    bold = (np.abs(sums).sum(axis=-1) / counts).max(axis=1)
     return float(bold[0] / (np.percentile(bold[1:], USUAL) + TINY))
