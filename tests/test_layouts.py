@@ -19,7 +19,7 @@ from texrs.cli import main
 from texrs.elements import ElementAnalysis, Layout, correct, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.exemplar.shapes import mark_outlines
-from texrs.papers.splice.sowing import continue_points
+from texrs.papers.splice.placement import continue_points
 from texrs.point_sets import PointLayout
 
 DOTS = ElementAnalysis.of_sample(samples.dots((128, 128)))

@@ -15,7 +15,7 @@ from texrs import samples
 from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
 from texrs.papers.splice.nets.graph import describe_places, join_knots
-from texrs.papers.splice.nets.targets import Targets, go_part_of_the_way, take_points
+from texrs.papers.splice.nets.targets import Targets, interpolate_layouts, take_points
 from texrs.point_sets import spacing
 
 SIZE = (144, 144)
@@ -140,10 +140,10 @@ def test_half_of_the_way_lies_between() -> None:
     mine = Targets(np.array([[0.0, 0], [0, 30], [30, 0]]), 1.0, "")
     theirs = Targets(np.array([[2.0, 0], [0, 34], [30, 8], [90, 90]]), 2.0, "lattice")
     for strength, count in ((0.25, 3), (0.5, 4)):
-        found = go_part_of_the_way(mine, theirs, strength)
+        found = interpolate_layouts(mine, theirs, strength)
         assert len(found.points) == count
         np.testing.assert_allclose(found.points[:3], (1 - strength) * mine.points + strength * theirs.points[:3])
-    assert go_part_of_the_way(mine, theirs, 0.0) is mine
+    assert interpolate_layouts(mine, theirs, 0.0) is mine
 
 
 def test_regular_layouts_go_on_on_their_lattice() -> None:

@@ -16,7 +16,7 @@ from texrs.kernels import seam
 from texrs.tiling import _closed
 from texrs.tiling._joints import Choice, find_joint, make_levels
 from texrs.tiling._maps import lay_out
-from texrs.tiling._things import find_things
+from texrs.tiling._whole_elements import find_things
 
 GENERATED = ("bark", "beans", "bricks", "dots", "leaves_and_flowers", "net", "pebbles", "scales", "weave", "grit")
 PHOTOGRAPHS = ("brick", "grass", "gravel", "coffee")

@@ -57,7 +57,7 @@ from texrs.tiling._extend import extend
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
 from texrs.tiling._light import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
-from texrs.tiling._things import SMALLEST, Things, find_things
+from texrs.tiling._whole_elements import SMALLEST, Things, find_things
 
 __all__ = ["Tiling", "check_tiling", "tile"]
 

@@ -12,7 +12,7 @@ from texrs.exemplar.regularity import bend, find_lattice
 from texrs.kernels.gather import gather
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
-from texrs.tiling._things import find_things
+from texrs.tiling._whole_elements import find_things
 
 PATCH, OVERLAP, DEEP = 0.6, 0.25, 6.0
 """Side of a patch and overlap of two patches, as shares of the shorter side, and additional cost of a seam inside elements."""

@@ -50,10 +50,10 @@ from texrs.exemplar import Exemplar
 from texrs.fields import Field
 from texrs.growth import FromSheet, stitch_sheet
 from texrs.materials import Material
-from texrs.papers.perspective.laying import Laid, lay_out
 from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
 from texrs.papers.perspective.sizes import Sizes
+from texrs.papers.perspective.surfaces import Laid, lay_out
 from texrs.planes import Plane
 from texrs.scale_maps import Measuring
 from texrs.scale_maps._kinds import Kind

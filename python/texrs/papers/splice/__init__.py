@@ -98,7 +98,7 @@ from texrs.papers.splice.literal import fill_literally, match_literally
 from texrs.papers.splice.matching import (
     Match,
     edit_layout,
-    go_part_of_the_way,
+    interpolate_layouts,
     is_own,
     keep_cut,
     match_edit,
@@ -331,7 +331,7 @@ def splice(
     else:
         match = match_layouts(mine, theirs, (rows, columns), align=turned, scale=enlarged)
     if part < 1:
-        match = go_part_of_the_way(mine, match, part)
+        match = interpolate_layouts(mine, match, part)
     match = replace(match, wanted=match.targets)
     if method != "paper":
         match = adjust_targets(mine, match, snap=bool(snap_rows), part=part < 1 or is_own(mine, theirs))

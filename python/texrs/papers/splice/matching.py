@@ -20,7 +20,7 @@ from texrs.papers.splice.edit import Step, apply_steps
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out, sow
 from texrs.papers.splice.foreground import split_foreground
-from texrs.papers.splice.sowing import continue_points
+from texrs.papers.splice.placement import continue_points
 from texrs.point_sets import PointLayout, directions, match_points, nearest_distances, spacing
 
 __all__ = [
@@ -28,7 +28,7 @@ __all__ = [
     "Match",
     "edit_layout",
     "find_turns",
-    "go_part_of_the_way",
+    "interpolate_layouts",
     "is_own",
     "keep_cut",
     "list_element_points",
@@ -179,7 +179,7 @@ def is_own(a: ElementAnalysis, b: ElementAnalysis) -> bool:
     return np.array_equal(a.points, b.points) and np.array_equal(a.mask, b.mask)
 
 
-def go_part_of_the_way(a: ElementAnalysis, match: Match, strength: float) -> Match:
+def interpolate_layouts(a: ElementAnalysis, match: Match, strength: float) -> Match:
     """Let elements go only a share of their way: 0 keeps the texture's own layout, 1 takes the other one."""
     targets, assigned = match.starts + strength * match.shift, match.assigned
     if a.layout == Layout.DISJOINT:

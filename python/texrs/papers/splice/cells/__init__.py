@@ -37,7 +37,7 @@ from texrs.papers.splice.cells.choice import list_usable, shortlist
 from texrs.papers.splice.cells.joining import Joined, join
 from texrs.papers.splice.cells.pictures import draw_cell_stages
 from texrs.papers.splice.cells.refinement import refine_charts
-from texrs.papers.splice.cells.strength import go_part_of_the_way, take_own_cells
+from texrs.papers.splice.cells.strength import interpolate_layouts, take_own_cells
 from texrs.papers.splice.cells.tessellation import Tessellation, take_cells, take_points
 from texrs.papers.splice.extension import lay_out
 from texrs.papers.splice.result import list_place, report_ways
@@ -113,7 +113,7 @@ def splice_cells(
     may_turn = (True, True) in find_mirrors(guidance(as_image(a.image))) if turns is None else turns
     wanted = _take_targets(b, size, cells.size, scale, seed)
     if strength < 1:
-        wanted = go_part_of_the_way(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
+        wanted = interpolate_layouts(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
     chosen = _list_shown(wanted)
     watch("cells", 0.2)
     # Choose a cell for each target, bend it, and join the cells.

@@ -17,7 +17,7 @@ from texrs.papers.splice.cells.outlines import match_outlines, rematch_outlines
 from texrs.papers.splice.cells.tessellation import Tessellation, finish_cells, take_cells
 from texrs.point_sets import match_points
 
-__all__ = ["go_part_of_the_way", "take_own_cells"]
+__all__ = ["interpolate_layouts", "take_own_cells"]
 
 
 def take_own_cells(
@@ -44,7 +44,7 @@ def take_own_cells(
     return replace(found, start=found.centre)
 
 
-def go_part_of_the_way(own: Tessellation, wanted: Tessellation, strength: float) -> Tessellation:
+def interpolate_layouts(own: Tessellation, wanted: Tessellation, strength: float) -> Tessellation:
     """Move the cells of one tessellation a share of their way to those of another.
 
     Parameters

@@ -16,7 +16,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import measure_moments, paint, trace
 from texrs.papers.splice.cells.continuation import continue_cells
-from texrs.papers.splice.sowing import continue_points
+from texrs.papers.splice.placement import continue_points
 from texrs.point_sets import PointLayout
 
 __all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]

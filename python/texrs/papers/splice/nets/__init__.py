@@ -36,7 +36,7 @@ from texrs.growth.start import OVERLAP, weights_of
 from texrs.papers.splice.nets.graph import describe_places, join_knots
 from texrs.papers.splice.nets.knots import Laid, lay_knots
 from texrs.papers.splice.nets.pictures import draw_net_stages
-from texrs.papers.splice.nets.targets import Targets, go_part_of_the_way, take_own_points, take_points
+from texrs.papers.splice.nets.targets import Targets, interpolate_layouts, take_own_points, take_points
 from texrs.papers.splice.result import list_place, report_ways
 from texrs.point_sets import spacing
 from texrs.source_map import SourceMap
@@ -116,7 +116,7 @@ def splice_nets(
     shape = (a.mask.shape[0], a.mask.shape[1])
     wanted = take_points(a, b, cells, size, unit, scale=scale, seed=seed)
     if strength < 1:
-        wanted = go_part_of_the_way(take_own_points(a, size, unit), wanted, strength)
+        wanted = interpolate_layouts(take_own_points(a, size, unit), wanted, strength)
     mine, theirs = describe_places(a.points, shape, unit), describe_places(wanted.points, size, unit)
     laid = lay_knots(a, mine, wanted.points, theirs, unit, seed, watch)
     places = grow_rest(a, laid, mine, theirs, unit, seed, watch)

@@ -12,10 +12,10 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.papers.splice.cells.tessellation import take_cells
 from texrs.papers.splice.extension import lay_out
-from texrs.papers.splice.sowing import continue_points
+from texrs.papers.splice.placement import continue_points
 from texrs.point_sets import match_points, nearest_distances, spacing
 
-__all__ = ["Targets", "go_part_of_the_way", "take_own_points", "take_points"]
+__all__ = ["Targets", "interpolate_layouts", "take_own_points", "take_points"]
 
 Points = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def take_own_points(a: ElementAnalysis, size: tuple[int, int], unit: float) -> T
     return Targets(points, 1.0, "reflected" if mirrored.any() else "", points)
 
 
-def go_part_of_the_way(own: Targets, wanted: Targets, strength: float) -> Targets:
+def interpolate_layouts(own: Targets, wanted: Targets, strength: float) -> Targets:
     """Move knots a share of their way, matched at the least total squared distance (Eq. 4).
 
     Knots without a partner stay for the first half of the way, or enter in the second.
