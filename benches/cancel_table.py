@@ -135,7 +135,7 @@ VERBS: dict[str, Callable[[Given], Call]] = {
     "paint": lambda g: bind(texrs.painting.texture_mesh, g.ball, texrs.SolidTexture(g.volume), scale=40, atlas=256),
     "turntable": lambda g: bind(texrs.volume.turntable, g.volume, g.folder + "/turn.gif", frames=8),
     "kernels.mean_shift": lambda g: bind(texrs.kernels.mean_shift.mean_shift, g.light, 7, 0.1),
-    "kernels.regions": lambda g: bind(texrs.kernels.regions.merge, g.light, 0.2),
+    "kernels.regions": lambda g: bind(texrs.kernels.regions.felzenszwalb, g.light, 0.2),
 }
 
 

@@ -25,9 +25,9 @@ WITHIN = {
 """What modules use of their own layer. The foundation and the bindings are of one piece."""
 HOMES = {
     "rayon": ("foundation/par",),
-    "libm": ("foundation/functions",),
+    "libm": ("foundation/libm",),
     "rustfft": ("foundation/fft",),
-    "pulp": ("foundation/wide",),
+    "pulp": ("foundation/simd",),
     "spade": ("kernels/warp",),
     "image": ("kernels/image_io",),
     "pyo3": ("bindings/",),

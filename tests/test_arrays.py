@@ -14,7 +14,7 @@ from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
 from texrs.kernels.mean_shift import mean_shift
 from texrs.kernels.poisson import solve
-from texrs.kernels.regions import merge
+from texrs.kernels.regions import felzenszwalb
 
 PEBBLES = texrs.samples.pebbles((64, 64)).image
 DISCS = texrs.samples.tilted_discs((96, 96)).image
@@ -91,7 +91,7 @@ VERBS = {
     "segment": (PEBBLES, lambda image: texrs.exemplar.segment(image).elements),
     "find": (DISCS, lambda image: texrs.planes.find(image).slant),
     "auto_mask": (DISCS, lambda image: texrs.scale_maps.auto_mask(image)),
-    "regions": (PEBBLES, lambda image: merge(image, 0.2)),
+    "regions": (PEBBLES, lambda image: felzenszwalb(image, 0.2)),
     "mean_shift": (PEBBLES, lambda image: mean_shift(image, 2, 0.1)),
     "solve": (PEBBLES, lambda image: solve(image, np.zeros((64, 64, 3)), np.zeros((64, 64, 3)))),
     "compare": (PEBBLES, lambda image: texrs.volume.compare(image, image, axes=2).autocorrelation),

@@ -107,7 +107,7 @@ LEFT = {
     "texrs.Material.__contains__.key",
     "texrs.Material.__getitem__.name",
     "texrs.kernels.mean_shift.mean_shift.progress",
-    "texrs.kernels.regions.merge.progress",
+    "texrs.kernels.regions.felzenszwalb.progress",
 }
 """Arguments of which some values end otherwise: a view of two bytes as an array of eight gigabytes, whose copy ends in a
 MemoryError; `int` as what is told of progress, whose own error goes through; and keys of a material, which is a mapping, that

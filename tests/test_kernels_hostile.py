@@ -29,7 +29,7 @@ from texrs.kernels.ncc import Correlation
 from texrs.kernels.patch_search import PatchIndex
 from texrs.kernels.poisson import blend, solve, spread
 from texrs.kernels.reconstruction import reconstruct
-from texrs.kernels.regions import merge
+from texrs.kernels.regions import felzenszwalb
 from texrs.kernels.seam import OldSeams, Strip, binary_labels, cut, cut_strip, cut_strips
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import from_points, mesh
@@ -155,7 +155,7 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
         {"seed": NOISE[..., 0] - 0.2, "mask": NOISE[..., 0], "wrap": (True, False)},
     ),
     "regions.merge": (
-        merge,
+        felzenszwalb,
         {"image": NOISE, "scale": 0.5, "blur": 0.4, "least": 5, "wrap": (False, True), "progress": None},
     ),
     "seam.cut": (cut, CUT),

@@ -8,7 +8,7 @@ from texrs import samples
 from texrs._rust import set_threads
 from texrs.errors import InvalidInput
 from texrs.kernels.mean_shift import mean_shift
-from texrs.kernels.regions import merge
+from texrs.kernels.regions import felzenszwalb
 
 
 @settings(max_examples=40, deadline=None)
@@ -27,7 +27,7 @@ def test_agrees_with_the_naive_twin(shape, levels, scale, blur, least, wrap, see
     # Without a blur all is exact, and ties are taken in the same order; with one they are broken by rounding.
     blur = blur if levels == 200 else 0.0
     options = {"blur": blur, "least": least, "wrap": wrap}
-    assert (merge(image, scale, **options) == reference.merge(image, scale, **options)).mean() > (
+    assert (felzenszwalb(image, scale, **options) == reference.merge(image, scale, **options)).mean() > (
         0.9 if blur else 0.999
     )
 
@@ -54,7 +54,7 @@ def test_regions_are_those_of_scikit_image(name, smooth):
         unit = mean_shift(unit, 6, 0.05)
     for scale, blur, least in [(60, 0.4, 24), (300, 0.8, 5), (1, 0.0, 0)]:
         theirs = felzenszwalb(unit.astype(np.float64), scale, blur, least)
-        assert (merge(unit, scale / 255, blur=blur, least=least) == theirs).all()
+        assert (felzenszwalb(unit, scale / 255, blur=blur, least=least) == theirs).all()
 
 
 def test_the_same_for_any_number_of_threads():
@@ -62,15 +62,15 @@ def test_the_same_for_any_number_of_threads():
     results = []
     for threads in (1, 2, 7):
         before = set_threads(threads)
-        results.append(merge(image, 0.5).tobytes())
+        results.append(felzenszwalb(image, 0.5).tobytes())
         set_threads(before)
     assert results[0] == results[1] == results[2]
 
 
 def test_moving_a_cyclic_image_moves_the_regions():
     image = np.random.default_rng(3).random((20, 24, 3))
-    found = merge(image, 0.3, blur=0, wrap=True)
-    moved = merge(np.roll(image, (7, 11), (0, 1)), 0.3, blur=0, wrap=True)
+    found = felzenszwalb(image, 0.3, blur=0, wrap=True)
+    moved = felzenszwalb(np.roll(image, (7, 11), (0, 1)), 0.3, blur=0, wrap=True)
     pairs = np.stack([np.roll(found, (7, 11), (0, 1)), moved], -1).reshape(-1, 2)
     assert found.max() > 2
     assert len(np.unique(pairs, axis=0)) == found.max() + 1 == moved.max() + 1
@@ -81,16 +81,16 @@ def test_moving_a_cyclic_image_moves_the_regions():
 def test_any_dtype_and_channels(dtype, channels):
     shape = (9, 11) if channels is None else (9, 11, channels)
     image = np.random.default_rng(1).integers(0, 90, shape).astype(dtype)
-    found = merge(image, 20, least=3)
+    found = felzenszwalb(image, 20, least=3)
     assert (found.dtype, found.shape) == (np.int32, (9, 11))
-    assert (found == merge(image.astype(float), 20, least=3)).all()
+    assert (found == felzenszwalb(image.astype(float), 20, least=3)).all()
 
 
 def test_regions_are_as_large_as_asked_for():
     image = np.random.default_rng(4).random((40, 40))
-    assert np.bincount(merge(image, 0.1, least=30).ravel()).min() >= 30
-    assert len(np.unique(merge(image, 0, blur=0, least=0))) == image.size
-    assert merge(image, 1e15).max() == 0
+    assert np.bincount(felzenszwalb(image, 0.1, least=30).ravel()).min() >= 30
+    assert len(np.unique(felzenszwalb(image, 0, blur=0, least=0))) == image.size
+    assert felzenszwalb(image, 1e15).max() == 0
 
 
 def test_progress_can_stop():
@@ -104,7 +104,7 @@ def test_progress_can_stop():
         raise Stop
 
     with pytest.raises(Stop):
-        merge(image, 0.5, progress=stop)
+        felzenszwalb(image, 0.5, progress=stop)
 
 
 @pytest.mark.parametrize(
@@ -122,4 +122,4 @@ def test_progress_can_stop():
 )
 def test_refuses_with_a_reason(arguments, message):
     with pytest.raises(InvalidInput, match=message):
-        merge(**({"image": np.zeros((4, 4)), "scale": 1.0} | arguments))
+        felzenszwalb(**({"image": np.zeros((4, 4)), "scale": 1.0} | arguments))

@@ -48,9 +48,9 @@ def segment_by_texrs(given: Arrays) -> Work:
 
 def merge_by_texrs(given: Arrays) -> Work:
     """The merge of Felzenszwalb and Huttenlocher, smoothing included."""
-    from texrs.kernels.regions import merge
+    from texrs.kernels.regions import felzenszwalb
 
-    return lambda: merge(given["image"], SCALE, blur=BLUR, least=LEAST)
+    return lambda: felzenszwalb(given["image"], SCALE, blur=BLUR, least=LEAST)
 
 
 def merge_by_skimage(given: Arrays) -> Work:

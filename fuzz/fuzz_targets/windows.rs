@@ -106,7 +106,7 @@ fn merged(draw: &mut Draw<'_>) {
         least: draw.within(0..=20),
         wrap: draw.flags(),
     };
-    let Some(found) = agreed(|monitor| regions::merge(&image, shape, &options, monitor)) else {
+    let Some(found) = agreed(|monitor| regions::felzenszwalb(&image, shape, &options, monitor)) else {
         return;
     };
     let grid = Grid::new([shape[0], shape[1]], options.wrap).unwrap();

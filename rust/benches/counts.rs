@@ -162,7 +162,9 @@ fn merging() {
         least: 24,
         wrap: [false; 2],
     };
-    measured(|| regions::merge(&data, [side, side, 3], &options, &Monitor::default()).unwrap());
+    measured(|| {
+        regions::felzenszwalb(&data, [side, side, 3], &options, &Monitor::default()).unwrap()
+    });
 }
 
 fn stitching() {

@@ -3,7 +3,7 @@
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;
 use texrs::par::{self, Monitor};
-use texrs::regions::{Options, merge};
+use texrs::regions::{Options, felzenszwalb};
 
 pub(crate) fn bench(c: &mut Criterion) {
     let mut group = c.benchmark_group("regions");
@@ -25,7 +25,7 @@ pub(crate) fn bench(c: &mut Criterion) {
         for threads in [1, 2] {
             group.bench_function(BenchmarkId::new(side.to_string(), threads), |b| {
                 par::install(threads, || {
-                    b.iter(|| merge(&image, [side, side, 3], &options, &Monitor::default()));
+                    b.iter(|| felzenszwalb(&image, [side, side, 3], &options, &Monitor::default()));
                 })
                 .unwrap();
             });

@@ -17,7 +17,7 @@ from texrs._arrays import log_single, to_lab
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.shapes import widen
 from texrs.kernels.mean_shift import mean_shift
-from texrs.kernels.regions import merge
+from texrs.kernels.regions import felzenszwalb
 
 __all__ = ["Regions", "mark_smooth"]
 
@@ -52,7 +52,7 @@ class Regions:
         """Filter an image and merge similar pixels. ``watch`` is called during the work."""
         filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS, progress=lambda stage, share: watch())
         watch()
-        region = merge(filtered, MERGE_SCALE, blur=MERGE_BLUR, least=MERGE_MINIMUM)
+        region = felzenszwalb(filtered, MERGE_SCALE, blur=MERGE_BLUR, least=MERGE_MINIMUM)
         watch()
         area = np.bincount(region.ravel()).astype(np.float64)
         lab = 100 * to_lab(filtered).reshape(-1, 3)

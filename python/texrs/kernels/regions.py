@@ -10,7 +10,7 @@ from texrs._progress import stage
 from texrs._typing import Labels, Progress
 from texrs.errors import InvalidInput
 
-__all__ = ["merge"]
+__all__ = ["felzenszwalb"]
 
 
 def __dir__() -> list[str]:
@@ -20,7 +20,7 @@ def __dir__() -> list[str]:
 _MOST = 1e15
 
 
-def merge(
+def felzenszwalb(
     image: object,
     scale: float,
     *,

@@ -2,7 +2,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray3, PyUntypedArray
 use pyo3::prelude::*;
 
 use super::run;
-use crate::kernels::regions::{Options, merge};
+use crate::kernels::regions::{Options, felzenszwalb};
 
 /// Returns the labels (rows, columns) of the regions of an image (rows, columns, channels).
 #[pyfunction]
@@ -24,7 +24,7 @@ pub(super) fn merge_regions<'py>(
     };
     let samples = image.as_slice()?;
     let labels = run(py, progress, |monitor| {
-        merge(samples, shape, &options, monitor)
+        felzenszwalb(samples, shape, &options, monitor)
     })?;
     PyArray1::from_vec(py, labels).reshape([shape[0], shape[1]])
 }

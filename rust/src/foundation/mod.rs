@@ -3,10 +3,10 @@
 pub mod error;
 pub(crate) mod fft;
 pub mod fixed;
-pub(crate) mod functions;
 pub mod grid;
 pub mod hash;
+pub(crate) mod libm;
 pub(crate) mod memory;
 pub mod par;
 pub mod pca;
-pub(crate) mod wide;
+pub(crate) mod simd;

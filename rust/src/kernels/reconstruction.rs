@@ -17,7 +17,7 @@ use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 use crate::{Error, Result};
 
 /// Number of processed pixels between checks of the monitor.

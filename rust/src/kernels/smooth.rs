@@ -7,7 +7,7 @@
 use crate::foundation::error::check_shape;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 use crate::{Error, Result};
 
 /// Number of sums that are computed together.

@@ -8,22 +8,22 @@
 //! Distances are divided by the variance of all windows, so they mean the same for every exemplar; [`UNIT`] is
 //! the distance of two windows that have nothing to do with each other, halved.
 
-mod apron;
+mod padding;
 mod projection;
 mod table;
 mod window;
 
 use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{BITS, ONE, Place};
-use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
 use crate::foundation::hash::Noise;
+use crate::foundation::libm::exp;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::pca::principal;
 use crate::{Error, Result};
 
-pub use apron::Apron;
+pub use padding::Padding;
 use projection::Projection;
 pub use table::Parts;
 pub(crate) use window::Centres;
@@ -69,7 +69,7 @@ pub struct Appearance<const D: usize> {
     radius: usize,
     channels: usize,
     colours: Vec<Colour>,
-    apron: Apron<D>,
+    padding: Padding<D>,
     offsets: Vec<[i32; D]>,
     projection: Projection,
     features: Vec<Line>,
@@ -116,7 +116,7 @@ impl<const D: usize> Appearance<D> {
             grid,
             radius,
             channels,
-            apron: Apron::new(&colours, &grid, radius + 1),
+            padding: Padding::new(&colours, &grid, radius + 1),
             colours,
             offsets: window(radius),
             projection: Projection::empty(),
@@ -259,8 +259,8 @@ impl<const D: usize> Appearance<D> {
 
     /// The colours with a rim of one sample more than windows reach.
     #[inline(always)]
-    pub fn apron(&self) -> &Apron<D> {
-        &self.apron
+    pub fn padding(&self) -> &Padding<D> {
+        &self.padding
     }
 
     /// The colour at a row-major position.

@@ -2,7 +2,7 @@
 
 use super::{FLAT, Feature, KEEP, LANES, SCALE, TOP};
 use crate::foundation::pca::Principal;
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// From the colours of a window to its appearance vector.
 #[derive(Debug, Clone, PartialEq)]

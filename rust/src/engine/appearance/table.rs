@@ -1,7 +1,7 @@
 //! An analysis taken apart into plain arrays, to be kept, and put together again.
 
 use super::{
-    Appearance, Apron, CHANNELS, Colour, Feature, KEEP, LANES, Line, Projection, check_sides,
+    Appearance, CHANNELS, Colour, Feature, KEEP, LANES, Line, Padding, Projection, check_sides,
     numbers, window,
 };
 use crate::foundation::grid::Grid;
@@ -82,7 +82,7 @@ impl<const D: usize> Appearance<D> {
             grid: parts.grid,
             radius: parts.radius,
             channels: parts.channels,
-            apron: Apron::new(&parts.colours, &parts.grid, parts.radius + 1),
+            padding: Padding::new(&parts.colours, &parts.grid, parts.radius + 1),
             colours: parts.colours,
             offsets: window(parts.radius),
             projection: Projection {

@@ -124,7 +124,7 @@ pub(super) mod v3 {
     use std::arch::x86_64::__m256i;
 
     use super::{Block, Boxes, Found, PAIRS, Query, WIDTH};
-    use crate::foundation::wide::{V3, cast};
+    use crate::foundation::simd::{V3, cast};
 
     // Wide by themselves, for not all of a search is inlined into the function that is.
     #[inline(always)]

@@ -7,7 +7,7 @@ use crate::engine::appearance::Appearance;
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, add, apply, inverse, nearest, sub};
 use crate::foundation::grid::Region;
 use crate::foundation::par::{self, Monitor};
-use crate::foundation::wide::square_apart;
+use crate::foundation::simd::square_apart;
 
 /// Diagonal neighbours, at most.
 const CORNERS: usize = 8;

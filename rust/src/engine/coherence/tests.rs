@@ -81,7 +81,7 @@ fn sets_are_those_of_the_definition() {
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 fn wide_registers_give_the_same_numbers() {
     use super::boxes::{self, Boxes, block, pairs, v3};
-    let Some(simd) = crate::foundation::wide::V3::try_new() else {
+    let Some(simd) = crate::foundation::simd::V3::try_new() else {
         return;
     };
     let noise = Noise::new(9);

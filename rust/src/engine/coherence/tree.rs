@@ -4,7 +4,7 @@ use super::boxes::{Boxes, WIDTH, extent, pairs};
 use super::{FEW, apart, boxes};
 use crate::foundation::par;
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
-use crate::foundation::wide::V3;
+use crate::foundation::simd::V3;
 
 /// Vectors of a leaf: as many blocks as a node has children.
 const LEAF: usize = WIDTH * WIDTH;

@@ -148,10 +148,10 @@ impl<'a, const D: usize> Eye<'a, D> {
     #[inline(always)]
     fn look(&mut self, places: &[Place<D>], p: usize) {
         let appearance = self.level.appearance;
-        let apron = appearance.apron();
+        let padding = appearance.padding();
         for (k, look) in self.looks.iter().enumerate() {
             let sample = nearest(add(places[(p as isize + look.across) as usize], look.rest));
-            appearance.put(&mut self.window, k, apron.colour(sample));
+            appearance.put(&mut self.window, k, padding.colour(sample));
         }
     }
 

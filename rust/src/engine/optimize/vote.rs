@@ -3,7 +3,7 @@
 use super::Level;
 use crate::engine::appearance::{CHANNELS, Colour, UNIT};
 use crate::foundation::fixed::{Place, add, apply, nearest};
-use crate::foundation::functions::exp;
+use crate::foundation::libm::exp;
 
 /// Standard deviation of a proposal's weight over the distance of its window, in points.
 const SIGMA: f64 = 2.0;

@@ -3,14 +3,14 @@
 //! Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001. For each window in turn:
 //!
 //! 1. *pool*: the places that fit what is there already best, looked for at half the size (`pool`);
-//! 2. *charge*: each for what others show already, and for going on with what lies beside it (`charges`);
+//! 2. *charge*: each for what others show already, and for going on with what lies beside it (`penalties`);
 //! 3. *refine*: the best few, to the pixel;
 //! 4. *cut*: all of these are cut in by the stitcher, and the cheapest stays.
 //!
 //! Departures are told where the verb is, `texrs.quilting`. Windows of a wave lie apart and are chosen side by side, each as if it
 //! were the first of them.
 
-mod charges;
+mod penalties;
 mod pool;
 mod window;
 
@@ -20,7 +20,7 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::kernels::patch_search::{Exemplar, Index, Match};
 use crate::{Error, Result};
-use charges::Charges;
+use penalties::Penalties;
 use pool::halve;
 use window::Around;
 pub use window::{Span, Window};
@@ -301,8 +301,8 @@ impl<'a> Quilt<'a> {
         let known = window.known();
         let colours = self.colours(&old);
         let pool = self.find_pool(&colours, &known, window, monitor)?;
-        let mut charges = Charges::of(self, window, &pool, &old, &known);
-        let best = charges.promising(CANDIDATES);
+        let mut penalties = Penalties::of(self, window, &pool, &old, &known);
+        let best = penalties.promising(CANDIDATES);
         let matches: Vec<Match> = best.iter().map(|&k| pool[k]).collect();
         let exact = self.refine(&matches, &colours, &known)?;
         let around = window.around(self.options.size, self.options.wrap);
@@ -322,8 +322,8 @@ impl<'a> Quilt<'a> {
             .map(|found| self.spread(found, &around))
             .collect();
         let patches: Vec<&[u32]> = patches.iter().map(|p| &p[..]).collect();
-        charges.finish();
-        let pick = |seams: &[f64]| charges.cheapest(&best, seams);
+        penalties.finish();
+        let pick = |seams: &[f64]| penalties.cheapest(&best, seams);
         let (chosen, pasted) = self.samples.cut_best(&pasting, &patches, pick, monitor)?;
         Ok(Chosen {
             found: exact[chosen],

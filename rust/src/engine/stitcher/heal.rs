@@ -13,7 +13,7 @@ use super::runs::widen;
 use super::{Patch, Stitching};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};
-use crate::foundation::functions::root;
+use crate::foundation::libm::root;
 use crate::foundation::par;
 
 /// Cost of a missing point of an instance.

@@ -34,9 +34,9 @@ use std::collections::HashMap;
 
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply};
-use crate::foundation::functions::root;
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
+use crate::foundation::libm::root;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};

@@ -6,7 +6,7 @@
 use super::source::{CHANNELS, Source};
 use super::view::Row;
 use super::weights::Weights;
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Cost that is added to every pair, so that the shorter of two equal seams is chosen.
 const SHORTEST: f32 = 2e-3;

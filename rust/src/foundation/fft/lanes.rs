@@ -6,7 +6,7 @@ use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
 use rustfft::num_traits::{FromPrimitive, Num, One, Signed, Zero};
 
-use crate::foundation::wide::{add_four, multiply_four, subtract_four};
+use crate::foundation::simd::{add_four, multiply_four, subtract_four};
 
 /// Number of values in [`Lanes`].
 pub(crate) const LANES: usize = 4;

@@ -2,8 +2,8 @@
 
 use super::{Canvas, FAR_WEIGHT, FLAT, Inpainting, KEPT_WEIGHT, Patch};
 use crate::Result;
-use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
+use crate::foundation::libm::exp;
 use crate::foundation::par::Monitor;
 use crate::kernels::patch_search::{Index, Match, Query};
 use crate::kernels::seam::cost::Cost;

@@ -15,7 +15,7 @@ use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
-use crate::foundation::wide::{V3, wide_fn};
+use crate::foundation::simd::{V3, wide_fn};
 use crate::{Error, Result};
 use window::{Planes, Sums, window, window_any};
 

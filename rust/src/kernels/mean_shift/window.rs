@@ -229,7 +229,7 @@ pub(super) mod v3 {
     use std::arch::x86_64::_CMP_LE_OQ;
 
     use super::{LANES, Lanes, Planes, Sums, across, fold};
-    use crate::foundation::wide::{V3, cast};
+    use crate::foundation::simd::{V3, cast};
 
     #[inline(always)]
     pub(in super::super) fn window<const C: usize>(

@@ -5,7 +5,7 @@
 //! are the unit of parallel work.
 
 use crate::foundation::fft::{self, Complex, Images};
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Number of values that are multiplied together.
 const LANES: usize = 16;

@@ -6,7 +6,7 @@ use std::arch::x86_64::{__m128, __m256d};
 use super::Query;
 use crate::foundation::error::check_shape;
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
-use crate::foundation::wide::{V3, cast};
+use crate::foundation::simd::{V3, cast};
 use crate::{Error, Result};
 
 /// Number of partial sums of a score. It is fixed, so that every CPU adds in the same order.

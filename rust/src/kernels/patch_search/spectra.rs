@@ -1,7 +1,7 @@
 //! Spectra of the blocks of the exemplars, with the means removed.
 
 use super::{Block, Exemplar, Index, once};
-use crate::foundation::functions::power_below;
+use crate::foundation::libm::power_below;
 use crate::foundation::par;
 
 /// Data of the exemplars for the filter.

@@ -10,7 +10,7 @@
 //! the row is mirrored or wrapped.
 
 use super::Edge;
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Weight of a neighbour below which it is omitted, relative to the pixel.
 const NOTHING: f64 = 1.0 / (1 << 28) as f64;

@@ -19,7 +19,7 @@ mod transform;
 use crate::foundation::fft::{LANES, Lanes};
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
-use crate::foundation::wide::wide;
+use crate::foundation::simd::wide;
 use crate::{Error, Result};
 use reduce::Level;
 use sweep::{PANEL, Systems};

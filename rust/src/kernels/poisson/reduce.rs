@@ -21,7 +21,7 @@
 use super::along::{Inverse, Scratch};
 use super::{Edge, Field, Layout, ROWS, sweep::Systems, transformed};
 use crate::foundation::par::{self, Monitor};
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Maximum number of reductions. Each reduction saves half as much as the previous one, and needs
 /// twice as many systems for each row.

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use super::Edge;
 use crate::foundation::fft::{Complex, LANES, Lanes, Lines, split};
-use crate::foundation::functions::sincos;
+use crate::foundation::libm::sincos;
 
 /// The transform of an axis of `len` unknowns.
 pub(super) struct Transform {

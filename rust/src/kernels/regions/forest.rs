@@ -32,7 +32,7 @@ pub(super) struct Forest {
     /// Step from the first end of an edge of each direction to the second end.
     steps: [u32; DIRECTIONS],
     triangles: [Vec<Triangle>; DIRECTIONS],
-    /// Dormant edges that have woken, the lightest first.
+    /// Inactive edges that have woken, the lightest first.
     woken: BinaryHeap<Reverse<Edge>>,
 }
 
@@ -110,7 +110,7 @@ impl Forest {
         })
     }
 
-    /// Joins similar regions over all edges. `edges` contains those that do not lie dormant.
+    /// Joins similar regions over all edges. `edges` contains those that do not lie inactive.
     /// Returns the pairs of roots that these edges did not join.
     pub(super) fn join_alike(
         &mut self,

@@ -13,10 +13,10 @@
 //! numbered by their first pixels.
 //!
 //! Departure from the paper: 60 % of the edges are never sorted, and the result is the same. See
-//! `dormant`.
+//! `inactive`.
 
-mod dormant;
 mod forest;
+mod inactive;
 mod weights;
 
 use crate::foundation::error::check_shape;
@@ -53,7 +53,7 @@ pub struct Options {
 
 /// Returns the number of the region of each pixel, from 0. The image has the given `shape` (rows,
 /// columns, channels).
-pub fn merge(
+pub fn felzenszwalb(
     image: &[f32],
     shape: [usize; 3],
     options: &Options,
@@ -74,12 +74,12 @@ pub fn merge(
         frame.len() + rows_in_work,
         PIXEL,
     )?;
-    // Measure the edges, and list and sort those that are not dormant.
+    // Measure the edges, and list and sort those that are not inactive.
     monitor.expect(STEPS);
     let mut weights = weights::measure(image, channels, &frame, options.blur, monitor)?;
     monitor.advance(STEPS / 4)?;
-    dormant::mark(&mut weights, &frame);
-    let awake = dormant::list_others(&weights, &frame)?;
+    inactive::mark(&mut weights, &frame);
+    let awake = inactive::list_others(&weights, &frame)?;
     monitor.advance(STEPS / 8)?;
     let awake = sort(awake)?;
     monitor.advance(STEPS / 8)?;

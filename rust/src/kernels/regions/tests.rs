@@ -118,12 +118,12 @@ fn smoothed(image: &[f32], [rows, columns, channels]: [usize; 3], options: &Opti
 }
 
 fn libm_exp(x: f64) -> f64 {
-    crate::foundation::functions::exp(x)
+    crate::foundation::libm::exp(x)
 }
 
 fn run(image: &[f32], shape: [usize; 3], options: &Options, threads: usize) -> Vec<i32> {
     par::install(threads, || {
-        merge(image, shape, options, &Monitor::default())
+        felzenszwalb(image, shape, options, &Monitor::default())
     })
     .unwrap()
     .unwrap()
@@ -210,11 +210,11 @@ fn refuses_what_it_cannot_merge() {
         wrap: [false; 2],
     };
     let monitor = Monitor::default();
-    assert!(merge(&[0.0; 4], [2, 2, 2], &options, &monitor).is_err());
-    assert!(merge(&[], [0, 2, 1], &options, &monitor).is_err());
-    assert!(merge(&[], [2, 2, 0], &options, &monitor).is_err());
-    assert!(merge(&[f32::NAN; 4], [2, 2, 1], &options, &monitor).is_err());
-    assert!(merge(&[1e20; 4], [2, 2, 1], &options, &monitor).is_err());
+    assert!(felzenszwalb(&[0.0; 4], [2, 2, 2], &options, &monitor).is_err());
+    assert!(felzenszwalb(&[], [0, 2, 1], &options, &monitor).is_err());
+    assert!(felzenszwalb(&[], [2, 2, 0], &options, &monitor).is_err());
+    assert!(felzenszwalb(&[f32::NAN; 4], [2, 2, 1], &options, &monitor).is_err());
+    assert!(felzenszwalb(&[1e20; 4], [2, 2, 1], &options, &monitor).is_err());
     for bad in [-1.0, f64::NAN, 1e30] {
         let scale = Options {
             scale: bad,
@@ -224,9 +224,9 @@ fn refuses_what_it_cannot_merge() {
             blur: bad,
             ..options
         };
-        assert!(merge(&[0.0; 4], [2, 2, 1], &scale, &monitor).is_err());
-        assert!(merge(&[0.0; 4], [2, 2, 1], &blur, &monitor).is_err());
+        assert!(felzenszwalb(&[0.0; 4], [2, 2, 1], &scale, &monitor).is_err());
+        assert!(felzenszwalb(&[0.0; 4], [2, 2, 1], &blur, &monitor).is_err());
     }
     monitor.cancel();
-    assert!(merge(&[0.0; 4], [2, 2, 1], &options, &monitor).is_err());
+    assert!(felzenszwalb(&[0.0; 4], [2, 2, 1], &options, &monitor).is_err());
 }

@@ -2,10 +2,10 @@
 
 use super::{DIRECTIONS, Frame};
 use crate::Result;
-use crate::foundation::functions::exp;
+use crate::foundation::libm::exp;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Number of rows of a task, which smooths one more row.
 const ROWS: usize = 32;

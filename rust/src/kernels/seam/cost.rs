@@ -4,7 +4,7 @@
 //! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures: image and video synthesis using graph
 //! cuts*, SIGGRAPH 2003.
 
-use crate::foundation::functions::power_below;
+use crate::foundation::libm::power_below;
 use crate::{Error, Result};
 
 /// Visibility of a seam between two neighbours.

@@ -7,7 +7,7 @@
 use super::plan::TILE;
 use crate::Result;
 use crate::foundation::par::Monitor;
-use crate::foundation::wide::{wide_fn, widest_fn};
+use crate::foundation::simd::{wide_fn, widest_fn};
 
 /// Maximum number of rows that are processed together.
 const TALL: usize = 16;

@@ -4,7 +4,7 @@ use super::Cholesky;
 use super::plan::TILE;
 use crate::Result;
 use crate::foundation::memory;
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Replaces right-hand sides by the solutions, all together, so that each number of the factor is
 /// read once.

@@ -2,7 +2,7 @@
 
 use super::CHUNK;
 use crate::foundation::par;
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Values beyond one side of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

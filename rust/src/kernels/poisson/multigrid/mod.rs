@@ -10,7 +10,7 @@ mod level;
 
 use super::{Domain, Edge};
 use crate::foundation::par::{self, Monitor};
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 use crate::{Error, Result};
 use level::{Level, Side, Vectors};
 

@@ -1,5 +1,5 @@
 //! Edges that need not be sorted: they are heavier than the two other edges of a triangle. They lie
-//! dormant until one of these edges has separated two regions.
+//! inactive until one of these edges has separated two regions.
 //!
 //! A region is *full* after an edge was too heavy for it. All later edges are heavier, so the
 //! region does not change any more. Let u-v be the heaviest edge of a triangle u, v, y. There are
@@ -16,13 +16,13 @@
 //!
 //! The heaviest edges of triangles are therefore left out of the list of edges. An edge stays in
 //! the list if in all its triangles both other edges are such edges themselves, because these might
-//! not wake it. `Forest` wakes dormant edges. For photographs, 40 % of the edges are sorted, and 1
+//! not wake it. `Forest` wakes inactive edges. For photographs, 40 % of the edges are sorted, and 1
 //! in 80 of the others wakes.
 
 use super::{DIRECTIONS, Edge, Frame, pack};
 use crate::Result;
 use crate::foundation::memory;
-use crate::foundation::wide::wide_fn;
+use crate::foundation::simd::wide_fn;
 
 /// Marks the heaviest edges of triangles by a negative sign of their weights.
 pub(super) fn mark(weights: &mut [f32], frame: &Frame) {
@@ -49,7 +49,7 @@ wide_fn! {
     }
 }
 
-/// Returns the edges that do not lie dormant, in the order of their numbers.
+/// Returns the edges that do not lie inactive, in the order of their numbers.
 pub(super) fn list_others(weights: &[f32], frame: &Frame) -> Result<Vec<Edge>> {
     let ([rows, columns], stride) = (frame.shape, frame.stride);
     let row = DIRECTIONS * stride;
@@ -82,7 +82,7 @@ pub(super) fn list_others(weights: &[f32], frame: &Frame) -> Result<Vec<Edge>> {
 }
 
 wide_fn! {
-    /// Computes the weights beyond which the edges of a row lie dormant, one line for each
+    /// Computes the weights beyond which the edges of a row lie inactive, one line for each
     /// direction. The bound is the minimum over the triangles of an edge of the heavier of their
     /// two other edges. With `WITNESS`, triangles whose two other edges are both marked are
     /// ignored.

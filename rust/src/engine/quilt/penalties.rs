@@ -20,17 +20,17 @@ const AS_WELL: f64 = 1.3;
 const MIRRORED: f64 = 0.02;
 const NEAR: f32 = 8.0;
 
-/// The charges of a pool of matches, and which of them may be taken.
-pub(super) struct Charges {
+/// The penalties of a pool of matches, and which of them may be taken.
+pub(super) struct Penalties {
     costs: Vec<f64>,
     /// A typical match.
     usual: f64,
-    charges: Vec<f64>,
+    penalties: Vec<f64>,
     free: Vec<usize>,
     regular: bool,
 }
 
-impl Charges {
+impl Penalties {
     pub(super) fn of(
         quilt: &Quilt<'_>,
         window: &Window,
@@ -57,7 +57,7 @@ impl Charges {
         };
         let seen: Vec<Option<u32>> = looked().map(|i| known[i].then_some(old[i])).collect();
         let count = seen.iter().flatten().count().max(1) as f64;
-        let mut charges = Vec::with_capacity(pool.len());
+        let mut penalties = Vec::with_capacity(pool.len());
         let mut turned = Vec::with_capacity(pool.len());
         for m in pool {
             let (mut used, mut alike, mut mirrored) = (0u64, 0u32, 0u32);
@@ -71,7 +71,7 @@ impl Charges {
                 }
             }
             let repetition = used as f64 / seen.len() as f64 / f64::from(quilt.pastes);
-            charges.push(unit * repetition + CONTINUATION * (f64::from(alike) / count));
+            penalties.push(unit * repetition + CONTINUATION * (f64::from(alike) / count));
             turned.push(f64::from(mirrored) / count);
         }
         let mut free: Vec<usize> = (0..pool.len()).filter(|&k| turned[k] <= MIRRORED).collect();
@@ -82,14 +82,14 @@ impl Charges {
             free: keep_in_step(quilt, pool, free, window.corner()),
             costs,
             usual,
-            charges,
+            penalties,
             regular,
         }
     }
 
     /// The most promising matches, the best first.
     pub(super) fn promising(&self, count: usize) -> Vec<usize> {
-        let merit = |k: usize| self.costs[k] / self.usual + self.charges[k];
+        let merit = |k: usize| self.costs[k] / self.usual + self.penalties[k];
         let mut best = self.free.clone();
         best.sort_by(|&a, &b| merit(a).total_cmp(&merit(b)));
         best.truncate(count);
@@ -100,7 +100,7 @@ impl Charges {
     /// out of step.
     pub(super) fn finish(&mut self) {
         if self.regular {
-            for (charge, cost) in self.charges.iter_mut().zip(&self.costs) {
+            for (charge, cost) in self.penalties.iter_mut().zip(&self.costs) {
                 *charge += cost / self.usual;
             }
         }
@@ -117,7 +117,7 @@ impl Charges {
             (sorted[n / 2 - 1] + sorted[n / 2]) / 2.0
         };
         let least = if median == 0.0 { 1.0 } else { median };
-        let cost = |i: usize| seams[i] / least + self.charges[matches[i]];
+        let cost = |i: usize| seams[i] / least + self.penalties[matches[i]];
         let mut best = 0;
         for i in 1..n {
             if cost(i) < cost(best) {

@@ -5,14 +5,14 @@ use crate::foundation::grid::Grid;
 
 /// Colours that can be read a little beyond the exemplar's ends: around cyclic axes, and from the border beyond others.
 #[derive(Debug, Clone)]
-pub struct Apron<const D: usize> {
+pub struct Padding<const D: usize> {
     colours: Vec<Colour>,
     strides: [i32; D],
     /// Position of sample zero.
     zero: i32,
 }
 
-impl<const D: usize> Apron<D> {
+impl<const D: usize> Padding<D> {
     pub(super) fn new(colours: &[Colour], grid: &Grid<D>, rim: usize) -> Self {
         let wide = Grid::new(grid.shape().map(|n| n + 2 * rim), [false; D])
             .expect("an exemplar that fits, so its rim does");

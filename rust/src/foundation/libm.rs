@@ -3,12 +3,12 @@
 //! The standard library calls the system's functions, whose code and rounding depend on the
 //! processor. Only this file names libm.
 
-pub(crate) use libm::{exp, sincos};
+pub(crate) use ::libm::{exp, sincos};
 
 /// Returns the D-th root of a positive number: the side of a square of area `x`, or of a cube of
 /// volume `x`.
 pub(crate) fn root<const D: usize>(x: f64) -> f64 {
-    if D == 2 { x.sqrt() } else { libm::cbrt(x) }
+    if D == 2 { x.sqrt() } else { ::libm::cbrt(x) }
 }
 
 /// Returns the largest power of two that is at most `x`, a positive normal number.
