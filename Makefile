@@ -118,6 +118,7 @@ lint-python: $(VENV)/.built
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest texrs._rust
 	$(BIN)/python .ci/prose
+	$(BIN)/python .ci/names
 
 format: $(VENV)/.tools
 	cargo fmt

@@ -29,7 +29,7 @@ import texrs
 from texrs import elements, io, metrics, samples
 from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import TexrsError
-from texrs.papers.splice.pictures import to_picture
+from texrs.papers.splice.stage_drawings import to_picture
 
 CLEAR = 4
 """How far, in pixels, the ground that is measured lies from any element: nearer is what comes with it, its shadow."""

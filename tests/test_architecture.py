@@ -20,7 +20,7 @@ LAYERS = (
     ("_masks",),
     ("_arrays",),
     ("_colours",),
-    ("_evidence", "_light", "_show", "_threads", "kernels"),
+    ("_light_evidence", "_light", "_show", "_threads", "kernels"),
     ("_chunks", "_lighting_correction", "_html", "_viewer"),
     ("_engine",),
     ("source_map",),

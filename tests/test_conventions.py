@@ -17,7 +17,7 @@ from texrs._notices import collect
 from texrs._typing import Array
 from texrs.cli import main
 from texrs.errors import InputWarning, InvalidInput
-from texrs.io._layers import read_layers
+from texrs.io._exr_layers import read_layers
 from texrs.materials import Role, guess_role
 from texrs.materials._conventions import CONVENTIONS, File, guess_roles, list_conventions
 from texrs.materials._roles import CODED

@@ -9,7 +9,7 @@ import pytest
 import texrs
 from texrs import io, samples
 from texrs.corner_tiles._corners import COLOURS, TILES, TORUS, draw_colours, number_tiles
-from texrs.corner_tiles._step import Draw, choose_side, find_step
+from texrs.corner_tiles._lattice_step import Draw, choose_side, find_step
 from texrs.exemplar.regularity import Lattice
 
 DOTS = samples.dots((64, 64)).image

@@ -17,8 +17,8 @@ from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._typing import Array
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.papers.solid import layers
-from texrs.papers.solid.boxes import Box, intersect, join
 from texrs.papers.solid.ground import Ground
+from texrs.papers.solid.packed_boxes import Box, intersect, join
 
 SOLID = samples.particles((32, 32, 32)).image
 PLANE = samples.dots((48, 48)).image

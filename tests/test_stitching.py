@@ -12,7 +12,7 @@ from texrs import SourceMap, fields, samples, volume
 from texrs.errors import InvalidInput
 from texrs.exemplar import _exemplar
 from texrs.exemplar.adjacency import classify, measure_adjacency
-from texrs.exemplar.instances import label_components
+from texrs.exemplar.separate_elements import label_components
 from texrs.metrics import evaluate
 
 PARTICLES = samples.particles((64, 64, 64))
@@ -151,7 +151,7 @@ def test_elements_stay_whole(kind):
 def test_elements_keep_their_share_and_number(kind):
     """Cuts around elements are shorter than cuts between them, and would leave fewer than there are."""
     exemplar = texrs.Exemplar(PARTICLES.image, axes=3)
-    depth = exemplar.instances.depth
+    depth = exemplar.separate_elements.depth
     shares, numbers = [], []
     for seed in (1, 2, 3):
         source = make_volume(kind, seed).source_map
@@ -213,7 +213,7 @@ def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
     """Things in a heap, which no background parts, are not found for sure."""
     picture = texrs.samples.beans((160, 160)).image
     exemplar = texrs.Exemplar(picture, repeat=False)
-    assert exemplar.instances is None
+    assert exemplar.separate_elements is None
     assert exemplar.stitcher.guessed
     assert not exemplar.stitcher.separate
     torn = [evaluate(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source_map).torn for seed in range(3)]

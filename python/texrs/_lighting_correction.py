@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, exp_single, log_single
 from texrs._checks import as_choice, as_float, as_wrap
 from texrs._colours import Space, decode_srgb, encode_srgb, shrink, to_light, to_pixels
-from texrs._evidence import MOST, Slow
+from texrs._light_evidence import MOST, Slow
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 

@@ -141,10 +141,10 @@ def rectify(
     watch("plane", 1.0)
     plane = seen.plane
     fine = choose_resolution(plane, seen.ground, fine)
-    sheet = Sheet.of(plane, seen.ground, fine)
+    sheet = FlatSheet.of(plane, seen.ground, fine)
     if seen.found:
         plane = level(plane, sheet.source.render(pixels, interpolation="linear"), sheet.sharp)
-        sheet = Sheet.of(plane, seen.ground, fine)
+        sheet = FlatSheet.of(plane, seen.ground, fine)
     start, sides = sheet.find_rectangle()
     if min(sides) < SMALLEST:
         raise InvalidInput(
@@ -218,7 +218,7 @@ def measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDAr
 
 
 @dataclass(frozen=True, slots=True)
-class Sheet:
+class FlatSheet:
     """The part of a plane that may be sharp, flattened at a distance of several texture pixels."""
 
     source: SourceMap
@@ -230,7 +230,7 @@ class Sheet:
     """Resolution of the texture."""
 
     @classmethod
-    def of(cls, plane: Plane, ground: Bools, resolution: float) -> Sheet:
+    def of(cls, plane: Plane, ground: Bools, resolution: float) -> FlatSheet:
         """Flatten a plane, and find where it is sharp enough for a resolution."""
         from scipy.ndimage import minimum_filter
 

@@ -27,7 +27,7 @@ from texrs.fields._spaced import as_distances
 from texrs.volume import Viewer, cubes, label_to_color, oblique_slice, render_block, render_volume, slices, turntable
 from texrs.volume._stretch import find_cube
 from texrs.volume._values import as_direction
-from texrs.volume.pictures import as_steps, check_cube, check_turntable
+from texrs.volume.rendering import as_steps, check_cube, check_turntable
 from texrs.volume.transparent import check_transfer, parse_transfer
 
 _AXES = {"plane": 0, "row": 1, "column": 2, "z": 0, "y": 1, "x": 2}

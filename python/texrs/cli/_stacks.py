@@ -18,7 +18,7 @@ from texrs._notices import collect
 from texrs.cli import _outputs, _provenance
 from texrs.cli._provenance import check_free, expand_braces
 from texrs.errors import FileError, InvalidInput
-from texrs.io._layers import list_channels
+from texrs.io._exr_layers import list_channels
 from texrs.materials import Material
 from texrs.materials._conventions import CONVENTIONS, as_convention
 from texrs.materials._converting import convert

@@ -38,8 +38,8 @@ from texrs._typing import Array, Floats, Path, Progress
 from texrs.corner_tiles._corners import TILES, TORUS, draw_colours, number_tiles
 from texrs.corner_tiles._cutting import cut_tiles
 from texrs.corner_tiles._fitting import Pictures, look_up
+from texrs.corner_tiles._lattice_step import choose_side, find_step
 from texrs.corner_tiles._shaders import write_shaders
-from texrs.corner_tiles._step import choose_side, find_step
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.io._files import as_path

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from texrs.corner_tiles._corners import COLOURS, TILES
 from texrs.corner_tiles._fitting import Fit, Pictures, Place, Places
-from texrs.corner_tiles._step import Draw, Step
+from texrs.corner_tiles._lattice_step import Draw, Step
 from texrs.kernels.seam import cut, cut_strip
 
 __all__ = ["cut_tiles"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array, Floats
-from texrs.corner_tiles._step import Draw
+from texrs.corner_tiles._lattice_step import Draw
 from texrs.kernels.patch_search import PatchIndex
 
 __all__ = ["Fit", "Pictures", "Place", "Places", "look_up"]

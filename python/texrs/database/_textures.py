@@ -18,8 +18,8 @@ from texrs._cache import Cache
 from texrs._calls import check_call
 from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
+from texrs.database._contact_sheet import ContactSheet
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
-from texrs.database._sheet import Sheet
 from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, LayoutName, analyse, hash_image, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
 from texrs.io._files import as_path
@@ -443,7 +443,7 @@ class TextureDatabase:
         read = partial(self._read_entry, kept)
         results: dict[tuple[str, str], Synthesis] = {}
         failed: dict[tuple[str, str], str] = {}
-        sheet = Sheet(len(down), len(across), side)
+        sheet = ContactSheet(len(down), len(across), side)
         for j, b in enumerate(across, start=1):
             with answering(progress, "matrix", 0.0):
                 sheet.put(0, j, read(b).image)

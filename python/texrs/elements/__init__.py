@@ -11,12 +11,12 @@ from __future__ import annotations
 from texrs.elements._analyse import analyse
 from texrs.elements._arrangement import Arrangement
 from texrs.elements._corrections import correct
+from texrs.elements._drawn_stages import draw
 from texrs.elements._elements import FORMAT, ElementAnalysis, hash_image, load
 from texrs.elements._instances import Instance
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch
 from texrs.elements._page import to_html
-from texrs.elements._pictures import draw
 
 __all__ = [
     "FORMAT",

@@ -11,9 +11,9 @@ import imageio.v3 as iio
 from texrs._checks import as_instance
 from texrs._version import __version__
 from texrs.elements._drawing import Picture, draw_plain
+from texrs.elements._drawn_stages import draw
 from texrs.elements._elements import ElementAnalysis
 from texrs.elements._layout import Layout
-from texrs.elements._pictures import draw
 from texrs.elements._proposal import ADVICE, DOUBTFUL
 
 __all__ = ["to_html"]

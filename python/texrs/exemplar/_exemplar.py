@@ -39,9 +39,9 @@ from texrs.exemplar.analysis import (
     count_levels,
     measure_repeat,
 )
-from texrs.exemplar.instances import Instances, as_instances, find_instances
 from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
+from texrs.exemplar.separate_elements import Instances, as_instances, find_instances
 from texrs.exemplar.stitching import guess_instances, make_stitcher
 from texrs.exemplar.symmetry import SUSPECT, Flip, find_mirrors
 from texrs.io import _origins

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texrs._typing import Floats
 from texrs.exemplar.adjacency import Adjacency, measure_adjacency
 from texrs.exemplar.atlas import pack, resize
-from texrs.exemplar.instances import Instances, find_instances
+from texrs.exemplar.separate_elements import Instances, find_instances
 from texrs.exemplar.sheet import FINE, FLAT, MOST, OPEN, Copies, measure_seen, round_frames
 
 __all__ = ["Frontal"]

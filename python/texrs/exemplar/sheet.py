@@ -22,7 +22,7 @@ from texrs._engine.stitcher import Stitcher
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar.adjacency import Adjacency, measure_adjacency
 from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure, pack, resize
-from texrs.exemplar.instances import Instances, find_instances, label_components
+from texrs.exemplar.separate_elements import Instances, find_instances, label_components
 from texrs.exemplar.stitching import make_stitcher
 from texrs.kernels.gather import gather
 from texrs.scale_maps._kinds import AREAS, Kind, find_kind

@@ -9,8 +9,8 @@ import numpy as np
 from texrs._engine.stitcher import Stitcher
 from texrs._typing import Floats
 from texrs.exemplar.adjacency import Adjacency, measure_adjacency
-from texrs.exemplar.instances import Instances
 from texrs.exemplar.segmentation import Segmentation
+from texrs.exemplar.separate_elements import Instances
 
 __all__ = ["guess_instances", "make_stitcher"]
 

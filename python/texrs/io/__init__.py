@@ -68,20 +68,20 @@ from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import (
-    _chunks,
+    _exr_layers,
     _files,
     _image_io,
-    _layers,
     _npy,
     _origins,
     _pillow,
+    _png_chunks,
     _raw,
     _series,
     _slabs,
-    _stores,
     _tiff,
     _volumes,
     _vtk,
+    _zarr,
 )
 from texrs.io._annotation import read_metadata, write_metadata
 from texrs.io._files import atomic, find_suffix
@@ -89,8 +89,8 @@ from texrs.io._formats import FORMATS, READ_IMAGES, STORE, VOLUMES, as_spacing, 
 from texrs.io._grids import READERS, read_numpy, read_spacing, read_unit
 from texrs.io._notes import Metadata
 from texrs.io._npy import Header, read_arrays, read_headers
-from texrs.io._stores import is_store
 from texrs.io._vectors import read_vectors
+from texrs.io._zarr import is_store
 
 __all__ = [
     "Header",
@@ -167,11 +167,11 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     if kind in ("npy", "npz"):
         return read_numpy(name, kind, limit, 2)
     if kind == "zarr":
-        return _stores.read_store(name, limit, 2)
+        return _zarr.read_store(name, limit, 2)
     if kind in VOLUMES:
         raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
     if kind == "exr":
-        return _origins.mark(_layers.read_image(name, limit), name, False)
+        return _origins.mark(_exr_layers.read_image(name, limit), name, False)
     file = _files.load(name, limit)
     if kind in _pillow.DECODED:
         array = _pillow.read(name, kind, file, limit)
@@ -515,7 +515,7 @@ def _write(
         spacing = read_spacing(like)
     steps = as_spacing(spacing, suffix)
     if suffix == STORE:
-        _stores.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
+        _zarr.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
         return
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         if array.dtype == np.bool_ and suffix not in (".npy", ".npz"):
@@ -546,11 +546,11 @@ def _write(
                 header = _find_header(like, "nii", "nii.gz")
                 _volumes.write_nifti(temporary, flat, steps, header, compressed=suffix == ".nii.gz")
             case ".exr":
-                _layers.write_image(temporary, flat)
+                _exr_layers.write_image(temporary, flat)
             case ".png" | ".hdr":
                 file = _image_io.encode(target, flat, suffix[1:])
                 described = suffix == ".png" and description is not None
-                temporary.write_bytes(_chunks.describe_png(file, description or "") if described else file)
+                temporary.write_bytes(_png_chunks.describe_png(file, description or "") if described else file)
             case _:
                 temporary.write_bytes(_pillow.encode(target, flat, suffix))
 

@@ -16,10 +16,10 @@ from pathlib import Path
 from texrs._checks import as_instance
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
-from texrs.io import _chunks, _files, _layers, _pillow, _texts, _tiff
+from texrs.io import _exr_layers, _files, _pillow, _png_chunks, _texts, _tiff
 from texrs.io._formats import detect_kind
 from texrs.io._notes import Metadata
-from texrs.io._stores import is_store
+from texrs.io._zarr import is_store
 
 DIGEST = re.compile(r'"content": "[0-9a-f]{64}"')
 """The part of a record that contains the digest of the rest of its file."""
@@ -29,20 +29,20 @@ MOST_JPEG = 65_533
 
 _READERS: dict[str, Callable[[Path], dict[str, object]]] = {
     "tiff": _tiff.read_notes,
-    "exr": _layers.read_notes,
+    "exr": _exr_layers.read_notes,
     "npz": _texts.read_npz,
     "html": _texts.read_html,
     "json": _texts.read_json,
     **{kind: partial(_pillow.read_notes, kind=kind) for kind in ("png", *_pillow.DECODED)},
 }
 _WRITERS: dict[str, Callable[[Path, Metadata], None]] = {
-    "png": _chunks.write_png,
-    "jpeg": lambda path, notes: _chunks.write_jpeg(path, notes, _read_record(path, "jpeg")),
-    "gif": lambda path, notes: _chunks.write_gif(path, notes, _read_record(path, "gif")),
+    "png": _png_chunks.write_png,
+    "jpeg": lambda path, notes: _png_chunks.write_jpeg(path, notes, _read_record(path, "jpeg")),
+    "gif": lambda path, notes: _png_chunks.write_gif(path, notes, _read_record(path, "gif")),
     "webp": partial(_pillow.write_notes, kind="webp"),
     "bmp": partial(_pillow.write_notes, kind="bmp"),
     "tiff": _tiff.write_notes,
-    "exr": _layers.write_notes,
+    "exr": _exr_layers.write_notes,
     "npz": _texts.write_npz,
     "html": _texts.write_html,
     "json": _texts.write_json,
@@ -174,19 +174,19 @@ def _fill_in(path: Path, made: str) -> str:
 def _read_record(path: Path, kind: str) -> bytes:
     """Return the bytes of the record in a file; empty if there is none."""
     with suppress(Exception):
-        return _chunks.encode_record(kind, str(_READERS[kind](path).get("made") or ""))
+        return _png_chunks.encode_record(kind, str(_READERS[kind](path).get("made") or ""))
     return b""
 
 
 def _replace_record(path: Path, kind: str, former: str, made: str) -> None:
     """Write a record over one of the same length."""
-    record = _chunks.encode_record(kind, made)
+    record = _png_chunks.encode_record(kind, made)
     with path.open("r+b") as file:
         with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
-            file.seek(data.find(_chunks.encode_record(kind, former)))
+            file.seek(data.find(_png_chunks.encode_record(kind, former)))
         file.write(record)
         if kind == "png":
-            file.write(zlib.crc32(b"iTXt" + _chunks.KEYWORD + record).to_bytes(4, "big"))
+            file.write(zlib.crc32(b"iTXt" + _png_chunks.KEYWORD + record).to_bytes(4, "big"))
 
 
 def needs_sidecar(path: Path) -> bool:

@@ -12,7 +12,7 @@ from texrs._checks import as_float, as_tuple, check_memory
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _files, _npy, _raw, _series, _stores, _tiff, _volumes, _vtk
+from texrs.io import _files, _npy, _raw, _series, _tiff, _volumes, _vtk, _zarr
 
 MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "png"),
@@ -107,7 +107,7 @@ READ = tuple(dict.fromkeys((*READ_IMAGES, *READ_VOLUMES)))
 
 def detect_kind(path: Path) -> str:
     """Return the format of a file by its content."""
-    if _stores.is_store(path):
+    if _zarr.is_store(path):
         return "zarr"
     if _series.is_series(path, READ_IMAGES):
         return "slices"

@@ -11,7 +11,7 @@ from typing import cast
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
-from texrs.io import _files, _npy, _raw, _series, _stores, _tiff, _volumes, _vtk
+from texrs.io import _files, _npy, _raw, _series, _tiff, _volumes, _vtk, _zarr
 from texrs.io._formats import READ_IMAGES, VOLUMES, detect_kind
 
 __all__ = ["READERS", "VECTORS", "holds_volume", "read_numpy", "read_spacing", "read_unit"]
@@ -52,7 +52,7 @@ READERS: dict[str, Reader] = {
     "nrrd": _volumes.read_nrrd,
     "nii": _volumes.read_nifti,
     "nii.gz": _volumes.read_nifti,
-    "zarr": lambda name, limit: _stores.read_store(name, limit, 3),
+    "zarr": lambda name, limit: _zarr.read_store(name, limit, 3),
     "raw": lambda name, limit: cast(_raw.Raw, _raw.parse_raw(name)).read(limit),
 }
 """Readers of volumes."""
@@ -60,7 +60,7 @@ VECTORS: dict[str, Reader] = READERS | {
     "npy": _npy.read_npy,
     "npz": _npy.read_npz,
     "vti": partial(_vtk.read_vti, vectors=True),
-    "zarr": lambda name, limit: _stores.read_store(name, limit, None),
+    "zarr": lambda name, limit: _zarr.read_store(name, limit, None),
 }
 """Readers of arrays that may have more axes."""
 SPACINGS: dict[str, Callable[[Path], Sequence[float] | None]] = {
@@ -68,7 +68,7 @@ SPACINGS: dict[str, Callable[[Path], Sequence[float] | None]] = {
     "nrrd": _volumes.read_nrrd_spacing,
     "nii": _volumes.read_nifti_spacing,
     "nii.gz": _volumes.read_nifti_spacing,
-    "zarr": _stores.read_store_spacing,
+    "zarr": _zarr.read_store_spacing,
     "tiff": _tiff.read_spacing,
     "slices": lambda name: (
         _tiff.read_spacing(first) if detect_kind(first := _series.list_slices(name, READ_IMAGES)[0]) == "tiff" else None
@@ -89,7 +89,7 @@ def holds_volume(path: PathLike) -> bool:
     if kind == "tiff":
         return _tiff.count_planes(name) > 1
     if kind == "zarr":
-        return _stores.count_axes(name) > 2
+        return _zarr.count_axes(name) > 2
     if kind != "npy":
         return False
     shape = _npy.read_header(name).shape

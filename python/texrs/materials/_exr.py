@@ -31,8 +31,8 @@ from texrs._notices import assume, ignore
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io import read_metadata
+from texrs.io._exr_layers import read_layers, write_layers
 from texrs.io._files import as_path
-from texrs.io._layers import read_layers, write_layers
 from texrs.materials._files import report_colours, shorten, show_names
 from texrs.materials._map import Map
 from texrs.materials._roles import Role, as_role, guess_role

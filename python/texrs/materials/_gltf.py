@@ -25,7 +25,7 @@ from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path
 from texrs.io._image_io import encode
-from texrs.materials._light import find_map
+from texrs.materials._lit_maps import find_map
 from texrs.materials._map import Map
 from texrs.materials._meshes import Mesh, make_plane, make_sphere
 from texrs.materials._packing import make_plain

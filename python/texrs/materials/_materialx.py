@@ -18,7 +18,7 @@ from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path
 from texrs.materials._converting import convert
 from texrs.materials._files import choose_suffix, write_maps
-from texrs.materials._light import find_map
+from texrs.materials._lit_maps import find_map
 from texrs.materials._map import Map
 from texrs.materials._packing import make_plain
 from texrs.materials._roles import Role, guess_role

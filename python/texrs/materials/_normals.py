@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from texrs._notices import assume
 from texrs._typing import Array
-from texrs.materials._light import decode_normals, find_map
+from texrs.materials._lit_maps import decode_normals, find_map
 from texrs.materials._map import Map
 from texrs.materials._roles import Role, states_y
 from texrs.materials._surface import list_signed

@@ -11,7 +11,7 @@ from texrs._colours import to_light, to_pixels, to_share
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.materials._conventions import cut_name
-from texrs.materials._light import decode_normals, find_map
+from texrs.materials._lit_maps import decode_normals, find_map
 from texrs.materials._map import Map, take_channels
 from texrs.materials._roles import Role
 from texrs.materials._surface import METAL, ROUGH, list_signed

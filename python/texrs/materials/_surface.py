@@ -9,7 +9,7 @@ import numpy as np
 from texrs._arrays import to_unit
 from texrs._colours import to_light, to_share
 from texrs._typing import Floats
-from texrs.materials._light import decode_normals, find_map
+from texrs.materials._lit_maps import decode_normals, find_map
 from texrs.materials._map import Map
 from texrs.materials._roles import Role
 

@@ -21,7 +21,7 @@ from texrs.io import atomic
 from texrs.io._image_io import encode
 from texrs.materials import Map, Role
 from texrs.materials._gltf import make_pictures, write_shapes
-from texrs.materials._light import find_map
+from texrs.materials._lit_maps import find_map
 from texrs.materials._meshes import Mesh
 from texrs.materials._surface import find_opacity, take_colour
 from texrs.painting._meshes import find_tangents, shade

@@ -17,7 +17,7 @@ from texrs._light import Light
 from texrs._progress import ask
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
-from texrs.planes._step import find_step
+from texrs.planes._boundary_line import find_step
 
 __all__ = ["find_ground"]
 

@@ -97,7 +97,7 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
 
     def _repr_png_(self) -> bytes | None:
         """Show the map with its contours in a notebook."""
-        from texrs.scale_maps._pictures import picture
+        from texrs.scale_maps._false_colours import picture
 
         return as_png(picture(self)) if self.ndim == 2 and self.size and bool((self > 0).all()) else None
 

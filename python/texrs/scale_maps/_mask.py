@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_bool, as_choice, as_image, as_int, as_mask, exp_single, log_single
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
-from texrs.scale_maps._extend import extend
+from texrs.scale_maps._extrapolation import extend
 from texrs.scale_maps._kinds import AREAS, Kind, ScaleMap
 from texrs.scale_maps._maps import centre_logs
 from texrs.scale_maps._trend import Trend, as_trend, follow_kind, gradient

@@ -11,7 +11,7 @@ from texrs._arrays import as_choice, as_size, exp_single, log_single
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._angles import from_angles
-from texrs.scale_maps._extend import extend
+from texrs.scale_maps._extrapolation import extend
 from texrs.scale_maps._kinds import find_kind, keep_kind
 from texrs.scale_maps._maps import as_map
 

@@ -53,9 +53,9 @@ from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling._borders import SEEN
 from texrs.tiling._check import AXES, Tiling, check_result, check_tiling, find_tiled, report_tiling
-from texrs.tiling._extend import extend
+from texrs.tiling._enlarging import extend
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
-from texrs.tiling._light import is_uneven, name_image
+from texrs.tiling._lighting_choice import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
 from texrs.tiling._whole_elements import SMALLEST, Things, find_things
 

@@ -25,8 +25,7 @@ from texrs.volume._stretch import cubes
 from texrs.volume.compare import Comparison, compare
 from texrs.volume.integrity import Integrity, integrity
 from texrs.volume.labels import extract_surface, label_to_color
-from texrs.volume.pictures import oblique_slice, render_block, slices, turntable
-from texrs.volume.reuse import CellReuse, cell_reuse, coherence
+from texrs.volume.rendering import oblique_slice, render_block, slices, turntable
 from texrs.volume.statistics import (
     Classes,
     ComponentStatistics,
@@ -46,6 +45,7 @@ from texrs.volume.structure import (
     texture_normal,
 )
 from texrs.volume.transparent import render_volume
+from texrs.volume.usage import CellReuse, cell_reuse, coherence
 from texrs.volume.viewer import Viewer
 
 __all__ = [

@@ -19,7 +19,7 @@ from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
 from texrs.volume._values import check_field, guess_axes, turn_in_space
 from texrs.volume.integrity import Integrity, integrity
-from texrs.volume.reuse import CellReuse, cell_reuse
+from texrs.volume.usage import CellReuse, cell_reuse
 
 __all__ = ["Comparison", "compare"]
 

@@ -11,7 +11,7 @@ from texrs._checks import as_instance, as_int
 from texrs._show import brief
 from texrs._typing import Array, Floats
 from texrs.exemplar import Exemplar, as_exemplar
-from texrs.exemplar.instances import Instances, label_components
+from texrs.exemplar.separate_elements import Instances, label_components
 from texrs.source_map import SourceMap
 
 __all__ = ["Integrity", "integrity"]

@@ -19,7 +19,7 @@ from texrs._conversion import as_ndarray
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
-from texrs.volume.pictures import _MARGIN, _view, check_cube
+from texrs.volume.rendering import _MARGIN, _view, check_cube
 
 __all__ = ["Stop", "parse_transfer", "render_volume"]
 

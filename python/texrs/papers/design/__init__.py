@@ -55,7 +55,7 @@ Departures from the paper, with their reasons:
 - An example in courses that do not repeat, such as a wall of stones of all lengths, is levelled. Its courses are laid
   on top of each other, as tall as the texture, several times, with courses of equal height exchanged. Patches move
   freely along the courses and keep their place across them, so that all joints continue
-  (`texrs.papers.design.sheets`). The report's "courses" describes the courses that were found.
+  (`texrs.papers.design.course_sheets`). The report's "courses" describes the courses that were found.
 
 - A tileable texture (section 3.5) is stitched on the torus from the start. Patches are chosen to fit both sides of the
   border. The paper instead folds a finished image whose patches were not chosen to fit there.

@@ -129,7 +129,7 @@ def cut_out(element: Element, moves: Moves, shape: tuple[int, int], seed: int, w
 
 
 @dataclass(slots=True, eq=False)
-class Sheet:
+class ScatteredSheet:
     """The texture in progress."""
 
     coordinates: Floats
@@ -220,7 +220,7 @@ def scatter(
     frames = ground.jacobian_array()
     table = [np.eye(2)] * (int(ground.label.max()) + 1) if frames is None else list(frames.astype(np.float64))
     size = ground.shape
-    sheet = Sheet(
+    sheet = ScatteredSheet(
         ground.coordinates.copy(), ground.exemplar.copy(), ground.label.copy(), np.zeros(size, np.int32), table, wrap
     )
     for which in range(len(plans) - 1, 0, -1):
@@ -228,7 +228,7 @@ def scatter(
     return SourceMap(sheet.coordinates, sheet.exemplar, sheet.label, np.array(sheet.frames, np.float32), ground.shapes)
 
 
-def scatter_layer(sheet: Sheet, plan: Plan, which: int, density: NDArray[np.float64], seed: int) -> None:
+def scatter_layer(sheet: ScatteredSheet, plan: Plan, which: int, density: NDArray[np.float64], seed: int) -> None:
     """Scatter the elements of one exemplar below those that are there, until they reach their density."""
     shape = plan.guide.shape[0], plan.guide.shape[1]
     due = float(np.mean(density)) * sheet.layer.size
@@ -282,7 +282,7 @@ class Room:
     """Cumulative sum, over the cells in order, of the lack around each cell."""
 
     @classmethod
-    def measure(cls, density: NDArray[np.float64], sheet: Sheet, extent: float, seed: tuple[int, int]) -> Room:
+    def measure(cls, density: NDArray[np.float64], sheet: ScatteredSheet, extent: float, seed: tuple[int, int]) -> Room:
         """Measure where elements are needed; without a map they form loose clusters, as plants do."""
         side, size = max(2, round(CELLS * extent)), sheet.layer.shape
         if density.ndim == 0:

@@ -16,10 +16,10 @@ from texrs.exemplar.symmetry import flip_frame
 from texrs.kernels.gather import gather
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
+from texrs.papers.design.course_sheets import lay_sheets, measure_stones
 from texrs.papers.design.mixing import Layer, mix
 from texrs.papers.design.plan import Plan
 from texrs.papers.design.scattering import scatter
-from texrs.papers.design.sheets import lay_sheets, measure_stones
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 

@@ -33,8 +33,8 @@ from texrs.fields import Field
 from texrs.growth import patch_side
 from texrs.growth.engine import Places
 from texrs.growth.start import bends_with, weights_of
-from texrs.papers.solid.boxes import Box, intersect, join
 from texrs.papers.solid.ground import Ground
+from texrs.papers.solid.packed_boxes import Box, intersect, join
 
 __all__ = ["WORK", "Layers", "Seen"]
 

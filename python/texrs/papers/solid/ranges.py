@@ -10,7 +10,7 @@ import numpy as np
 from texrs._arrays import as_size
 from texrs._engine.pyramid import Region
 from texrs.errors import InvalidInput
-from texrs.papers.solid.limits import LARGER
+from texrs.papers.solid.memory_check import LARGER
 
 __all__ = ["MAX_COORDINATE", "as_origin", "as_region"]
 

@@ -19,7 +19,7 @@ from texrs.fields import as_field as make_field
 from texrs.fields._spaced import as_distances
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.materials import Material
-from texrs.papers.solid.limits import LARGER, check_region
+from texrs.papers.solid.memory_check import LARGER, check_region
 from texrs.papers.solid.plans import Choice, check_plan
 from texrs.papers.solid.settings import Quality, as_quality
 

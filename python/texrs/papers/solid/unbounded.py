@@ -28,7 +28,7 @@ from texrs.kernels.gather import gather
 from texrs.materials import Material
 from texrs.materials._material import apply_materials
 from texrs.papers.solid.layers import WORK, Layers
-from texrs.papers.solid.limits import LARGER, check_region, estimate_bytes
+from texrs.papers.solid.memory_check import LARGER, check_region, estimate_bytes
 from texrs.papers.solid.parts import Endless
 from texrs.papers.solid.ranges import MAX_COORDINATE, as_origin, as_region
 from texrs.papers.solid.request import as_field, as_interpolation

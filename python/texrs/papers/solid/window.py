@@ -14,7 +14,7 @@ from texrs.errors import InvalidInput
 from texrs.papers.solid.ranges import MAX_COORDINATE
 from texrs.papers.solid.unbounded import Texture
 from texrs.volume._values import as_direction
-from texrs.volume.pictures import as_steps
+from texrs.volume.rendering import as_steps
 
 __all__ = ["PlaneTexture", "SolidTexture"]
 

@@ -30,7 +30,7 @@ from texrs._typing import Bools, Progress
 from texrs.growth import Windows
 from texrs.growth.constraints import NOTHING
 from texrs.growth.engine import Places
-from texrs.papers.solid.boxes import intersect
+from texrs.papers.solid.packed_boxes import intersect
 
 __all__ = ["World", "blocks_reach", "window_reach"]
 

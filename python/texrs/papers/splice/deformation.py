@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from texrs._typing import Bools
 from texrs.elements import ElementAnalysis, Layout
 from texrs.papers.splice.energy import minimise_energy
-from texrs.papers.splice.extension import Extension
 from texrs.papers.splice.interpolation import interpolate
 from texrs.papers.splice.matching import Match
+from texrs.papers.splice.texture_extension import Extension
 
 __all__ = ["Deformation", "deform", "deform_by_energy", "find_rigid_shifts", "mark_removed"]
 

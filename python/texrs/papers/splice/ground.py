@@ -25,9 +25,9 @@ from texrs.growth.start import OVERLAP, weights_of
 from texrs.kernels.seam import cut
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import Foreground, split_foreground
-from texrs.papers.splice.light import Light, measure_light
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft, fill_with_patches
+from texrs.papers.splice.shading import Light, measure_light
 from texrs.point_sets import spacing
 
 __all__ = ["ENOUGH", "Scene", "cut_in", "lay_ground", "survey"]

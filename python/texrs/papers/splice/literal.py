@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
-from texrs.papers.splice.extension import extend
 from texrs.papers.splice.matching import Match, find_turns
 from texrs.papers.splice.refine import Draft
+from texrs.papers.splice.texture_extension import extend
 from texrs.point_sets import nearest_distances
 
 __all__ = ["fill_literally", "match_literally"]

@@ -22,9 +22,9 @@ from texrs.papers.splice.adjustment import separate_targets
 from texrs.papers.splice.edit import Step
 from texrs.papers.splice.foreground import Foreground, split_foreground
 from texrs.papers.splice.ground import Scene, cut_in, survey
-from texrs.papers.splice.light import Light
 from texrs.papers.splice.matching import Edit, Match, edit_layout
 from texrs.papers.splice.refine import Draft, fill_with_patches
+from texrs.papers.splice.shading import Light
 from texrs.point_sets import spacing
 
 __all__ = ["Rearrangement", "rearrange"]

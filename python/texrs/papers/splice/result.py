@@ -13,11 +13,11 @@ from texrs.elements import ElementAnalysis, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.energy import choose_coarseness
 from texrs.papers.splice.interpolation import STEP
-from texrs.papers.splice.light import Light
 from texrs.papers.splice.matching import Match, list_element_points
-from texrs.papers.splice.pictures import draw_stages
 from texrs.papers.splice.rearrangement import Rearrangement
 from texrs.papers.splice.refine import Draft
+from texrs.papers.splice.shading import Light
+from texrs.papers.splice.stage_drawings import draw_stages
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 

@@ -32,15 +32,15 @@ from texrs.elements import ElementAnalysis
 from texrs.elements._instances import find_sure_cells
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.symmetry import find_mirrors
+from texrs.papers.splice.cells.cell_drawings import draw_cell_stages
 from texrs.papers.splice.cells.charts import Charts, draw_charts
 from texrs.papers.splice.cells.choice import list_usable, shortlist
 from texrs.papers.splice.cells.joining import Joined, join
-from texrs.papers.splice.cells.pictures import draw_cell_stages
 from texrs.papers.splice.cells.refinement import refine_charts
 from texrs.papers.splice.cells.strength import interpolate_layouts, take_own_cells
 from texrs.papers.splice.cells.tessellation import Tessellation, take_cells, take_points
-from texrs.papers.splice.extension import lay_out
 from texrs.papers.splice.result import list_place, report_ways
+from texrs.papers.splice.texture_extension import lay_out
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 

@@ -35,7 +35,7 @@ from texrs.exemplar.cells import Cells
 from texrs.growth.start import OVERLAP, weights_of
 from texrs.papers.splice.nets.graph import describe_places, join_knots
 from texrs.papers.splice.nets.knots import Laid, lay_knots
-from texrs.papers.splice.nets.pictures import draw_net_stages
+from texrs.papers.splice.nets.net_drawings import draw_net_stages
 from texrs.papers.splice.nets.targets import Targets, interpolate_layouts, take_own_points, take_points
 from texrs.papers.splice.result import list_place, report_ways
 from texrs.point_sets import spacing

@@ -11,8 +11,8 @@ from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.papers.splice.cells.tessellation import take_cells
-from texrs.papers.splice.extension import lay_out
 from texrs.papers.splice.placement import continue_points
+from texrs.papers.splice.texture_extension import lay_out
 from texrs.point_sets import match_points, nearest_distances, spacing
 
 __all__ = ["Targets", "interpolate_layouts", "take_own_points", "take_points"]

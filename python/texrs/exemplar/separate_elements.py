@@ -91,7 +91,7 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     Examples
     --------
     >>> import texrs
-    >>> from texrs.exemplar.instances import find_instances
+    >>> from texrs.exemplar.separate_elements import find_instances
     >>> stones = texrs.Exemplar(texrs.samples.particles((48, 48, 48)).image, axes=3)
     >>> find_instances(stones.colours, stones.repeat).count > 10
     True

@@ -11,7 +11,7 @@ from texrs.exemplar.cells import Cells
 from texrs.papers.splice.cells.charts import Charts
 from texrs.papers.splice.cells.joining import Joined
 from texrs.papers.splice.cells.tessellation import Tessellation
-from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, draw_outlines, mark_points, to_picture
+from texrs.papers.splice.stage_drawings import BLUE, GREEN, RED, Stages, draw_outlines, mark_points, to_picture
 
 __all__ = ["draw_cell_stages"]
 

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, as_rgb, guidance
 from texrs._typing import Array
 
-__all__ = ["Sheet"]
+__all__ = ["ContactSheet"]
 
 GAP = 4
 """Pixels between the pictures of a sheet."""
 
 
-class Sheet:
+class ContactSheet:
     """Small pictures in rows and columns, with those of the textures along the left and the upper edge."""
 
     def __init__(self, rows: int, columns: int, side: int) -> None:

@@ -8,7 +8,16 @@ from numpy.typing import NDArray
 from texrs._typing import Array
 from texrs.elements import ElementAnalysis
 from texrs.papers.splice.nets.graph import join_knots
-from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, draw_lines, draw_outlines, mark_points, to_picture
+from texrs.papers.splice.stage_drawings import (
+    BLUE,
+    GREEN,
+    RED,
+    Stages,
+    draw_lines,
+    draw_outlines,
+    mark_points,
+    to_picture,
+)
 
 __all__ = ["draw_net_stages"]
 
