@@ -131,8 +131,8 @@ def extend(
         name: as_int(value, name, 0, MOST)
         for name, value in (("top", top), ("bottom", bottom), ("left", left), ("right", right))
     }
-    sides = add_sizes((rows, columns), added) if size is None else as_size(size, "size")
-    missing = [n - m for n, m in zip(sides, add_sizes((rows, columns), added), strict=True)]
+    sides = _add_sizes((rows, columns), added) if size is None else as_size(size, "size")
+    missing = [n - m for n, m in zip(sides, _add_sizes((rows, columns), added), strict=True)]
     if min(missing) < 0 or max(missing) > 2 * MOST:
         raise InvalidInput(
             f"size: needs {rows, columns} pixels, and what the sides add, at least, and at most {2 * MOST} more; got {sides}"
@@ -162,7 +162,7 @@ def extend(
     for axis, before, after in ((1, "left", "right"), (0, "top", "bottom")):
         added[before] += missing[axis] // 2
         added[after] += missing[axis] - missing[axis] // 2
-        room = (MOST, MOST) if planes[0][0] is None else measure_room(planes[0][0], added, axis)
+        room = (MOST, MOST) if planes[0][0] is None else _measure_room(planes[0][0], added, axis)
         if alone and missing[axis] and sum(room) >= added[before] + added[after]:
             over = max(0, added[before] - room[0]) - max(0, added[after] - room[1])
             added[before], added[after] = added[before] - over, added[after] + over
@@ -208,12 +208,12 @@ def extend(
     return Synthesis(result, source, stages, report)
 
 
-def add_sizes(shape: tuple[int, int], added: Mapping[str, int]) -> tuple[int, int]:
+def _add_sizes(shape: tuple[int, int], added: Mapping[str, int]) -> tuple[int, int]:
     """Return the sides of an image with the added pixels."""
     return shape[0] + added["top"] + added["bottom"], shape[1] + added["left"] + added["right"]
 
 
-def measure_room(plane: Plane, added: Mapping[str, int], axis: int) -> tuple[int, int]:
+def _measure_room(plane: Plane, added: Mapping[str, int], axis: int) -> tuple[int, int]:
     """Return the pixels that can be added on both ends of an axis, up to the horizon and at most `MOST`."""
     low = -np.array([added["top"], added["left"]])
     high = np.array(plane.shape) - 1 + np.array([added["bottom"], added["right"]])

@@ -165,23 +165,23 @@ def evaluate(
     if known.axes != 2 or source.shapes != (known.shape,):
         raise InvalidInput(f"source: needs one into a picture of {known.shape}, got one into {source.shapes}")
     cyclic = as_wrap(wrap)
-    traits = known.cached(("traits", elements.key), lambda: measure_traits(known, elements))
-    seams = [find_seam(source, axis, cyclic[axis]) for axis in range(2)]
+    traits = known.cached(("traits", elements.key), lambda: _measure_traits(known, elements))
+    seams = [_find_seam(source, axis, cyclic[axis]) for axis in range(2)]
     seam_blur = 0.0
     if image is not None:
         pixels = guidance(as_image(image, "image"))
         if pixels.shape[:2] != source.shape:
             raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
-        seam_blur = measure_blur(traits, source, seams, pixels)
-    repetition, coverage = measure_use(traits, source)
+        seam_blur = _measure_blur(traits, source, seams, pixels)
+    repetition, coverage = _measure_use(traits, source)
     area = source.shape[0] * source.shape[1]
     return Quality(
-        measure_tears(traits, seams, area), measure_breaks(traits, seams, area), seam_blur, repetition, coverage
+        _measure_tears(traits, seams, area), _measure_breaks(traits, seams, area), seam_blur, repetition, coverage
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Traits:
+class _Traits:
     """Usual values of an exemplar.
 
     Attributes
@@ -223,7 +223,7 @@ class Traits:
         return self.colours.nbytes + self.depth.nbytes + self.slopes.nbytes + self.salience.nbytes
 
 
-def measure_traits(exemplar: Exemplar, elements: ElementOptions) -> Traits:
+def _measure_traits(exemplar: Exemplar, elements: ElementOptions) -> _Traits:
     """Measure the usual values of an exemplar."""
     from scipy.ndimage import gaussian_filter
 
@@ -236,14 +236,14 @@ def measure_traits(exemplar: Exemplar, elements: ElementOptions) -> Traits:
     slopes = np.concatenate(np.gradient(soft, axis=(0, 1)), axis=-1).astype(np.float32)
     sizes = np.abs(slopes).reshape(*exemplar.shape, 2, -1).mean(axis=-1)
     own = SourceMap.identity(exemplar.shape)
-    pairs = [Seam(own, axis, *list_neighbours(exemplar.shape, axis)) for axis in range(2)]
+    pairs = [_Seam(own, axis, *_list_neighbours(exemplar.shape, axis)) for axis in range(2)]
     line = max(float(np.percentile(sizes, EDGE)), 1e-6)
-    broken, lines = (float(marks.mean()) for marks in find_breaks(slopes, line, pairs))
+    broken, lines = (float(marks.mean()) for marks in _find_breaks(slopes, line, pairs))
     step = float(np.percentile(steps, VISIBLE))
-    return Traits(colours, depth, float(outline), step, slopes, line, broken, lines, measure_salience(colours, depth))
+    return _Traits(colours, depth, float(outline), step, slopes, line, broken, lines, _measure_salience(colours, depth))
 
 
-def measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
+def _measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
     """Return how conspicuous each cell is.
 
     This is the deviation of its mean and contrast from the usual ones, in standard deviations.
@@ -263,7 +263,7 @@ def measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seam:
+class _Seam:
     """Pairs of neighbours along an axis that do not come from neighbouring places."""
 
     source: SourceMap
@@ -282,23 +282,23 @@ class Seam:
         return self.at, self.after
 
 
-def list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[np.intp], ...], ...]:
+def _list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[np.intp], ...], ...]:
     """Return the pixels of an image that have a neighbour along an axis, and these neighbours."""
     at = np.nonzero(np.ones([n - (a == axis) for a, n in enumerate(shape)], bool))
     return at, tuple(index + (a == axis) for a, index in enumerate(at))
 
 
-def find_seam(source: SourceMap, axis: int, wrap: bool) -> Seam:
+def _find_seam(source: SourceMap, axis: int, wrap: bool) -> _Seam:
     """Find the seams that cross an axis."""
     parted = ~source.is_coherent(axis, wrap=wrap)
     if not wrap:
         np.moveaxis(parted, axis, 0)[-1] = False
     at = np.nonzero(parted)
     after = tuple((index + (a == axis)) % n for a, (index, n) in enumerate(zip(at, source.shape, strict=True)))
-    return Seam(source, axis, at, after)
+    return _Seam(source, axis, at, after)
 
 
-def measure_tears(traits: Traits, seams: list[Seam], area: int) -> float:
+def _measure_tears(traits: _Traits, seams: list[_Seam], area: int) -> float:
     """Return the length of seams inside elements, divided by the expected outline length."""
     length = 0.0
     for seam in seams:
@@ -309,14 +309,14 @@ def measure_tears(traits: Traits, seams: list[Seam], area: int) -> float:
     return length / max(traits.outlines * area, 1.0)
 
 
-def measure_breaks(traits: Traits, seams: list[Seam], area: int) -> float:
+def _measure_breaks(traits: _Traits, seams: list[_Seam], area: int) -> float:
     """Return the share of lines that break off at seams, minus the usual share."""
-    found, _ = find_breaks(traits.slopes, traits.line, seams)
+    found, _ = _find_breaks(traits.slopes, traits.line, seams)
     excess = float(found.sum()) - traits.broken * len(found)
     return max(0.0, excess) / max(traits.lines * area, 1.0)
 
 
-def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, Bools]:
+def _find_breaks(slopes: Floats, line: float, seams: list[_Seam]) -> tuple[Bools, Bools]:
     """Return masks of the pairs with a broken crossing line, and of the pairs with any line.
 
     A crossing line is a strong gradient along the seam. Beyond the seam there must be a similar one, at most a pixel
@@ -327,10 +327,10 @@ def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, 
     for seam in seams:
         for at in seam.sides:
             # Use both axes, because a seam along a slanted outline goes in steps.
-            ends[at] |= np.abs(list_slopes(slopes, seam, at, seam.axis)[1]).mean(axis=-1) > line
+            ends[at] |= np.abs(_list_slopes(slopes, seam, at, seam.axis)[1]).mean(axis=-1) > line
     broken, lines = [], []
     for seam in seams:
-        first, second = (list_slopes(slopes, seam, at, 1 - seam.axis) for at in seam.sides)
+        first, second = (_list_slopes(slopes, seam, at, 1 - seam.axis) for at in seam.sides)
         off, crossed = np.zeros(len(seam.at[0]), bool), np.zeros(len(seam.at[0]), bool)
         for here, there in ((first, second), (second, first)):
             size = np.abs(here[1]).mean(axis=-1)
@@ -342,7 +342,7 @@ def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, 
     return np.concatenate(broken), np.concatenate(lines)
 
 
-def list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], along: int) -> list[Array]:
+def _list_slopes(slopes: Floats, seam: _Seam, at: tuple[NDArray[np.intp], ...], along: int) -> list[Array]:
     """Return the gradients along an output axis at the sources of pixels, and one pixel to each side."""
     source = seam.source
     frame = source.jacobian_array()
@@ -359,7 +359,7 @@ def list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], al
     return found
 
 
-def measure_blur(traits: Traits, source: SourceMap, seams: list[Seam], image: Floats) -> float:
+def _measure_blur(traits: _Traits, source: SourceMap, seams: list[_Seam], image: Floats) -> float:
     """Return the share of the detail of the sources that is missing next to seams."""
     from scipy.ndimage import binary_dilation, laplace
 
@@ -380,7 +380,7 @@ def measure_blur(traits: Traits, source: SourceMap, seams: list[Seam], image: Fl
     return float(np.clip(1 - shown / wanted, 0, 1)) if wanted > 0 else 0.0
 
 
-def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
+def _measure_use(traits: _Traits, source: SourceMap) -> tuple[float, float]:
     """Return the amount of exact repetition, and the share of the exemplar that is shown."""
     rows, columns = traits.salience.shape
     last = np.array(traits.colours.shape[:2]) - 1
@@ -388,7 +388,7 @@ def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
     cell = (row * columns + column).ravel()
     area = np.bincount(cell, minlength=rows * columns)
     # Rotated, scaled or mirrored copies do not count as equal.
-    key, ways = cell, number_frames(source)
+    key, ways = cell, _number_frames(source)
     if ways is not None:
         key = ways.ravel() * (rows * columns) + cell
     shown, number = np.unique(key, return_inverse=True)
@@ -401,7 +401,7 @@ def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
     return repetition, coverage
 
 
-def number_frames(source: SourceMap) -> NDArray[np.intp] | None:
+def _number_frames(source: SourceMap) -> NDArray[np.intp] | None:
     """Return a number for each pixel, equal for pixels with about the same rotation and scale."""
     frame = source.jacobian_array()
     if frame is None:

@@ -140,20 +140,20 @@ def rectify(
         seen = see(pixels, PlaneView.of(view))
     watch("plane", 1.0)
     plane = seen.plane
-    fine = choose_resolution(plane, seen.ground, fine)
-    sheet = FlatSheet.of(plane, seen.ground, fine)
+    fine = _choose_resolution(plane, seen.ground, fine)
+    sheet = _FlatSheet.of(plane, seen.ground, fine)
     if seen.found:
-        plane = level(plane, sheet.source.render(pixels, interpolation="linear"), sheet.sharp)
-        sheet = FlatSheet.of(plane, seen.ground, fine)
+        plane = _level(plane, sheet.source.render(pixels, interpolation="linear"), sheet.sharp)
+        sheet = _FlatSheet.of(plane, seen.ground, fine)
     start, sides = sheet.find_rectangle()
     if min(sides) < SMALLEST:
         raise InvalidInput(
             f"image: of the plane {sides[0]} x {sides[1]} pixels are sharp at this resolution, {SMALLEST} x {SMALLEST} are "
             "needed; give a smaller resolution, or another plane"
         )
-    known, _ = lay(plane, start, sides, fine)
+    known, _ = _lay(plane, start, sides, fine)
     texture = known.render(pixels, interpolation=interpolation, antialias=True)
-    laid, grown = grow(texture, asked, cyclic, number, watch)
+    laid, grown = _grow(texture, asked, cyclic, number, watch)
     # Seams of a grown texture are corrected like those of any other.
     rest = {} if laid.finish is None else {"screening": laid.finish.screening, "across": laid.finish.across}
     source = laid.compose(known).with_finish(cyclic, interpolation=interpolation, antialias=True, **rest)
@@ -180,7 +180,7 @@ def rectify(
     return Synthesis(shown[..., 0] if squeeze and shown.ndim == 3 else shown, source, stages, report)
 
 
-def list_points(ground: Bools) -> NDArray[np.intp]:
+def _list_points(ground: Bools) -> NDArray[np.intp]:
     """Return the outermost ground pixels of an image and a sample of the others: enough to measure a plane."""
     step = max(1, min(ground.shape) // 256)
     thin = np.zeros_like(ground)
@@ -188,16 +188,16 @@ def list_points(ground: Bools) -> NDArray[np.intp]:
     return np.argwhere(ground & thin)
 
 
-def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float:
+def _choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float:
     """Return the requested resolution, or the mean resolution of the visible plane."""
-    width = plane.width(list_points(ground))
+    width = plane.width(_list_points(ground))
     if np.count_nonzero(width > LEAST) < SMALLEST:
         raise InvalidInput(
             "ground: too little of the plane lies before its horizon; give a mask of it, or another plane"
         )
     resolution = asked or float(np.median(width[width > LEAST]))
     while True:
-        low, high = measure_extent(plane, ground, resolution)
+        low, high = _measure_extent(plane, ground, resolution)
         most = (LARGER * ground.size / max(float(np.prod(high - low)), 1e-9)) ** 0.5
         if resolution <= most:
             return resolution
@@ -207,9 +207,9 @@ def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float
         resolution = 0.9 * most
 
 
-def measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the minimum and maximum (row, column) of the part of a plane that may be sharp."""
-    grid = list_points(ground)
+    grid = _list_points(ground)
     near = grid[plane.width(grid) > max(LEAST, SHARP * resolution)]
     if len(near) < SMALLEST:
         raise InvalidInput(f"resolution: at {resolution:.3g} hardly anything of this plane is sharp; give less")
@@ -218,7 +218,7 @@ def measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDAr
 
 
 @dataclass(frozen=True, slots=True)
-class FlatSheet:
+class _FlatSheet:
     """The part of a plane that may be sharp, flattened at a distance of several texture pixels."""
 
     source: SourceMap
@@ -230,38 +230,38 @@ class FlatSheet:
     """Resolution of the texture."""
 
     @classmethod
-    def of(cls, plane: Plane, ground: Bools, resolution: float) -> FlatSheet:
+    def of(cls, plane: Plane, ground: Bools, resolution: float) -> _FlatSheet:
         """Flatten a plane, and find where it is sharp enough for a resolution."""
         from scipy.ndimage import minimum_filter
 
-        low, high = measure_extent(plane, ground, resolution)
+        low, high = _measure_extent(plane, ground, resolution)
         sides = (high - low) * resolution
         step = max(1, ceil(float(sides.max()) / SHOWN))
-        source, inside = lay(plane, low, (int(sides[0] / step) + 1, int(sides[1] / step) + 1), resolution / step)
+        source, inside = _lay(plane, low, (int(sides[0] / step) + 1, int(sides[1] / step) + 1), resolution / step)
         # The pixels between the samples must be ground too.
         solid = ground if step == 1 or ground.all() else minimum_filter(ground, 2 * step + 1)
         nearest = np.rint(source.coordinates).astype(np.intp)
         inside &= solid[nearest[..., 0], nearest[..., 1]]
         # The smallest singular value: the minimum number of photograph pixels that a pixel covers.
         frames = source.jacobians()
-        squares, area = np.square(frames).sum(axis=(-2, -1)), cross(frames[..., 0, :], frames[..., 1, :])
+        squares, area = np.square(frames).sum(axis=(-2, -1)), _cross(frames[..., 0, :], frames[..., 1, :])
         fewest = np.sqrt(np.maximum(squares - np.sqrt(np.maximum(squares**2 - 4 * area**2, 0)), 0) / 2)
         return cls(source, np.asarray(inside & (fewest >= SHARP * step)), low, step, resolution)
 
     def find_rectangle(self) -> tuple[NDArray[np.float64], tuple[int, int]]:
         """Return the first point of approximately the largest sharp rectangle, and its sides in texture pixels."""
-        top, bottom, left, right = find_rectangle(self.sharp)
+        top, bottom, left, right = _find_rectangle(self.sharp)
         start = self.low + np.array([top, left]) * (self.step / self.resolution)
         rows, columns = (max(0, (n - 1) * self.step + 1) for n in (bottom - top, right - left))
         return start, (rows, columns)
 
 
-def cross(one: Array, other: Array) -> Array:
+def _cross(one: Array, other: Array) -> Array:
     """Return the area between vectors (..., 2)."""
     return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
 
 
-def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resolution: float) -> tuple[SourceMap, Bools]:
+def _lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resolution: float) -> tuple[SourceMap, Bools]:
     """Return the map of a rectangle of a plane, and its position within the photograph."""
     most = np.array(plane.shape) - 1
     flat = low + np.moveaxis(np.indices(sides), 0, -1) / resolution
@@ -272,7 +272,7 @@ def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resoluti
     return SourceMap.from_coordinates(at.astype(np.float32), plane.shape, jacobian=frames.astype(np.float32)), inside
 
 
-def level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
+def _level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
     """Rotate a plane so that courses of its flat texture, if there are any, are along an axis."""
     from scipy.ndimage import binary_erosion, gaussian_filter
 
@@ -289,7 +289,7 @@ def level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
     return replace(plane, rotation=float(f"{plane.rotation - np.degrees(np.angle(fourth)) / 4:.5g}"))
 
 
-def find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
+def _find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
     """Return the rows and columns of approximately the largest rectangle of full cells in a mask."""
     step = max(1, -(-max(mask.shape) // CELLS))
     rows, columns = (n // step for n in mask.shape)
@@ -310,12 +310,12 @@ def find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
     return top * step, bottom * step, left * step, right * step
 
 
-def cut(source: SourceMap, box: tuple[slice, slice]) -> SourceMap:
+def _cut(source: SourceMap, box: tuple[slice, slice]) -> SourceMap:
     """Return a rectangle of a map."""
     return SourceMap.from_coordinates(source.coordinates[box], source.shapes[0], jacobian=source.jacobians()[box])
 
 
-def grow(
+def _grow(
     flat: Array, size: tuple[int, ...] | None, wrap: tuple[bool, ...], seed: int, watch: Progress
 ) -> tuple[SourceMap, str]:
     """Return the map of a texture of any size, tileable or not, into a flat one, and the method."""
@@ -327,7 +327,7 @@ def grow(
         return SourceMap.identity(shape), "nothing"
     if all(n <= m for n, m in zip(size, shape, strict=True)):
         places = [slice((m - n) // 2, (m - n) // 2 + n) for n, m in zip(size, shape, strict=True)]
-        return cut(SourceMap.identity(shape), (places[0], places[1])), "nothing"
+        return _cut(SourceMap.identity(shape), (places[0], places[1])), "nothing"
     from texrs.papers.design import design
 
     return design(flat, size, seed=seed, wrap=False, progress=watch).source_map, "design"

@@ -225,9 +225,9 @@ def inpaint(
     cyclic, seed, mask = as_wrap(wrap, usual=False), as_seed(seed), as_marks(mask)
     picture, marked = find_hole(image.image if isinstance(image, Exemplar) else image, mask, cyclic)
     open_ = widen(marked, mask.feather, cyclic)
-    pictures = check_pictures(picture, marked, open_, exemplar)
+    pictures = _check_pictures(picture, marked, open_, exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    usable = check_allowed(allowed, open_, exemplar is None and method == "patch")
+    usable = _check_allowed(allowed, open_, exemplar is None and method == "patch")
     width = as_int(boundary_width, "boundary_width", 0, 1024)
     if patch_size is not None and method == "optimise":
         raise InvalidInput("patch_size: method 'optimise' has no patches; leave it out, or take method='patch'")
@@ -240,7 +240,7 @@ def inpaint(
 
     check_work("inpaint", pictures, shapes[0], "image", method=method)
     watch("inpaint", 0.0)
-    scales, measured = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
+    scales, measured = _recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)
     mirrors = choose_mirrors(pictures, open_, allow_mirror) if method == "patch" else (NONE,)
@@ -264,7 +264,7 @@ def inpaint(
             progress=progress,
         )
     places, count = made.source, made.count
-    new = find_places(places.label)
+    new = _find_places(places.label)
     # What is kept maps to itself; of patches every coordinate is whole, but where they are seen in depth.
     result = pictures[0].copy()
     if not made.whole:
@@ -309,7 +309,7 @@ def inpaint(
     return Synthesis(result, places, stages, report)
 
 
-def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
+def _check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
     """Return the pixels that patches may be copied from: known pixels, and only allowed ones if there is a mask of them."""
     if allowed is None:
         return ~open_
@@ -321,7 +321,7 @@ def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
     return usable
 
 
-def recover_scales(
+def _recover_scales(
     pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object, scale_kind: Kind | None
 ) -> tuple[list[Floats] | None, list[ScaleEstimate | None]]:
     """Return the scale maps of the picture and of the one to copy from, if scales count, and how each was measured."""
@@ -333,7 +333,7 @@ def recover_scales(
     return [scale, np.ones(shape, np.float32) if other is None else other], [measured, beside]
 
 
-def check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | None) -> list[Array]:
+def _check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | None) -> list[Array]:
     """Return the picture with its marked pixels painted over, and the one to copy from if there is one."""
     # Values in the hole must not matter, not even for the range of the values.
     array = array.copy()
@@ -356,6 +356,6 @@ def check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | N
     return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])]
 
 
-def find_places(marked: Array) -> tuple[NDArray[np.intp], ...]:
+def _find_places(marked: Array) -> tuple[NDArray[np.intp], ...]:
     """Return the places of what is not zero, as `np.nonzero`, which looks at each axis apart, in a tenth of its time."""
     return np.unravel_index(np.flatnonzero(marked), marked.shape)

@@ -213,7 +213,7 @@ def texture_mesh(
     if not all(there.any() for _, there in baked):
         raise InvalidInput("mesh: its atlas has no area: it lies in one line, or beyond 0 to 1")
     if scale is None:
-        size = limit_scale(size, texture, laid.surface, side)
+        size = _limit_scale(size, texture, laid.surface, side)
     points = np.concatenate([points[there] for points, there in baked])
     values = _sample(texture, points * size, watch)
     ends = np.cumsum([there.sum() for _, there in baked])[:-1]
@@ -291,10 +291,10 @@ def find_scale(
     if atlas is None:
         return size
     side, more = as_int(atlas, "atlas", 16, 16384), as_int(padding, "padding", 0, 64)
-    return limit_scale(size, texture, lay_flat(surface, side, more, fresh=unwrap).surface, side)
+    return _limit_scale(size, texture, lay_flat(surface, side, more, fresh=unwrap).surface, side)
 
 
-def limit_scale(size: float, texture: SolidTexture, surface: Surface, side: int) -> float:
+def _limit_scale(size: float, texture: SolidTexture, surface: Surface, side: int) -> float:
     """Return a scale, lowered if its voxels would be smaller than the texels: the atlas cannot show finer detail."""
     assert surface.uv is not None
     edges = np.diff(surface.vertices[surface.faces], axis=1)

@@ -175,17 +175,17 @@ def tile(
     pixels = as_image(given.base, "image") if isinstance(given, Material) else given.pixels
     rows, columns = pixels.shape[:2]
     wanted, weight = (
-        as_sides(size, (rows, columns), cyclic),
+        _as_sides(size, (rows, columns), cyclic),
         as_float(0.0 if screening is None else screening, "screening", 0, 1e6),
     )
-    choices = as_choices(overlap, size is None, (rows, columns), wanted, cyclic)
+    choices = _as_choices(overlap, size is None, (rows, columns), wanted, cyclic)
     check_work("tile", [pixels], wanted, "image" if size is None else "size", way=LARGER)
     evened = None if flatten_lighting is None else as_bool(flatten_lighting, "flatten_lighting")
     with collect() as notices:
         free = [cyclic[a] and overlap is None and wanted == (rows, columns) for a in range(2)]
         already = [] if evened else find_tiled(given, free)
         if evened is None:
-            evened = len(already) < sum(cyclic) and not keeps_colours(image, weight) and is_uneven(given)
+            evened = len(already) < sum(cyclic) and not _keeps_colours(image, weight) and is_uneven(given)
         if evened:
             even = given.flatten_lighting() if isinstance(given, Material) else as_exemplar(even_light(given.image))
             already = find_tiled(even, free)
@@ -194,7 +194,7 @@ def tile(
             along = " and ".join(AXES[a] for a in already)
             assume(f"{name_image(given)}: tiles already along the {along}, which are not changed")
         join = partial(
-            join_edges,
+            _join_edges,
             image,
             wrap=cyclic,
             size=wanted,
@@ -220,7 +220,7 @@ tile.takes = ("image",)  # type: ignore[attr-defined]
 
 
 @takes_materials("image")
-def join_edges(
+def _join_edges(
     image: Array | Exemplar | Material,
     *,
     wrap: Sequence[bool],
@@ -246,7 +246,7 @@ def join_edges(
     if larger:
         source = extend(exemplar.guidance, size, wrap, watch)
     else:
-        source, found, reasons = join_ends(exemplar.guidance, things, size, choices, wrap, already, refused, watch)
+        source, found, reasons = _join_ends(exemplar.guidance, things, size, choices, wrap, already, refused, watch)
     weight = screening if found or larger else 0.0
     source = source.with_finish(wrap, screening=weight or None, flatten_lighting=flatten_lighting)
     composite = source.render(exemplar.image)
@@ -268,8 +268,8 @@ def join_edges(
         "already": [AXES[a] for a in already],
         "resized": reasons,
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
-        "joints": {AXES[a]: describe(joined) for a, joined in found.items()},
-        "in_place": round(measure_kept_places(source), 4),
+        "joints": {AXES[a]: _describe(joined) for a, joined in found.items()},
+        "in_place": round(_measure_kept_places(source), 4),
         "in_step": things is not None and things.strict,
         "tiling": report_tiling(
             check_result(result, source, wrap, regular=things is not None and things.regular), wrap
@@ -304,21 +304,21 @@ def measure_unchanged(image: Array, given: Array) -> float:
     return round(float(same.sum()) / (image.shape[0] * image.shape[1]), 4)
 
 
-def keeps_colours(image: Array | Exemplar | Material, screening: float) -> bool:
+def _keeps_colours(image: Array | Exemplar | Material, screening: float) -> bool:
     """Return whether a result has only the colours of the image. Its light is then never evened out."""
     if isinstance(image, Material):
         return has_few_colours(np.asarray(image.base))
     return find_palette({"image": image, "screening": screening}, ("image",), {}) is not None
 
 
-def measure_kept_places(source: SourceMap) -> float:
+def _measure_kept_places(source: SourceMap) -> float:
     """Return the share of the pixels that come from the same place of the image."""
     rows, columns = (np.arange(n, dtype=np.float32) for n in source.shape)
     there = (source.coordinates[..., 0] == rows[:, np.newaxis]) & (source.coordinates[..., 1] == columns)
     return float(there.mean())
 
 
-def as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tuple[int, int]:
+def _as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tuple[int, int]:
     """Return the requested size of the result, or the size of the image."""
     for axis, side in enumerate(shape):
         if wrap[axis] and side < 2:
@@ -336,7 +336,7 @@ def as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tupl
     return rows, columns
 
 
-def as_choices(
+def _as_choices(
     overlap: object, free: bool, shape: tuple[int, int], size: tuple[int, int], wrap: Sequence[bool]
 ) -> list[Choice]:
     """Return the joints of each axis that may be chosen; ``free``: whether the size depends on the joint."""
@@ -367,7 +367,7 @@ def _choose(side: int, wanted: int, free: bool) -> Choice:
     return Choice(max(1, overlap), overlap, wanted)
 
 
-def join_ends(
+def _join_ends(
     colours: Floats,
     things: Things | None,
     wanted: tuple[int, int],
@@ -419,12 +419,12 @@ def join_ends(
         label = np.take_along_axis(label, line, axis) * np.uint32(len(PIECES)) + piece if found else piece
         found[axis] = joined
         if choice.period and not joined.joint.cover:
-            reasons[AXES[axis]] = give_reason(joined, things, axis, shape[axis])
+            reasons[AXES[axis]] = _give_reason(joined, things, axis, shape[axis])
     coordinates = np.stack(np.divmod(place, shape[1]), axis=-1).astype(np.float32)
     return SourceMap.from_coordinates(coordinates, shape, label=label), found, reasons
 
 
-def give_reason(joined: Joined, things: Things, axis: int, side: int) -> str:
+def _give_reason(joined: Joined, things: Things, axis: int, side: int) -> str:
     """Return why an axis became shorter."""
     length, period = joined.joint.period, things.find_period(axis)
     if times := things.count_periods(axis, length):
@@ -436,7 +436,7 @@ def give_reason(joined: Joined, things: Things, axis: int, side: int) -> str:
     return f"{side} -> {length} pixels: a joint that keeps the length costs {joined.dearer:.1f} times as much"
 
 
-def describe(joined: Joined) -> dict[str, object]:
+def _describe(joined: Joined) -> dict[str, object]:
     """Return the report about one axis."""
     joint, edges = joined.joint, sum(cut.edges for cut in joined.cuts)
     cost = sum(cut.value for cut in joined.cuts)

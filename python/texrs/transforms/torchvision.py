@@ -46,7 +46,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         if not pictures:
             raise InvalidInput("inputs: needs a picture, got none")
         seed = int(torch.randint(2**62, ()).item())
-        source = self._augment(to_array(pictures[0]), seed=seed).source_map
+        source = self._augment(_to_array(pictures[0]), seed=seed).source_map
         params: dict[str, Any] = {"source": source, "boxes": None, "index": None}
         for each in flat_inputs:
             if isinstance(each, tv_tensors.BoundingBoxes):
@@ -63,7 +63,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
                 canvas_size=inpt.canvas_size,
             )
             return functional.convert_bounding_box_format(corners, new_format=inpt.format)
-        shown = params["source"].render(to_array(inpt), interpolation="nearest")
+        shown = params["source"].render(_to_array(inpt), interpolation="nearest")
         if not isinstance(inpt, torch.Tensor):
             return type(inpt).fromarray(shown) if hasattr(type(inpt), "fromarray") else functional.to_pil_image(shown)
         made = torch.from_numpy(shown if inpt.ndim == 2 else np.ascontiguousarray(np.moveaxis(shown, -1, 0)))
@@ -76,10 +76,10 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         wanted = self._needs_transform_list(flat)
         params = self.make_params([each for each, need in zip(flat, wanted, strict=True) if need])
         made = [self.transform(each, params) if need else each for each, need in zip(flat, wanted, strict=True)]
-        return follow_labels(tree_unflatten(made, spec), params["index"])
+        return _follow_labels(tree_unflatten(made, spec), params["index"])
 
 
-def to_array(picture: Any) -> Any:
+def _to_array(picture: Any) -> Any:
     """Return a tensor as an array with its channels last; anything else as it is."""
     if not isinstance(picture, torch.Tensor):
         return picture
@@ -89,7 +89,7 @@ def to_array(picture: Any) -> Any:
     return array if picture.ndim == 2 else np.moveaxis(array, 0, -1)
 
 
-def follow_labels(sample: Any, index: Any) -> Any:
+def _follow_labels(sample: Any, index: Any) -> Any:
     """Return a sample whose labels are those of the boxes that survive."""
     if index is None:
         return sample
@@ -97,9 +97,9 @@ def follow_labels(sample: Any, index: Any) -> Any:
         return {
             key: value[torch.from_numpy(index)]
             if key == "labels" and isinstance(value, torch.Tensor)
-            else follow_labels(value, index)
+            else _follow_labels(value, index)
             for key, value in sample.items()
         }
     if isinstance(sample, list | tuple):
-        return type(sample)(follow_labels(each, index) for each in sample)
+        return type(sample)(_follow_labels(each, index) for each in sample)
     return sample
