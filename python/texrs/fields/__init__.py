@@ -1,9 +1,9 @@
-"""Frame fields: how a texture is turned, stretched and sheared at each point of the output.
+"""Frame fields: rotation, scale and shear of a texture at each point of the output.
 
-A `Field` gives a frame F for any point: its columns are where the exemplar's axes go in the output, so a column of
-length 2 means features twice as large. J = F^-1 takes steps in the output to steps in the exemplar; source maps keep
-J. Points are (row, column) or (plane, row, column) in voxels of the output, with centres at the integers; the letters
-x, y and z stand for the axes of columns, rows and planes.
+A `Field` gives a frame F for any point. Its columns are the directions of the exemplar's axes in the output, so a
+column of length 2 means features twice as large. J = F^-1 converts steps in the output to steps in the exemplar;
+source maps store J. Points are (row, column) or (plane, row, column) in voxels of the output, with centres at the
+integers. The letters x, y and z name the axes of columns, rows and planes.
 
 ===================  ==========================================================================
 `identity`           as the exemplar stands
@@ -24,11 +24,11 @@ x, y and z stand for the axes of columns, rows and planes.
 `read`               the vectors or frames of a file
 ===================  ==========================================================================
 
-Wherever a field is taken, its words, an array of vectors or frames, or the file of one will do as well (`as_field`).
+Every parameter for a field also takes its words, an array of vectors or frames, or a file of one (`as_field`).
 
-The field is kept, not a dense array of frames: what is evaluated at a point depends on that point alone. `parse`
-makes a field of a text (``zigzag:period=64,angle=30``), `names` lists them, `check` looks for singular frames before
-long work.
+A field is stored as a formula, not as a dense array of frames: its value at a point depends only on this point.
+`parse` makes a field from a text (``zigzag:period=64,angle=30``), `names` lists them, `check` finds singular frames
+before long work.
 """
 
 from texrs.fields._directions import from_directions, from_gradient, from_structure

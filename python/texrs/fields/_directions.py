@@ -1,4 +1,4 @@
-"""Fields from directions, as simulations, scans and painters have them: a vector a place, completed to frames."""
+"""Fields from directions of simulations, scans or strokes: one vector a place, completed to frames."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["from_directions", "from_gradient", "from_structure"]
 SMALLEST = 1e-9
 """Length below which a vector has no direction, as a share of the longest."""
 DIGITS = 6
-"""Of directions: what solvers of different processors disagree on lies below."""
+"""Digits of directions. Solvers on different processors differ in later digits."""
 _LETTERS = "yx", "zyx"
 
 
@@ -33,37 +33,37 @@ def from_directions(
 ) -> Field:
     """Return a field that turns one axis of the exemplar into given directions.
 
-    In volumes the other two axes are completed: one lies as near to ``up`` as it can, the last across both. Lengths do not
-    count; where there is no direction, that of the nearest place which has one is taken, and so it is where neighbours point in
-    opposite ways, as around a vortex.
+    The other two axes are completed in volumes: one is as near to ``up`` as possible, and the last is perpendicular to
+    both. Lengths do not count. A place without a direction takes the nearest one. The same is done where neighbours
+    point in opposite directions, as around a vortex.
 
     Parameters
     ----------
     directions : (R, C, 2) or (P, R, C, 3) array_like
-        Steps in voxels of the output.
+        Vectors in voxels of the output.
     extent : sequence of int, optional
-        Voxels that the array spreads over, as for `from_array`; by default one for each vector.
+        Voxels that the array covers, as for `from_array`. By default one for each vector.
     along : {"x", "y", "z"}
-        The axis of the exemplar that goes there: that of columns, rows or planes.
+        Axis of the exemplar that is turned into the directions: columns, rows or planes.
     up : (3,) or (P, R, C, 3) array_like, optional
-        (plane, row, column), of volumes, for all or place by place, as the normals of a surface; by default the direction that
-        is least gone along.
+        Up direction in volumes, (plane, row, column), one for all or one a place, such as the normals of a surface. By
+        default the axis least parallel to the directions.
     order : {"zyx", "xyz", "yx", "xy"}, optional
-        Of the components; as of the axes of arrays, (plane, row, column), by default.
+        Order of the components. Default: the order of array axes, (plane, row, column).
     signed : bool
-        False: v and -v mean the same, as of fibres, and neighbours are brought to agree.
+        If False, v and -v are the same, as for fibres, and neighbours are brought into agreement.
     origin : sequence of float, optional
-        The first voxel; by default 0.
+        First voxel. Default: 0.
 
     Returns
     -------
     Field
-        Of rotations.
+        Field of rotations.
 
     Raises
     ------
     InvalidInput
-        Not such an array, no direction anywhere, or a wrong option.
+        If the array has another form, has no direction anywhere, or an option is invalid.
 
     Examples
     --------
@@ -98,18 +98,18 @@ def from_directions(
 
 
 def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, across: bool = False) -> Field:
-    """Return a field that follows where a map rises, such as a height, a distance or a density.
+    """Return a field that follows the gradient of a map, such as a height, a distance or a density.
 
     Parameters
     ----------
     volume : (R, C) or (P, R, C) array_like
         The map.
     along : {"x", "y", "z"}
-        The axis of the exemplar that goes up the map.
+        Axis of the exemplar that follows the gradient.
     sigma : float
-        Samples that the map is smoothed by, 0 to 100.
+        Standard deviation of the smoothing, in samples, 0 to 100.
     across : bool
-        Of pictures: the axis goes along contours, a quarter turned.
+        For images: if True, the axis follows contours, a quarter turn from the gradient.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
     Raises
     ------
     InvalidInput
-        Not such an array, or it is the same everywhere.
+        If the array has another form, or is constant.
 
     Examples
     --------
@@ -138,16 +138,16 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
 
 
 def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -> Field:
-    """Return a field that follows the grain of a picture or a volume: where it changes least, by its structure tensor.
+    """Return a field that follows the grain of an image or a volume, by its structure tensor.
 
     Parameters
     ----------
     volume : (R, C) or (P, R, C) array_like
-        What has a grain, such as wood or fibres.
+        Image or volume with a grain, such as wood or fibres.
     along : {"x", "y", "z"}
-        The axis of the exemplar that goes along it.
+        Axis of the exemplar that follows the grain.
     sigma : float
-        Samples over which the tensor is smoothed, 0 to 100; slopes are taken at half of that.
+        Standard deviation of the smoothing of the tensor, in samples, 0 to 100. Gradients use half of it.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
     Raises
     ------
     InvalidInput
-        Not such an array, or it is the same everywhere.
+        If the array has another form, or is constant.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
     sigma = as_float(sigma, "sigma", 0, 100)
     slopes = _slopes(_as_map(volume), sigma / 2)
     if not np.abs(slopes).max():
-        raise InvalidInput("volume: is the same everywhere, so that there is no grain")
+        raise InvalidInput("volume: is constant, so it has no grain")
     axes = slopes.shape[-1]
     tensor = np.empty((*slopes.shape, axes))
     for i in range(axes):
@@ -190,7 +190,7 @@ def _as_map(volume: ArrayLike) -> NDArray[np.float64]:
 
 
 def _slopes(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
-    """Return by how much a smoothed map rises along each axis, (..., A)."""
+    """Return the gradient of a smoothed map, (..., A)."""
     along: list[NDArray[np.float64]] = list(np.gradient(_smooth(values, sigma)))
     return np.stack(along, axis=-1)
 
@@ -202,13 +202,13 @@ def _smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
 
 
 def _fill(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit vectors; where there is none, that of the nearest place which has one."""
+    """Return unit vectors. Places without one take the nearest."""
     from scipy.ndimage import distance_transform_edt
 
     length = np.sqrt((vectors**2).sum(axis=-1))
     none = length <= SMALLEST * length.max()
     if none.all():
-        raise InvalidInput("directions: all have no length, so that there is no direction")
+        raise InvalidInput("directions: all have length 0, so they have no direction")
     unit = vectors / np.where(none, 1, length)[..., np.newaxis]
     if none.any():
         nearest = distance_transform_edt(none, return_distances=False, return_indices=True)
@@ -217,7 +217,7 @@ def _fill(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _agree(unit: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return lines as arrows that agree with those before them, along one axis after the other."""
+    """Return lines as vectors that agree with previous neighbours, along one axis after the other."""
     out = unit.copy()
     for axis in reversed(range(out.ndim - 1)):
         line = np.moveaxis(out, axis, 0)
@@ -228,12 +228,12 @@ def _agree(unit: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> NDArray[np.float64]:
-    """Return frames (..., A, A) whose column ``along`` is the direction."""
+    """Return frames (..., A, A) with the direction as column ``along``."""
     axes = unit.shape[-1]
     frames = np.empty((*unit.shape, axes))
     frames[..., along] = unit
     if axes == 2:
-        # The other column is a quarter turned, so that nothing is mirrored.
+        # The other column is a quarter turn away, so that nothing is mirrored.
         turned = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
         frames[..., 1 - along] = turned if along == 0 else -turned
         return frames
@@ -249,7 +249,7 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
                 f"up: needs 3 numbers that are not all 0, or such for each of {unit.shape[:-1]}, got {up!r}"
             )
         upwards = upwards.reshape(-1, 3) / np.sqrt((upwards.reshape(-1, 3) ** 2).sum(axis=1, keepdims=True))
-    # Where a direction is that of up, the axis that it is least along stands in.
+    # If a direction is parallel to up, use the axis least parallel to it instead.
     spare = np.eye(3)[np.abs(flat).argmin(axis=1)]
     near = np.abs((flat * upwards).sum(axis=1)) > 0.999
     wanted = np.where(near[:, np.newaxis], spare, upwards)
@@ -257,7 +257,7 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
     second /= np.sqrt((second**2).sum(axis=1, keepdims=True))
     third = np.cross(flat, second)
     shape = unit.shape
-    # What stands up in the exemplar stays so: up goes to its planes, or to its rows where planes go along.
+    # Keep the exemplar upright: up becomes its planes, or its rows if planes follow the direction.
     one, other = [axis for axis in range(3) if axis != along]
     frames[..., one] = second.reshape(shape)
     frames[..., other] = third.reshape(shape)

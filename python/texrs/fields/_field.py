@@ -1,4 +1,4 @@
-"""What every field is: a frame for any point, checked, the same however many points are asked for at once."""
+"""Base class of fields: a checked frame for any point, independent of the number of points in a call."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from texrs.fields._matrices import Matrices, find_flat, inverses, transpose_each
 from texrs.fields._picture import SIDE, choose_places, draw_arrows
 
 LEAST_DETERMINANT = 1e-3
-"""Frames of a smaller determinant are refused: they are flat, and have no inverse worth the name."""
+"""Minimum determinant of a frame. Frames below it are flat and have no useful inverse."""
 MAX_CONDITION = 100.0
-"""Frames that stretch one way so many times as much as another are refused."""
+"""Maximum ratio of the largest to the smallest stretch of a frame."""
 
 FAR = 1e9
-"""Lengths and single places are within so many voxels."""
+"""Maximum absolute length or coordinate, in voxels."""
 MOST_BYTES = 2**32
-"""Of a lattice of frames."""
+"""Maximum bytes of a lattice of frames."""
 _BLOCK = 2**13
-"""Points evaluated at once; the result does not depend on it."""
+"""Number of points evaluated at a time. The result does not depend on it."""
 _NAMES = ("row", "column"), ("plane", "row", "column")
 
 
 class Field(ABC):
-    """A frame for every point of the plane or of space (made by the functions of `texrs.fields`).
+    """A frame for every point of the plane or of space. Functions of `texrs.fields` create fields.
 
-    The columns of a frame F are where the exemplar's axes go in the output: a column of length 2 means features
-    twice as large along that axis. Its inverse J maps steps in the output to steps in the exemplar; that is what a
-    source map keeps. Points are in voxels of the output, (row, column) or (plane, row, column), with centres at the
-    integers; they may be any finite numbers. A frame depends on its point alone, to the last bit, so that any window
-    of an unbounded texture is the same however it is cut.
+    The columns of a frame F are the directions of the exemplar's axes in the output. A column of length 2 means features
+    twice as large along this axis. Its inverse J converts steps in the output to steps in the exemplar, and
+    source maps store J. Points are in voxels of the output, (row, column) or (plane, row, column), with centres at the
+    integers. They may be any finite numbers. A frame depends only on its point, to the last bit, so that all windows
+    of an unbounded texture agree.
 
     Fields can be pickled. Two fields are equal if they have the same `key`.
 
@@ -61,22 +61,22 @@ class Field(ABC):
 
     axes: int
     _rigid = False
-    """Whether every frame is a rotation: then J is the transposed F, and none is singular."""
+    """Whether every frame is a rotation. Then J is the transpose of F, and no frame is singular."""
     _placed_in_voxels = False
-    """Whether points are voxels whatever the spacing, as of an array that spreads over the output."""
+    """Whether points are voxels for any spacing, as for an array over the output."""
 
     @abstractmethod
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         """Return the frames (A, A, N) of (N, A) points, unchecked."""
 
     def _content(self) -> tuple[Any, ...] | None:
-        """Return what the field is made of, for its key; None if that cannot be known."""
+        """Return the data that determine the field, for its key; None if unknown."""
         parts: Any = self
         return tuple(getattr(self, part.name) for part in fields(parts) if part.compare)
 
     @abstractmethod
     def describe(self) -> str:
-        """Return what the field is, in words.
+        """Return a description of the field.
 
         Returns
         -------
@@ -93,12 +93,12 @@ class Field(ABC):
 
     @property
     def constant(self) -> NDArray[np.float32] | None:
-        """The frame, (A, A) float32, where it is the same everywhere; None where it varies."""
+        """The frame, (A, A) float32, if it is the same everywhere, else None."""
         return None
 
     @cached_property
     def key(self) -> bytes | None:
-        """A digest of all that the field depends on, for caches; None of a field that calls a function."""
+        """Digest of all data that determine the field, for caches. None if the field calls a function."""
         content = self._content()
         return None if content is None else content_hash(type(self).__name__, self.axes, *content)
 
@@ -114,7 +114,7 @@ class Field(ABC):
         return f"<{self.axes}-D field: {self.describe()}>"
 
     def _repr_png_(self) -> bytes:
-        """Show in a notebook where the exemplar's rows (red) and columns (blue) go; of a volume, in its middle plane."""
+        """Return an image of the directions of the exemplar's rows (red) and columns (blue)."""
         places = choose_places(self.axes)
         return as_png(draw_arrows(places, self.over((SIDE,) * self.axes).frames(places)))
 
@@ -129,13 +129,14 @@ class Field(ABC):
         Returns
         -------
         ndarray
-            Shape (..., A, A), float32; column j is where the exemplar's axis j goes.
+            Array of shape (..., A, A), float32. Column j is the direction of the exemplar's axis j.
 
         Raises
         ------
         InvalidInput
-            Not points, or a frame at one of them is singular: not finite, of a determinant below 0.001, or of a
-            condition number above 100. The message names the place.
+            If the points are invalid, or a frame at one of them is singular. It is singular if it is not finite, its
+            determinant is
+        below 0.001, or its condition number is above 100. The message names the place.
 
         Examples
         --------
@@ -150,7 +151,7 @@ class Field(ABC):
         return self._evaluate(points, False)
 
     def jacobians(self, points: ArrayLike) -> Floats:
-        """Return the Jacobians J, the inverses of the frames: output steps to exemplar steps.
+        """Return the Jacobians J, the inverses of the frames, which convert output steps to exemplar steps.
 
         Parameters
         ----------
@@ -160,12 +161,12 @@ class Field(ABC):
         Returns
         -------
         ndarray
-            Shape (..., A, A), float32.
+            Array of shape (..., A, A), float32.
 
         Raises
         ------
         InvalidInput
-            As for `frames`.
+            If an argument is invalid for `frames`.
 
         Examples
         --------
@@ -180,7 +181,7 @@ class Field(ABC):
     def lattice(
         self, shape: Sequence[int], *, origin: ArrayLike = 0, step: float = 1, jacobians: bool = True
     ) -> Floats:
-        """Return the Jacobians (or the frames) at the samples of a level of a pyramid.
+        """Return the Jacobians or the frames at the samples of a pyramid level.
 
         Parameters
         ----------
@@ -189,21 +190,21 @@ class Field(ABC):
         origin : int, or one an axis
             Index of the first sample, on the level's own lattice.
         step : float
-            Voxels from one sample to the next: 1, 2, 4 ... Sample i lies at (i + 1/2) step - 1/2.
+            Voxels from one sample to the next: 1, 2, 4 ... Sample i is at (i + 1/2) step - 1/2.
         jacobians : bool
-            False gives the frames.
+            If False, return the frames.
 
         Returns
         -------
         ndarray
-            Shape of the lattice, then (A, A); float32.
+            Array of the lattice's shape, then (A, A); float32.
 
         Raises
         ------
         InvalidInput
-            As for `frames`, or the shape is not one.
+            If the shape or an argument for `frames` is invalid.
         LimitExceeded
-            More samples than 4 GiB hold.
+            If the samples need more than 4 GiB.
 
         Examples
         --------
@@ -229,22 +230,22 @@ class Field(ABC):
         return out.reshape(*sides, self.axes, self.axes)
 
     def over(self, shape: Sequence[int]) -> Field:
-        """Return the field as it lies over a bounded output: what was left open (a centre, a length) is set by its size.
+        """Return the field over a bounded output: its size sets a centre or length that is not given.
 
         Parameters
         ----------
         shape : sequence of int
-            Rows and columns, or planes, rows and columns, of the output.
+            Size of the output: rows and columns, or planes, rows and columns.
 
         Returns
         -------
         Field
-            The field itself where nothing is open.
+            The field itself if nothing is missing.
 
         Raises
         ------
         InvalidInput
-            Another number of sides than the field has axes, or sides below 1.
+            If the number of sides differs from the field's axes, or a side is below 1.
 
         Examples
         --------
@@ -256,20 +257,20 @@ class Field(ABC):
         return self._over([n - 1 for n in as_size(shape, "shape", axes=self.axes)])
 
     def _over(self, reach: Sequence[float]) -> Field:
-        """Return the field over an output whose last point lies so far from its first."""
+        """Return the field over an output, given the distance of its last point from its first."""
         return self
 
     def _check_steps(self, steps: Sequence[float]) -> None:
-        """Check whether voxels of a spacing are small enough for the field."""
+        """Check that voxels of a spacing are small enough for the field."""
         return
 
     def inverse(self) -> Field:
-        """Return the field whose frames are the inverses of these at each point.
+        """Return the field whose frames are the inverses of these.
 
         Returns
         -------
         Field
-            Of the same axes.
+            Field with the same axes.
 
         Examples
         --------
@@ -299,7 +300,7 @@ class Field(ABC):
 
 
 def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "field") -> Matrices:
-    """Return the inverses of frames, or raise InvalidInput that names the first place where there is none."""
+    """Return the inverses of frames, or raise InvalidInput with the first place of a singular one."""
     inverse, det = inverses(frames)
     bad = find_flat(frames, inverse, det, LEAST_DETERMINANT, MAX_CONDITION)
     if bad.any():
@@ -317,7 +318,7 @@ def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "fiel
 
 
 def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.float64]:
-    """Check points of shape (..., A): finite numbers."""
+    """Check points of shape (..., A) with finite numbers."""
     given = try_array(points)
     if given.dtype.kind not in "buif" or given.ndim == 0 or given.shape[-1] != axes:
         raise InvalidInput(
@@ -336,7 +337,7 @@ def check_axes(axes: object) -> int:
 
 
 def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float64]:
-    """Check a single point, (A,); by default the origin."""
+    """Check a single point, (A,). Default: the origin."""
     if place is None:
         return np.zeros(axes)
     at = as_points(place, axes, name)
@@ -387,17 +388,17 @@ def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = N
     Parameters
     ----------
     field : Field
-        Of 2 or 3 axes.
+        Field of 2 or 3 axes.
     shape : sequence of int
         Size of the box in voxels.
     origin : sequence of float, optional
-        Its first voxel; by default 0.
+        First voxel of the box. Default: 0.
 
     Raises
     ------
     InvalidInput
-        Not a field, or of another number of axes, or singular at one of up to 32768 voxels spread evenly over the
-        box, corners included.
+        If it is not a field or has other axes. Also if it is singular at one of up to 32768 voxels spread evenly over
+        the box, corners included.
 
     Examples
     --------

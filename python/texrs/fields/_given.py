@@ -1,4 +1,4 @@
-"""Fields as they are given: words, arrays of vectors or of frames, and files of these."""
+"""Conversion to fields: words, arrays of vectors or frames, and files of arrays."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ from texrs.io._formats import READ_VOLUMES, STORE
 __all__ = ["FieldLike", "as_field", "read"]
 
 FieldLike: TypeAlias = Field | ArrayLike | os.PathLike[str]
-"""What stands for a field: see `as_field`."""
+"""Types that `as_field` converts to a field."""
 
 SUFFIXES = (*READ_VOLUMES, STORE)
 _OPTIONS = ("along", "order", "up", "signed")
 
 
 def is_file(text: str) -> bool:
-    """Return whether a text names a file of vectors, and not a field in words."""
+    """Return whether a text names a file of vectors, instead of a field in words."""
     return _split(text)[0].lower().rstrip("/").endswith(SUFFIXES) or io.is_store(_split(text)[0])
 
 
 def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = None, **options: Any) -> Field:
-    """Return the field of the vectors or the frames in a file.
+    """Read a field from a file of vectors or frames.
 
     Parameters
     ----------
     path : path_like
-        .npy, .npz, .zarr, .nrrd, .nii, .vti or .tif: directions (..., 2) or (..., 3), or frames (..., A, A). In the
-        formats of ParaView, Slicer and the like components are x, y, z; in the others as the axes of arrays, unless
-        ``order`` says otherwise.
+        .npy, .npz, .zarr, .nrrd, .nii, .vti or .tif: directions (..., 2) or (..., 3), or frames (..., A, A).
+        Components are x, y, z in the formats of ParaView, Slicer and similar programs. Components in other formats are
+        in the order of array axes, unless ``order`` is given.
     extent : sequence of int, optional
-        Voxels that it spreads over, as for `from_array`; by default one for each vector.
+        Voxels that the field covers, as for `from_array`. By default one for each vector.
     axes : int, optional
-        2 or 3, that the field must have; of a single plane of vectors in space, 2 drops what leads out of it.
+        Required number of axes, 2 or 3. For a single plane of vectors in space, 2 drops the component across it.
     **options
-        Of `from_directions`: ``along``, ``up``, ``order``, ``signed``.
+        Options of `from_directions`: ``along``, ``up``, ``order``, ``signed``.
 
     Returns
     -------
@@ -57,9 +57,9 @@ def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = 
     Raises
     ------
     FileError
-        Missing, not readable, or not such an array.
+        If the file is missing, not readable, or has no such array.
     InvalidInput
-        Vectors or frames that make no field, or of another number of axes.
+        If the vectors or frames are not a field, or have other axes.
 
     Examples
     --------
@@ -112,22 +112,22 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
 def as_field(
     value: object, axes: int, extent: Sequence[int] | None = None, *, spacing: Sequence[float] | None = None
 ) -> Field | None:
-    """Return the field that was given: itself, in words, as an array, or as the file of one; None stays.
+    """Return a value as a field: a field, words, an array, or a file of an array. None stays None.
 
     Parameters
     ----------
     value : Field, str, array_like, path_like or None
-        Words are those of `parse`; an array is of directions, (R, C, 2) or (P, R, C, 3), or of frames, (..., A, A); a file
-        holds such an array (`read`), and may be followed by options of `from_directions`, as in
+        Words are those of `parse`. An array contains directions, (R, C, 2) or (P, R, C, 3), or frames, (..., A, A). A
+        file contains such an array (`read`). Options of `from_directions` may follow its name, as in
         ``flow.npy:along=z,order=xyz`` (also ``up=1x0x0`` and ``signed=no``).
     axes : int
         2 or 3.
     extent : sequence of int, optional
-        Voxels that arrays spread over, and over which words are meant; by default one for each vector.
+        Voxels that arrays cover, and the size for words. By default one for each vector.
     spacing : sequence of float, optional
-        Distances between voxels along planes, rows and columns: the field turns and scales in space, where voxels need not
-        be cubes. Places and lengths of the field are in the unit of the spacing. Arrays spread over voxels, and their
-        vectors or frames are those of space. A field that has a spacing keeps it. Default: voxels are cubes of side 1.
+        Distances between voxels along planes, rows and columns. The field rotates and scales in space, where voxels
+        need not be cubes. Places and lengths of the field are in the unit of the spacing. Arrays cover voxels, and
+        their vectors or frames are in space. A field that has a spacing keeps it. Default: voxels are cubes of side 1.
 
     Returns
     -------
@@ -136,9 +136,9 @@ def as_field(
     Raises
     ------
     InvalidInput
-        None of these, or of another number of axes.
+        If the value has another type, or other axes.
     FileError
-        A file that is missing, damaged, or holds no such array.
+        If a file is missing, damaged, or has no such array.
 
     Examples
     --------
@@ -149,7 +149,7 @@ def as_field(
     >>> fields.as_field(np.ones((4, 4, 4, 3)), 3, (32, 32, 32)).axes
     3
 
-    A quarter turn in a volume whose planes lie 2 apart, and whose rows and columns 1:
+    A quarter turn in a volume with planes 2 apart, and rows and columns 1 apart:
 
     >>> fields.as_field("rotation:angle=90,plane=yz", 3, spacing=(2, 1, 1)).constant.round(3) + 0
     array([[ 0. ,  0.5,  0. ],
@@ -166,7 +166,7 @@ def as_field(
 
 
 def _make_field(value: object, axes: int, extent: Sequence[int] | None) -> Field:
-    """Return the field that was given, in units of voxels."""
+    """Return a value as a field in units of voxels."""
     if isinstance(value, Field):
         if value.axes != axes:
             raise InvalidInput(f"field: needs a field of {axes} axes, got {value}")
@@ -185,7 +185,7 @@ def _make_field(value: object, axes: int, extent: Sequence[int] | None) -> Field
 
 
 def _split(text: str) -> tuple[str, str]:
-    """Return of ``flow.npy:along=z`` the file and the options."""
+    """Return the file and the options of ``flow.npy:along=z``."""
     name, colon, words = text.rpartition(":")
     return (name, words) if colon and "=" in words and name.lower().rstrip("/").endswith(SUFFIXES) else (text, "")
 

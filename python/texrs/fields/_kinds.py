@@ -1,4 +1,4 @@
-"""What the fields by formula are made of."""
+"""Classes of the fields that a formula defines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from texrs.fields._field import Field
 from texrs.fields._matrices import Matrices, multiply, repeat
 
 LETTERS = "yx", "zyx"
-"""Of the axes of pictures and of volumes, in their order."""
+"""Letters of the axes of images and of volumes, in order."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +47,7 @@ class Wound(Field):
         at = (0.0,) * self.axes if self.centre is None else self.centre
         out = points[:, self.radial] - at[self.radial]
         along = points[:, self.tangential] - at[self.tangential]
-        # Quotients and roots, where sines of angles could differ in the last bit from one loop to another.
+        # Use quotients and roots, because sines of angles could differ in the last bit between loops.
         far = np.maximum(np.abs(out), np.abs(along))
         middle = far == 0
         far = np.where(middle, 1.0, far)

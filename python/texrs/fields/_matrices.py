@@ -1,8 +1,8 @@
-"""Small matrices, many at once, by formulas alone: a matrix comes out the same in whatever company it is computed.
+"""Many small matrices at once, by formulas only: each result is independent of the other matrices.
 
-All take float64 of shape (A, A, N), A = 2 or 3, so that ``m[i, j]`` is an array of numbers. Products, quotients and
-roots of single numbers are exact to the last bit wherever they stand in an array, which the loops of linear algebra
-libraries do not promise.
+All functions take float64 of shape (A, A, N), A = 2 or 3, so that ``m[i, j]`` is an array of numbers. Products,
+quotients and roots of single numbers are exact to the last bit at any position of an array. Loops of linear algebra
+libraries do not guarantee this.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ Numbers = NDArray[np.float64]
 Matrices = NDArray[np.float64]
 
 POLAR_STEPS = 5
-"""Of Newton's iteration with Higham's scaling: a matrix of condition 100 comes to 1e-11 of its limit."""
+"""Newton iterations (Higham scaling) of the polar decomposition.
+
+They bring a matrix of condition number 100 within 1e-11 of the limit.
+"""
 _TERMS, _SQUARINGS = 9, 4
-"""Of Taylor's series and afterwards: exact to 1e-10 for matrices of norms up to 5."""
+"""Terms of the Taylor series and number of squarings, exact to 1e-10 for matrices of norms up to 5."""
 
 
 def repeat(matrix: NDArray[np.float64], count: int) -> Matrices:
-    """Return one matrix for each of so many points."""
+    """Return copies of one matrix for a number of points."""
     return np.repeat(matrix[:, :, np.newaxis], count, axis=2)
 
 
@@ -60,7 +63,7 @@ def cofactors(m: Matrices) -> Matrices:
 
 
 def determinants(m: Matrices, cofactor: Matrices | None = None) -> Numbers:
-    """Return the determinants, along the first row."""
+    """Return the determinants, expanded along the first row."""
     c = cofactors(m) if cofactor is None else cofactor
     out: Numbers = m[0, 0] * c[0, 0]
     for j in range(1, len(m)):
@@ -69,12 +72,12 @@ def determinants(m: Matrices, cofactor: Matrices | None = None) -> Numbers:
 
 
 def inverses(m: Matrices) -> tuple[Matrices, Numbers]:
-    """Return the inverses (not finite where there is none) and the determinants."""
+    """Return the inverses (not finite for singular matrices) and the determinants."""
     c = cofactors(m)
     det = determinants(m, c)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         c /= det
-    c += 0.0  # Zeros are made positive.
+    c += 0.0  # Negative zeros become positive.
     return transpose_each(c), det
 
 
@@ -88,7 +91,7 @@ def norms(m: Matrices) -> Numbers:
 
 
 def rotations(m: Matrices) -> Matrices:
-    """Return the nearest orthogonal matrices (the polar factors); not finite where there are none."""
+    """Return the nearest orthogonal matrices (the polar factors), not finite if there are none."""
     x = m
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for _ in range(POLAR_STEPS):
@@ -99,7 +102,7 @@ def rotations(m: Matrices) -> Matrices:
 
 
 def exponentials(m: Matrices) -> Matrices:
-    """Return the exponentials of symmetric matrices, by Taylor's series and squaring of what is not uniform in them."""
+    """Return the exponentials of symmetric matrices, by the Taylor series and squaring of the traceless part."""
     axes = len(m)
     mean: Numbers = m[0, 0].copy()
     for a in range(1, axes):
@@ -119,11 +122,11 @@ def exponentials(m: Matrices) -> Matrices:
 
 
 def find_flat(m: Matrices, inverse: Matrices, det: Numbers, least: float, worst: float) -> Bools:
-    """Return which matrices are not finite, of a determinant below ``least`` or a condition beyond ``worst``."""
+    """Return a mask of the matrices that are not finite, or whose determinant or condition is out of range."""
     with np.errstate(invalid="ignore", over="ignore"):
         bound = norms(m) * norms(inverse)
         bad: Bools = ~(np.abs(det) >= least) | ~np.isfinite(bound)
-        # Of Frobenius norms the product is never below the condition number, so few are left to be looked at.
+        # The product of Frobenius norms is never below the condition number, so only few matrices need the exact test.
         doubtful = np.flatnonzero(~bad & (bound > worst))
     if doubtful.size:
         singular = np.linalg.svd(m[:, :, doubtful].transpose(2, 0, 1), compute_uv=False)

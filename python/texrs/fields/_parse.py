@@ -1,4 +1,4 @@
-"""Fields written as text, for the command line."""
+"""Text form of fields, as the command line uses it."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _WORDS = ("axis", "plane", "radial")
 
 
 def names() -> dict[str, str]:
-    """Return the fields that `parse` knows, with their parameters and the defaults of these.
+    """Return the fields of `parse`, with their parameters and defaults.
 
     Returns
     -------
     dict of str to str
-        For each name, the text of the field as it is by default.
+        Text of the default field for each name.
 
     Examples
     --------
@@ -53,29 +53,29 @@ def names() -> dict[str, str]:
 def parse(
     text: str, axes: int = 3, size: Sequence[int] | None = None, *, spacing: Sequence[float] | None = None
 ) -> Field:
-    """Return the field that a text names, with what differs from the defaults.
+    """Return the field that a text describes.
 
     Parameters
     ----------
     text : str
-        ``name`` or ``name:key=value,key=value``; a centre is written ``16x24.5x0``. `names` lists what there is.
+        ``name`` or ``name:key=value,key=value``. A centre is written ``16x24.5x0``. `names` lists the fields.
     axes : int
         2 or 3.
     size : sequence of int, optional
-        Size of the output: sets what was left open, as `Field.over`.
+        Size of the output. It sets parameters that are not given, as in `Field.over`.
     spacing : sequence of float, optional
-        Distances between voxels along planes, rows and columns. Places and lengths in the text are in its unit; lengths
-        that are left out are multiples of the smallest voxel side. Default: voxels are cubes of side 1.
+        Distances between voxels along planes, rows and columns. Places and lengths in the text are in its unit.
+        Default lengths are multiples of the smallest voxel side. Default: voxels are cubes of side 1.
 
     Returns
     -------
     Field
-        The field that has that name.
+        Field with this name.
 
     Raises
     ------
     InvalidInput
-        Not such a text; the message says what is allowed.
+        If the text is invalid. The message lists the allowed values.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def parse(
     elif axes != 3:
         raise InvalidInput(f"field: {name} is for volumes, not for pictures")
     if spacing is not None:
-        # Usual lengths are those of voxels.
+        # Default lengths are in voxels.
         unit, usual = min(as_distances(spacing, axes)), {"period": 32.0} | ({} if size else {"length": 128.0})
         options = {key: unit * length for key, length in usual.items() if key in allowed} | options
     try:

@@ -7,13 +7,13 @@ import numpy as np
 from texrs._typing import Array, Floats
 
 SIDE, STEP = 240, 20
-"""Of the picture, and from one place to the next, in pixels."""
+"""Side of the image, and distance of the arrows, in pixels."""
 COLOURS = ((200, 40, 40), (30, 90, 200))
-"""Where the exemplar's rows go to, and its columns."""
+"""Colours of the directions of the exemplar's rows and columns."""
 
 
 def choose_places(axes: int) -> Floats:
-    """Return the places whose frames are drawn, (n, axes), in a box of a side of `SIDE`: of a volume, its middle plane."""
+    """Return the places of the arrows, (n, axes), in a box of side `SIDE`, or in the middle plane of a volume."""
     at = np.arange(STEP / 2, SIDE, STEP, dtype=np.float32)
     rows, columns = np.meshgrid(at, at, indexing="ij")
     middle = [np.full_like(rows, SIDE / 2)] * (axes - 2)
@@ -21,7 +21,7 @@ def choose_places(axes: int) -> Floats:
 
 
 def draw_arrows(places: Floats, frames: Floats) -> Array:
-    """Draw the last two axes of frames as arrows at their places: the longest axis of all is a step long."""
+    """Draw the last two axes of frames as arrows at their places. The longest arrow has the length of a step."""
     picture = np.full((SIDE, SIDE, 3), 255, np.uint8)
     frames = frames[..., -2:, -2:]
     longest = max(float(np.sqrt((frames**2).sum(axis=-2).max())), 1e-12)

@@ -1,9 +1,9 @@
-"""Fields from frames at some places: an array of any resolution, points, a function.
+"""Fields from samples: an array of any resolution, points, or a function.
 
-A mean of frames is not a frame: of two that are turned 30 degrees either way it is 13 % too small. So each frame is
-split once into a rotation (or a mirrored one) and the logarithm of a stretch, F = R exp(L). Between samples R is the
-rotation nearest to the mean of the R, and L is the mean of the L: sizes are kept, and what turns without stretching
-never stretches.
+A mean of frames is not a frame: the mean of two rotations by plus and minus 30 degrees is 13 % too small. Each frame
+is therefore split into a rotation (or a mirrored one) and the logarithm of a stretch, F = R exp(L). Interpolated
+between samples, R is the rotation nearest to the mean of the R, and L is the mean of the L. Sizes are kept, and
+rotations without stretch stay so.
 """
 
 from __future__ import annotations
@@ -23,44 +23,43 @@ from texrs.fields._field import Field, as_place, as_points, check_axes, refuse_f
 from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transpose_each
 
 MAX_FRAMES = 2**24
-"""Of an array of frames: 256 voxels a side."""
+"""Maximum number of frames in an array: 256 voxels a side."""
 MAX_POINTS = 4096
-"""At which frames may be set: all of them are looked at for each voxel."""
+"""Maximum number of points with frames. Every voxel uses all of them."""
 
 _BLOCK = 2**14
-"""Frames that are split at once."""
+"""Number of frames that are split at a time."""
 _FLATTEST = 0.02
-"""Determinant of a mean of rotations below which it is no guide to a rotation."""
+"""Minimum determinant of a mean of rotations. Below it the nearest rotation is undefined."""
 
 
 def from_array(
     frames: ArrayLike, extent: Sequence[int] | None = None, *, origin: Sequence[float] | None = None
 ) -> Field:
-    """Return a field that is sampled from an array, of any resolution.
+    """Return a field that is sampled from an array of any resolution.
 
-    The array's cells divide the box of ``extent`` voxels from ``origin`` evenly; each frame holds at the middle of
-    its cell, and lies exactly on a voxel where the array has the box's own resolution. Between samples rotations and
-    stretches are interpolated linearly, apart from each other; beyond the outermost samples the field goes on as it
-    is there.
+    The array's cells divide the box of ``extent`` voxels from ``origin`` evenly. Each frame is at the middle of its
+    cell, which is exactly a voxel if the array has the box's resolution. Rotations and stretches are interpolated
+    linearly and separately between samples. Beyond the outermost samples the field is constant.
 
     Parameters
     ----------
     frames : array_like
         Shape (R, C, 2, 2) or (P, R, C, 3, 3), real numbers.
     extent : sequence of int, optional
-        Voxels that the array spreads over; by default one for each frame.
+        Voxels that the array covers. By default one for each frame.
     origin : sequence of float, optional
-        The first voxel; by default 0.
+        First voxel. Default: 0.
 
     Returns
     -------
     Field
-        It interpolates the array's frames.
+        Field that interpolates the array's frames.
 
     Raises
     ------
     InvalidInput
-        Not such an array, singular somewhere, or mirrored in one place and not in another.
+        If the array has another form, is singular somewhere, or is mirrored at some places only.
 
     Examples
     --------
@@ -100,28 +99,28 @@ def make_grid(
 
 
 def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
-    """Return a smooth field through frames that are set at points.
+    """Interpolate a smooth field through frames at points.
 
-    Each point counts by the inverse fourth power of its distance: the field has the given frame at a given point,
-    follows the nearest points elsewhere, and far away becomes the mean of all. Rotations and stretches are averaged
-    apart from each other.
+    The weight of a point is the inverse fourth power of its distance. The field has the given frame at a given point,
+    follows the nearest points elsewhere, and approaches the mean of all far away. Rotations and stretches are averaged
+    separately.
 
     Parameters
     ----------
     points : array_like
-        Shape (N, A), in voxels of the output; up to 4096.
+        Array of shape (N, A), in voxels of the output, up to 4096 points.
     frames : array_like
-        Shape (N, A, A).
+        Array of shape (N, A, A).
 
     Returns
     -------
     Field
-        It passes through the given frames.
+        Field through the given frames.
 
     Raises
     ------
     InvalidInput
-        Not such arrays, two points in one place, a singular frame, or mirrored frames among others.
+        If arrays have other forms, two points are equal, a frame is singular, or only some are mirrored.
 
     Examples
     --------
@@ -151,21 +150,22 @@ def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: in
     Parameters
     ----------
     function : callable
-        Takes points (N, A), float64, and returns frames (N, A, A). The frame of a point must depend on that point
-        alone: not on the others of a call, nor on what was asked before. To be pickled the field needs a function
-        that can be pickled. Such a field has no `Field.key`.
+        Function of points (N, A), float64, that returns frames (N, A, A). The frame of a point must depend only on
+        this point, not on other points or earlier calls. A field can be pickled if its function can. Such a field has
+        no `Field.key`.
     axes : int
         2 or 3.
 
     Returns
     -------
     Field
-        It calls the function.
+        Field that calls the function.
 
     Raises
     ------
     InvalidInput
-        Not a function; or, when the field is evaluated, what it returns is no frames. What it raises passes.
+        If it is not a function, or its result is not frames when the field is evaluated. Its own exceptions pass
+        through.
 
     Examples
     --------
@@ -193,7 +193,10 @@ class _Grid(Field):
     turns: Floats
     stretches: Floats | None
     opposed: bool = False
-    """Whether the nearest frame counts where those around point in opposite ways, as around a vortex; else that is refused."""
+    """Whether the nearest frame is used where surrounding frames are opposite, as around a vortex.
+
+    Otherwise this is refused.
+    """
     _placed_in_voxels = True
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
@@ -211,7 +214,7 @@ class _Grid(Field):
             for a, (up, n) in enumerate(zip(corner, self.sides, strict=True)):
                 index = index * n + np.minimum(low[a] + up, n - 1)
                 weight = weight * (share[a] if up else 1 - share[a])
-            if not weight.any():  # Voxels that lie on samples; to add zeros would change no bit.
+            if not weight.any():  # Skip voxels on samples: adding zeros would not change a bit.
                 continue
             turn += weight * self.turns[..., index]
             if stretch is not None and self.stretches is not None:
@@ -242,7 +245,7 @@ class _Scattered(Field):
         stretch = None if self.stretches is None else np.zeros((*self.stretches.shape[:-1], len(points)))
         total = np.zeros(len(points))
         for i, place in enumerate(self.places):
-            # Relative to the nearest, so that no weight overflows on a point or vanishes far away.
+            # Use distances relative to the nearest point, so that no weight overflows or vanishes.
             distance = self._measure_squares(points, place)
             ratio = np.where(distance > 0, nearest / np.where(distance > 0, distance, 1), 1)
             weight = ratio * ratio
@@ -296,8 +299,8 @@ class _Function(Field):
 def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float64]]) -> tuple[Floats, Floats | None]:
     """Split frames (N, A, A) into rotations and logarithms of stretches.
 
-    The rotations are (A, A, N). The logarithms are so too, or (N,) where no frame stretches one way more than another,
-    or none where none stretches at all. float32, for a dense array of frames is large.
+    The rotations are (A, A, N). The logarithms have the same shape, (N,) if each frame stretches all directions
+    equally, or are None if no frame stretches. They are float32, because a dense array of frames is large.
     """
     count, axes = frames.shape[:2]
     turns, logs = (np.empty((axes, axes, count), np.float32) for _ in range(2))
@@ -325,7 +328,7 @@ def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float6
 
 
 def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[np.float64]) -> Matrices:
-    """Make frames of means of rotations and of logarithms of stretches."""
+    """Return frames from means of rotations and of logarithms of stretches."""
     flat = np.abs(determinants(turn)) < _FLATTEST
     if flat.any():
         place = ", ".join(f"{v:g}" for v in points[int(np.flatnonzero(flat)[0])].tolist())
@@ -337,7 +340,7 @@ def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[n
 
 
 def _to_matrices(frames: Array) -> Matrices:
-    """Bring frames (..., A, A) to the order of `_matrices`, copied."""
+    """Return a copy of frames (..., A, A) in the order of `_matrices`."""
     axes = frames.shape[-1]
     return np.array(frames.reshape(-1, axes, axes).transpose(1, 2, 0), np.float64, order="C")
 

@@ -17,7 +17,7 @@ _WORDS = {"plane": "z", "row": "y", "column": "x"}
 
 
 def identity(axes: int = 3) -> Field:
-    """Return the field of textures that stand as their exemplar does.
+    """Return the field of textures in the orientation of their exemplar.
 
     Parameters
     ----------
@@ -27,12 +27,12 @@ def identity(axes: int = 3) -> Field:
     Returns
     -------
     Field
-        Its frame is the identity everywhere.
+        Field with the identity as its frame everywhere.
 
     Raises
     ------
     InvalidInput
-        Another number of axes.
+        If the number of axes is invalid.
 
     Examples
     --------
@@ -51,17 +51,17 @@ def constant(matrix: ArrayLike) -> Field:
     Parameters
     ----------
     matrix : array_like
-        Shape (2, 2) or (3, 3); column j is where the exemplar's axis j goes.
+        Matrix of shape (2, 2) or (3, 3). Column j is the direction of the exemplar's axis j.
 
     Returns
     -------
     Field
-        The same frame everywhere; of two axes or of three, as the matrix.
+        Field with this frame everywhere.
 
     Raises
     ------
     InvalidInput
-        Not such a matrix, or a singular one.
+        If the matrix has another form or is singular.
 
     Examples
     --------
@@ -76,14 +76,14 @@ def constant(matrix: ArrayLike) -> Field:
 
 
 def rotation(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
-    """Return the field that turns the texture everywhere by one angle in one plane.
+    """Return the field that rotates the texture by one angle in one plane.
 
     Parameters
     ----------
     angle : float
-        Degrees, within 360 either way: the first axis of ``plane`` turns towards the second.
+        Angle in degrees, -360 to 360. The first axis of ``plane`` turns towards the second.
     plane : str
-        Two of "x" (columns), "y" (rows) and "z" (planes). In "xy" a positive angle is clockwise on the screen, where
+        Two of "x" (columns), "y" (rows) and "z" (planes). A positive angle in "xy" is clockwise on the screen, where
         rows grow downwards.
     axes : int
         2 or 3.
@@ -91,12 +91,12 @@ def rotation(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
     Returns
     -------
     Field
-        The same rotation everywhere.
+        Field with this rotation everywhere.
 
     Raises
     ------
     InvalidInput
-        Another angle, or another plane.
+        If the angle or the plane is invalid.
 
     Examples
     --------
@@ -112,24 +112,24 @@ def rotation(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
 
 
 def rotation_3d(angle: float = 30, angle2: float = 30) -> Field:
-    """Return the field that turns the texture in the plane xy, then in the plane yz, so that no axis stays.
+    """Return the field that rotates the texture in the plane xy, then in the plane yz, so that no axis is fixed.
 
     Parameters
     ----------
     angle : float
-        Degrees in xy, as in `rotation`, within 360 either way.
+        Angle in xy in degrees, as in `rotation`, -360 to 360.
     angle2 : float
-        Degrees in yz, afterwards; within 360 either way.
+        Angle in yz in degrees, applied afterwards, -360 to 360.
 
     Returns
     -------
     Field
-        The same rotation everywhere, of three axes.
+        Field of three axes with this rotation everywhere.
 
     Raises
     ------
     InvalidInput
-        An angle beyond 360 degrees either way.
+        If an angle is beyond 360 degrees.
 
     Examples
     --------
@@ -145,12 +145,14 @@ def rotation_3d(angle: float = 30, angle2: float = 30) -> Field:
 
 
 def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
-    """Return the field that shears the texture: its second axis leans towards its first; areas and volumes stay.
+    """Return the field that shears the texture: its second axis leans towards its first.
+
+    Areas and volumes do not change.
 
     Parameters
     ----------
     amount : float
-        Steps along the first axis of ``plane`` for each step along the second, within 9 either way.
+        Steps along the first axis of ``plane`` for each step along the second, -9 to 9.
     plane : str
         Two of "x", "y" and "z".
     axes : int
@@ -159,12 +161,12 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
     Returns
     -------
     Field
-        The same shear everywhere.
+        Field with this shear everywhere.
 
     Raises
     ------
     InvalidInput
-        An amount out of range, another plane, or another number of axes.
+        If the amount, the plane or the number of axes is invalid.
 
     Examples
     --------
@@ -185,31 +187,31 @@ def circular(
 ) -> Field:
     """Return the field that winds the texture round an axis: one of its axes is radial, one tangential.
 
-    With d the way from the axis to a point, ``F e_r = d / |d|``, F e_t = the same turned by a right angle towards t, and
-    the third axis stays. On the axis itself F is the identity.
+    Let d be the vector from the axis to a point. Then ``F e_r = d / |d|``, and F e_t is the same rotated by a right
+    angle towards t. The third axis does not change. On the axis itself F is the identity.
 
     Parameters
     ----------
     axis : str
-        "x", "y" or "z": what the circles go round. A picture is wound round "z", which it lacks.
+        Axis of the circles: "x", "y" or "z". An image is wound round "z", which it does not have.
     radial : str, optional
-        The axis of the exemplar that points outwards, r; t is the remaining one. By default the one that follows
-        ``axis`` in x, y, z, x: so x is radial and y tangential round z.
+        Axis r of the exemplar that points outwards; t is the remaining one. By default the one after ``axis`` in x, y,
+        z, x: x is radial and y tangential round z.
     centre : sequence of float, optional
-        A point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
-        `Field.over`), the origin of an unbounded one.
+        Point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
+        `Field.over`), or the origin of an unbounded one.
     axes : int
         2 or 3.
 
     Returns
     -------
     Field
-        Its frames are rotations, about the axis.
+        Field of rotations about the axis.
 
     Raises
     ------
     InvalidInput
-        Not such axes, or not such a centre.
+        If an axis or the centre is invalid.
 
     Examples
     --------
@@ -230,33 +232,32 @@ def spiral(
     centre: Sequence[float] | None = None,
     axes: int = 3,
 ) -> Field:
-    """Return the field of `circular`, turned by an angle: what ran along circles runs along spirals.
+    """Return the field of `circular`, rotated by an angle: circles become spirals.
 
     Parameters
     ----------
     angle : float
-        Degrees from the circles to the spirals (of equal angle, so logarithmic), within 360 either way; the radial axis
-        turns towards the tangential one.
+        Angle in degrees between circles and spirals, -360 to 360. The spirals are logarithmic. The radial axis turns
+        towards the tangential one.
     axis : str
-        "x", "y" or "z": what the spirals go round. A picture is wound round "z", which it lacks.
+        Axis of the spirals: "x", "y" or "z". An image is wound round "z", which it does not have.
     radial : str, optional
-        The axis of the exemplar that points outwards at an angle of 0. By default the one that follows ``axis`` in x, y,
-        z, x.
+        Axis of the exemplar that points outwards at an angle of 0. By default the one after ``axis`` in x, y, z, x.
     centre : sequence of float, optional
-        A point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
-        `Field.over`), the origin of an unbounded one.
+        Point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
+        `Field.over`), or the origin of an unbounded one.
     axes : int
         2 or 3.
 
     Returns
     -------
     Field
-        Its frames are rotations, about the axis.
+        Field of rotations about the axis.
 
     Raises
     ------
     InvalidInput
-        An angle beyond 360 degrees either way, not such axes, or not such a centre.
+        If the angle is beyond 360 degrees, or an axis or the centre is invalid.
 
     Examples
     --------
@@ -271,33 +272,33 @@ def spiral(
 def zigzag(
     period: float = 32, angle: float = 30, *, axis: str | None = None, plane: str = "xy", axes: int = 3
 ) -> Field:
-    """Return the field that turns the texture by an angle, and by its opposite, in alternate bands.
+    """Return the field that rotates the texture by an angle and by its opposite, in alternate bands.
 
-    Where floor(2 (p + 1/2) / period) along ``axis`` is even, the texture is turned by ``angle``, elsewhere by
-    ``-angle``: lines of the exemplar that run along ``axis`` become zigzags.
+    Where floor(2 (p + 1/2) / period) along ``axis`` is even, the texture is rotated by ``angle``, elsewhere by
+    ``-angle``. Lines of the exemplar along ``axis`` become zigzags.
 
     Parameters
     ----------
     period : float
-        Width of two bands, at least 2 voxels; in the unit of the spacing if one is stated.
+        Width of two bands, at least 2 voxels; in the unit of the spacing if one is given.
     angle : float
-        Degrees, as in `rotation`, within 360 either way.
+        Angle in degrees, as in `rotation`, -360 to 360.
     axis : str, optional
-        "x", "y" or "z": across the bands. By default the first of ``plane``.
+        Axis across the bands: "x", "y" or "z". By default the first of ``plane``.
     plane : str
-        Two of "x", "y" and "z": what turns, as in `rotation`.
+        Plane of rotation: two of "x", "y" and "z", as in `rotation`.
     axes : int
         2 or 3.
 
     Returns
     -------
     Field
-        Its frames are two rotations, in turn.
+        Field of two alternating rotations.
 
     Raises
     ------
     InvalidInput
-        A period that is not positive, an angle beyond 360 degrees either way, not such an axis, or another plane.
+        If the period is not positive, the angle is beyond 360 degrees, or the axis or the plane is invalid.
 
     Examples
     --------
@@ -317,30 +318,30 @@ def scale_ramp(
 ) -> Field:
     """Return the field whose features grow along an axis.
 
-    Features are ``start`` times as large at 0 and ``stop`` times at ``length``, by equal factors over equal ways
-    between, and constant beyond.
+    Features are ``start`` times as large at 0 and ``stop`` times at ``length``. The factor grows exponentially
+    between, and is constant beyond.
 
     Parameters
     ----------
     start, stop : float
         Size of the features, from 1/8 to 8.
     axis : str
-        "x", "y" or "z": along which they grow.
+        Axis of growth: "x", "y" or "z".
     length : float, optional
-        Voxels, or the unit of the spacing if one is stated; more than 0. By default up to the last voxel of a bounded output
-        (see `Field.over`), 128 of an unbounded one.
+        Length of the growth in voxels, or in the unit of the spacing if one is given; more than 0. By default up to
+        the last voxel of a bounded output (see `Field.over`), or 128 for an unbounded one.
     axes : int
         2 or 3.
 
     Returns
     -------
     Field
-        Its frames are multiples of the identity.
+        Field of multiples of the identity.
 
     Raises
     ------
     InvalidInput
-        A factor or a length out of range, or not such an axis.
+        If a factor, the length or the axis is invalid.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Fields in physical units: voxels need not be cubes."""
+"""Fields in physical units, for voxels that need not be cubes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _AXES = "(row, column)", "(plane, row, column)"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spaced(Field):
-    """A field in physical units, seen in voxels: with D = diag(spacing), its frames are D^-1 F D."""
+    """A field in physical units, converted to voxels: with D = diag(spacing), its frames are D^-1 F D."""
 
     field: Field
     spacing: tuple[float, ...]
@@ -38,7 +38,7 @@ class Spaced(Field):
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         step = np.array(self.spacing)
-        # An array of frames spreads over voxels, whatever these are.
+        # An array of frames covers voxels of any shape.
         at = points if self.field._placed_in_voxels else points * step
         return np.asarray(self.field._frames(at) * (step / step[:, np.newaxis])[..., np.newaxis])
 
@@ -53,7 +53,7 @@ class Spaced(Field):
 
 
 def space(field: Field, spacing: Sequence[float] | None) -> Field:
-    """Return a field for voxels of a spacing; the field itself for cubes of side 1, or if it has a spacing already."""
+    """Return a field for voxels of a spacing. Cubes of side 1, and fields with a spacing, are returned unchanged."""
     if isinstance(field, Spaced):
         return field
     steps = as_distances(spacing, field.axes)

@@ -1,10 +1,10 @@
-"""Pictures of volumes, and statistics of how like its exemplar a synthesised one is.
+"""Images of volumes, and statistics of the similarity of a synthesised volume to its exemplar.
 
-Pictures: `slices`, `oblique_slice`, `render_block`, `render_volume` (seen through), `turntable` and `Viewer` (a page with
-sliders). `label_to_color` gives labels colours, and `extract_surface` returns the triangles around one. `cubes` makes cubes of
-other voxels.
+Images: `slices`, `oblique_slice`, `render_block`, `render_volume` (transparent), `turntable` and `Viewer` (a page with
+sliders). `label_to_color` gives labels colours, and `extract_surface` returns the triangles around a label. `cubes`
+converts other voxels to cubes.
 
-Statistics, each of which can be used alone, most of them for pictures too; `compare` makes a report of them all:
+Statistics. Each can be used alone, most of them also for images. `compare` makes a report of all:
 
 ===========================  ===============================================================
 `classes`                    the colours of a texture's materials, and their shares

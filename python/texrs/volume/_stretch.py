@@ -1,4 +1,4 @@
-"""Volumes whose voxels are not cubes, as they are seen."""
+"""Display of volumes whose voxels are not cubes."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ __all__ = ["cubes", "find_cube"]
 
 
 def cubes(volume: ArrayLike, spacing: Sequence[float]) -> Array:
-    """Return a volume whose voxels are cubes, by repeating planes, rows and columns; no value is changed.
+    """Convert a volume to cubic voxels by repeating planes, rows and columns. No value changes.
 
     Parameters
     ----------
     volume : array_like
-        Shape (D, H, W) or (D, H, W, C).
+        Volume of shape (D, H, W) or (D, H, W, C).
     spacing : (plane, row, column) float
         Voxel size along each axis, in any unit. The smallest becomes the side of the cubes.
 
     Returns
     -------
     ndarray
-        In the volume's dtype; the volume itself if its voxels are cubes.
+        Volume in the same dtype; the volume itself if its voxels are cubes.
 
     Raises
     ------
     InvalidInput
-        Not a volume, or not such a spacing.
+        If the volume or the spacing is invalid.
 
     Examples
     --------
@@ -55,6 +55,6 @@ def cubes(volume: ArrayLike, spacing: Sequence[float]) -> Array:
 
 
 def find_cube(place: int, length: int, side: int) -> int:
-    """Return which of the cubes along an axis shows a plane: of ``length`` planes that have become ``side``."""
+    """Return the cube along an axis that shows a plane, when ``length`` planes became ``side`` cubes."""
     number = place + length if place < 0 else place
     return place if length == side or not 0 <= number < length else int((number + 0.5) * side / length)

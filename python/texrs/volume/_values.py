@@ -26,7 +26,10 @@ def drop_first(array: Array, axis: int, step: int) -> Array:
 
 
 def correlate(values: Array, reach: int, product: np.ufunc) -> NDArray[np.float64]:
-    """Return the mean product of values and those some steps further along each axis, (A, reach + 1); NaN beyond the ends."""
+    """Return the mean product of values and those a number of steps further along each axis, (A, reach + 1).
+
+    NaN beyond the ends.
+    """
     out = np.full((values.ndim, reach + 1), np.nan)
     for axis in range(values.ndim):
         for step in range(min(reach + 1, values.shape[axis])):
@@ -36,7 +39,7 @@ def correlate(values: Array, reach: int, product: np.ufunc) -> NDArray[np.float6
 
 
 def by_distance(curves: NDArray[np.float64], spacing: Sequence[float] | None) -> NDArray[np.float64]:
-    """Return curves over steps along each axis (A, N) as curves over distances of 0, 1, 2 ... times the smallest spacing."""
+    """Convert curves over steps along each axis (A, N) to curves over multiples of the smallest spacing."""
     steps, lags = np.array(as_distances(spacing, len(curves))), np.arange(curves.shape[1])
     if (steps == steps[0]).all():
         return curves
@@ -50,7 +53,7 @@ def turn_in_space(field: Field, points: ArrayLike, spacing: Sequence[float] | No
 
 
 def check_field(field: object, axes: int) -> Field | None:
-    """Check that a field, if there is one, has so many axes, and return it."""
+    """Check that a field, if given, has a number of axes, and return it."""
     if field is not None and (not isinstance(field, Field) or field.axes != axes):
         got = field if isinstance(field, Field) else type(field).__name__
         raise InvalidInput(f"field: needs a field of {axes} axes, got {got}")
@@ -58,14 +61,14 @@ def check_field(field: object, axes: int) -> Field | None:
 
 
 def guess_axes(image: Array) -> int:
-    """Return how many axes are taken not to be channels: up to 4 along the last one of three are channels."""
+    """Return the number of axes without channels. A last axis of up to 4 of three axes is taken for channels."""
     return {2: 2, 4: 3}.get(image.ndim, 2 if image.ndim == 3 and image.shape[-1] <= 4 else 3)
 
 
 def as_colours(image: ArrayLike, name: str, axes: int | None) -> Floats:
-    """Return the colours of a picture or a volume in [0, 1], channels last."""
+    """Return the colours of an image or a volume in [0, 1], channels last."""
     if axes is None:
-        with suppress(ValueError, TypeError):  # Of what is no array `as_image` tells.
+        with suppress(ValueError, TypeError):  # `as_image` reports values that are not arrays.
             image = as_ndarray(image, name, axes=3)
             axes = guess_axes(image)
     count = 3 if axes is None else axes
@@ -73,7 +76,7 @@ def as_colours(image: ArrayLike, name: str, axes: int | None) -> Floats:
 
 
 def as_values(values: ArrayLike, name: str = "values") -> Floats:
-    """Return values of one channel, finite, in 2-D or in 3-D."""
+    """Return finite values of one channel, in 2-D or in 3-D."""
     array = as_array(values, name, np.float32)
     if array.ndim not in (2, 3) or array.size == 0:
         raise InvalidInput(f"{name}: needs shape (H, W) or (D, H, W), got {array.shape}")
@@ -90,7 +93,7 @@ def as_region(mask: ArrayLike) -> Bools:
 
 
 def as_direction(value: object, name: str) -> NDArray[np.float64]:
-    """Return three numbers, for planes, rows and columns; a normal has a length."""
+    """Return three numbers, for planes, rows and columns. A normal must have a length."""
     out = try_array(value, np.float64)
     if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
         raise InvalidInput(f"{name}: needs three numbers (plane, row, column), got {str(value)[:60]}")

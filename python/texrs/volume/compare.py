@@ -1,4 +1,4 @@
-"""A report on how like its exemplar a synthesised picture or volume is."""
+"""Report on the similarity of a synthesised image or volume to its exemplar."""
 
 from __future__ import annotations
 
@@ -28,38 +28,38 @@ _REACH = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """What `compare` finds. Pairs are of the exemplar and of the output.
+    """Result of `compare`. Pairs are of the exemplar and the output.
 
     Attributes
     ----------
     shares : (2, K) float64
         Share of each class, from dark to light (or by label).
     particles : tuple of Particles
-        Pieces of the material that was chosen.
+        Connected pieces of the chosen material.
     frequency : tuple of float
         Mean spectral frequency of the slices.
     two_point : (2, A, 13) float64
         Two-point correlation of the chosen material, along each axis, by step.
     lineal_path : (2, A, 13) float64
-        Its lineal path.
+        Lineal path function of the chosen material.
     autocorrelation : (2, A, 13) float64
-        Of the lightness.
+        Autocorrelation of the lightness.
     isolated : tuple of float
         Share of voxels that differ from their surroundings.
     values : float
         Mean distance of the values of the slices from those of the exemplar, in [0, 1].
     seams : (2,) float64
-        Least and largest change from plane to plane of the output, over the median of its axis.
+        Minimum and maximum change from plane to plane of the output, divided by the median of its axis.
     orientation : (2, 2) float64 or None
-        Median and 90th percentile of the angle between the layers and where they should be, in degrees: of the
-        exemplar against its own normal, of the output against the field. None without a field.
+        Median and 90th percentile of the angle between the layers and their expected direction, in degrees. The
+        exemplar is compared with its own normal, and the output with the field. None without a field.
     turned : float or None
-        How far the field turns the exemplar's normal, in degrees on average: where it is 0 the orientation says
-        nothing.
+        Mean angle in degrees between the exemplar's normal before and after the field. If it is 0, the orientation has
+        no meaning.
     reuse : CellReuse or None
         Use of the exemplar. None without a source map.
     integrity : Integrity or None
-        How whole the elements are. None without a source map, or without separate elements.
+        Integrity of the elements. None without a source map, or without separate elements.
 
     Examples
     --------
@@ -89,12 +89,12 @@ class Comparison:
 
     @property
     def relative_shares(self) -> NDArray[np.float64]:
-        """Share of each class in the output over that in the exemplar, (K,)."""
+        """Share of each class in the output divided by that in the exemplar, (K,)."""
         return np.asarray(self.shares[1] / np.maximum(self.shares[0], 1e-30))
 
     @property
     def frequency_ratio(self) -> float:
-        """Frequency of the output over that of the exemplar; 1 is as fine, 0.5 twice as large."""
+        """Frequency of the output divided by that of the exemplar. 1 is equally fine, 0.5 twice as large."""
         return self.frequency[1] / self.frequency[0]
 
     @property
@@ -155,28 +155,27 @@ def compare(
     axes: int | None = None,
     spacing: Sequence[float] | None = None,
 ) -> Comparison:
-    """Return how a synthesised picture or volume compares with its exemplar.
+    """Compare a synthesised image or volume with its exemplar.
 
     Parameters
     ----------
     exemplar, output : array_like
-        (H, W[, C]) or (D, H, W[, C]), of one dtype and one number of channels, of any sizes of at least 16 a side.
+        (H, W[, C]) or (D, H, W[, C]), of one dtype and one number of channels, with sides of at least 16.
     source : SourceMap, optional
-        That of the output: adds what is reused, and whether elements are whole.
+        Source map of the output. It adds reuse, and the integrity of elements.
     field : Field, optional
-        What the output followed: adds the orientation of its layers, and says when neighbours are coherent. What it
-        leaves open is set by the size of the output (`texrs.fields.Field.over`).
+        Field of the output. It adds the orientation of its layers, and determines which neighbours are coherent. The
+        size of the output sets parameters that are not given (`texrs.fields.Field.over`).
     classes : int or None
-        How many classes of colour are made of the exemplar, 2 to 16; None: both arrays are labels, whole numbers
-        from 0 to 255 without channels.
+        Number of colour classes of the exemplar, 2 to 16. None: both arrays are labels, whole numbers from 0 to 255
+        without channels.
     chosen : int or tuple of int, optional
-        The classes or labels whose particles are counted; by default the lighter half of the classes, and of labels
-        all but 0.
+        Classes or labels whose pieces are counted. By default the lighter half of the classes, or all labels except 0.
     axes : int, optional
-        2 or 3; by default by the shape, up to 4 along the last of three axes are channels.
+        Number of axes, 2 or 3. By default from the shape: up to 4 along the last of three axes are channels.
     spacing : sequence of float, optional
-        Distances between samples along each axis, of both: correlations, paths, sizes and orientations are then those of
-        space, and the field is one of space. Frequencies stay in samples. Default: 1.
+        Distances between samples along each axis, for both. Correlations, paths, sizes and orientations are then in
+        space, and the field is in space. Frequencies stay in samples. Default: 1.
 
     Returns
     -------
@@ -186,7 +185,7 @@ def compare(
     Raises
     ------
     InvalidInput
-        Not two such arrays, or too small ones, or nothing chosen that is there.
+        If the arrays are invalid or too small, or no chosen class exists.
 
     Examples
     --------
@@ -258,7 +257,7 @@ def compare(
 def _turn_normal(
     field: Field, shape: tuple[int, ...], normal: NDArray[np.float64], spacing: Sequence[float] | None
 ) -> float:
-    """Return the mean angle between the exemplar's normal and where the field takes it."""
+    """Return the mean angle between the exemplar's normal and its direction after the field."""
     lines = [np.linspace(0, n - 1, min(n, 16)) for n in shape]
     frames = turn_in_space(field, np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1), spacing)
     there = np.einsum("...ji,j->...i", frames, normal)
@@ -267,7 +266,7 @@ def _turn_normal(
 
 
 def _share_range(first: Array, second: Array) -> tuple[Array, Array]:
-    """Bring floats to [0, 1] by the exemplar's range, where that goes beyond; integers have theirs."""
+    """Scale floats to [0, 1] by the exemplar's range if it is larger. Integers use the range of their dtype."""
     low, high = (float(f(first)) for f in (np.min, np.max))
     if first.dtype.kind != "f" or (low >= 0 and high <= 1):
         return first, np.clip(second, 0, 1) if second.dtype.kind == "f" else second

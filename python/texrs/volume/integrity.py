@@ -1,4 +1,4 @@
-"""Whether the separate elements of an exemplar are whole in what was made from it."""
+"""Integrity of the separate elements of an exemplar in a synthesised result."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from texrs.source_map import SourceMap
 __all__ = ["Integrity", "integrity"]
 
 FOLLOW = 1.6
-"""Neighbours whose places are farther apart than this many samples, with their frames, are of two pieces."""
+"""Maximum deviation in samples of neighbours' coordinates, after their frames, within one piece."""
 WHOLE, CRUMB = 0.9, 0.3
-"""A piece with more of its element is whole, and one with less a crumb."""
+"""Shares of an element: above the first a piece is whole, below the second it is a crumb."""
 LEAST = 40
-"""Points of a part that is judged by its colours."""
+"""Minimum number of points of a part whose colours are compared."""
 SECOND = 0.12
-"""Share of a part that a second colour has where it is of several."""
+"""Minimum share of a second colour for a part to have several colours."""
 
 
 @dataclass(frozen=True, slots=True)
 class Integrity:
-    """How whole elements are. Pairs are of the exemplar and of the output.
+    """Integrity of elements. Pairs are of the exemplar and the output.
 
     Attributes
     ----------
     contacts : tuple of float
-        Pairs of neighbours, in 1000 points, that lie in elements of other colours: there should be a border between.
+        Pairs of neighbours in elements of different colours, in 1000 points. There should be a border between them.
     largest : tuple of float
-        Share of the elements' points that lie in the largest part that hangs together.
+        Share of the elements' points in the largest connected part.
     mixed : tuple of float
-        Share of these parts that show several colours of elements.
+        Share of connected parts with several colours of elements.
     density : tuple of float
-        Parts in 100 000 points. Those that an end cuts are not counted, and the others so much more (Miles and Lantuéjoul):
-        a larger output does not seem to have fewer because less of it lies at its ends.
+        Parts in 100 000 points. Parts that a border cuts are not counted, and the others count more to compensate
+        (Miles and Lantuéjoul). The size of the output then does not matter.
     torn : float
-        Share of the output's points in elements whose piece has less than 0.9 of its element. Pieces at an end of the
-        output are not counted.
+        Share of the output's points in elements whose piece has less than 0.9 of its element. Pieces at a border of
+        the output are not counted.
     crumbs : float
         Pieces with less than 0.3 of their element, in 100 000 points.
 
@@ -67,26 +67,26 @@ class Integrity:
 
 
 def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -> Integrity | None:
-    """Measure whether the separate elements of an exemplar are whole in what was made from it.
+    """Measure whether the separate elements of an exemplar are whole in a result.
 
     Parameters
     ----------
     exemplar : (D, H, W), (D, H, W, C), (H, W) or (H, W, C) array, or Exemplar
-        What was looked up.
+        Exemplar of the result.
     source : SourceMap
-        Of the picture or the volume that was made from it alone.
+        Source map of an image or a volume that was made from this exemplar only.
     axes : int
-        Of an array, 2 or 3.
+        Number of axes of an array, 2 or 3.
 
     Returns
     -------
     Integrity or None
-        None where the exemplar has no separate elements (`texrs.Exemplar.instances`).
+        None if the exemplar has no separate elements (`texrs.Exemplar.instances`).
 
     Raises
     ------
     InvalidInput
-        Not an image.
+        If the exemplar is not an image.
 
     Examples
     --------
@@ -120,7 +120,7 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """The elements that a map shows: of each point its number, the samples that it shows, and connected parts."""
+    """Elements in a source map: the element of each point, its sample, and connected parts."""
 
     elements: NDArray[np.uint32]
     inside: NDArray[np.bool_]
@@ -147,7 +147,7 @@ class _Shown:
 
         total = 0.0
         for size, box in zip(self.sizes, ndimage.find_objects(self.parts), strict=True):
-            # So many places there are in which it would touch no end.
+            # Count the positions where the part would not touch a border.
             places = 1 if size >= LEAST else 0
             for side, length, cyclic in zip(box, self.parts.shape, self.wrap, strict=True):
                 whole = side.start > 0 and side.stop < length
@@ -156,7 +156,7 @@ class _Shown:
         return round(1e5 * total, 2)
 
     def count_contacts(self) -> float:
-        """Count the pairs of neighbours in elements of other colours, in 1000 points."""
+        """Return the pairs of neighbours in elements of different colours, in 1000 points."""
         total = 0
         for axis in range(self.elements.ndim):
             (p, q), (m, n) = (_pair(a, axis) for a in (self.elements, self.inside))
@@ -165,7 +165,7 @@ class _Shown:
         return round(total / self.elements.size * 1e3, 3)
 
     def measure_mixed(self) -> float:
-        """Return the share of parts in which a second colour has more than its share."""
+        """Return the share of parts whose second colour exceeds its share."""
         from scipy import ndimage
 
         judged = np.flatnonzero(self.sizes >= LEAST) + 1
@@ -191,7 +191,7 @@ class _Shown:
         for axis in range(self.elements.ndim):
             (p, q), (i, j) = (_pair(a, axis) for a in (self.elements, index))
             step = np.diff(source.coordinates, axis=axis)
-            # Around the ends of an exemplar that repeats, too.
+            # Continue across the borders of a periodic exemplar.
             sides = np.array(found.labels.shape)
             step = np.linalg.norm(np.minimum(np.abs(step), np.abs(sides - np.abs(step))), axis=-1)
             follow = (p > 0) & (p == q) & (step <= FOLLOW * np.maximum(_pair(reach, axis)[0], 1))
@@ -199,7 +199,7 @@ class _Shown:
         rows, columns = np.concatenate(edges, axis=1)
         graph = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(index.size,) * 2)
         pieces = connected_components(graph, directed=False)[1]
-        # A point stands for as much of the exemplar as its frame has room for.
+        # A point represents as much of the exemplar as its frame covers.
         worth = np.ones(index.size) if frames is None else np.abs(np.linalg.det(frames)).reshape(-1)
         inside = self.elements.reshape(-1) > 0
         sizes = np.bincount(pieces[inside], worth[inside], minlength=pieces.max() + 1)
@@ -228,6 +228,6 @@ def _average_elements(colours: Floats, found: Instances) -> Floats:
 
 
 def _pair(array: Array, axis: int) -> tuple[Array, Array]:
-    """Return each point but the last along an axis, and the next one."""
+    """Return each point except the last along an axis, and the next one."""
     n = array.shape[axis]
     return np.take(array, range(n - 1), axis), np.take(array, range(1, n), axis)

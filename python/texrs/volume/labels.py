@@ -1,4 +1,4 @@
-"""Volumes of labels: painted, and the surface of what a label marks."""
+"""Volumes of labels: colours of labels, and the surface of a label."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ __all__ = ["extract_surface", "label_to_color"]
 _GROUND = (233, 230, 222)
 _MOST_COLOURS = 2**16
 _GOLDEN = 0.6180339887498949
-"""Steps of hue that come back to none they were at."""
+"""Step of hue that never returns to an earlier hue."""
 
 
 def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uint8]:
-    """Return each label a colour, so that a picture shows it.
+    """Give each label a colour for display.
 
     Parameters
     ----------
     labels : array_like
         Bool or integers of at least 0, (H, W) or (D, H, W).
     colours : (K, 3) array_like, optional
-        uint8, in the order of the labels, which then are below K. By default 0 is light, and the others have colours
-        that differ; a label has the same colour in each volume.
+        Colours in uint8, in the order of the labels, which must then be below K. By default 0 is light, and the others
+        have different colours. A label has the same colour in every volume.
 
     Returns
     -------
     ndarray
-        Shape (..., 3), uint8.
+        Colours of shape (..., 3), uint8.
 
     Raises
     ------
     InvalidInput
-        Not labels, or a label without a colour.
+        If the values are not labels, or a label has no colour.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
     if colours is None:
         table = _make_table(min(largest + 1, _MOST_COLOURS))
         if largest >= len(table):
-            # Of very many labels some share a colour, though never that of the ground.
+            # Very many labels share some colours, but none shares the colour of the background.
             array = np.where(array < len(table), array, array % (_MOST_COLOURS - 1) + 1)
         return np.ascontiguousarray(table[array.astype(np.intp)])
     given = try_array(colours)
@@ -71,28 +71,28 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
 def extract_surface(
     mask: ArrayLike, *, spacing: Sequence[float] = (1, 1, 1), closed: bool = True
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
+    """Extract the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
 
     Parameters
     ----------
     mask : array_like
-        Bool or integers, (D, H, W): where the material is, as ``labels == 2``.
+        Mask of the material, bool or integers, (D, H, W), such as ``labels == 2``.
     spacing : sequence of 3 float
-        From plane to plane, row to row and column to column.
+        Distances between planes, rows and columns.
     closed : bool
-        Whether pieces that the border cuts are closed there, so that the surface has an inside.
+        If True, pieces that the border cuts are closed there, so that the surface has an inside.
 
     Returns
     -------
     vertices : (N, 3) float32
         Corners as x, y, z: columns, rows and planes times their spacing.
     faces : (M, 3) int64
-        Three corners each, counter-clockwise as seen from outside.
+        Three corners for each triangle, counter-clockwise as seen from outside.
 
     Raises
     ------
     InvalidInput
-        Not a mask of at least 2 voxels a side, or one without a surface.
+        If it is not a mask of at least 2 voxels a side, or has no surface.
 
     Examples
     --------
@@ -117,14 +117,14 @@ def extract_surface(
     if as_bool(closed, "closed"):
         solid = np.pad(solid, 1)
     if solid.all() or not solid.any():
-        raise InvalidInput("mask: is all of one kind, so that there is no surface")
+        raise InvalidInput("mask: is constant, so it has no surface")
     corners, faces, _, _ = marching_cubes(solid.astype(np.float32), 0.5, allow_degenerate=False)
     vertices = ((corners - (1 if closed else 0)) * steps)[:, ::-1]
     return np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int64)
 
 
 def _make_table(count: int) -> Array:
-    """Return colours of hues that go round by the golden section, of three brightnesses in turn."""
+    """Return colours with hues by the golden section, and three brightnesses in turn."""
     k = np.arange(count)
     hue = 6 * (k * _GOLDEN % 1)
     value = np.array([0.86, 0.66, 0.48])[k % 3]

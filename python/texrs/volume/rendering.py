@@ -1,4 +1,4 @@
-"""Pictures of volumes: slices, oblique cuts, a cube and a turntable."""
+"""Images of volumes: slices, oblique slices, a block and a turntable."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from texrs.volume._values import as_direction
 __all__ = ["oblique_slice", "render_block", "slices", "turntable"]
 
 _LARGEST = 4096
-"""Pixels a side of pictures of cubes."""
+"""Maximum pixels a side of images of blocks."""
 _MOST = 2**26
-"""Pixels of all pictures of a turntable."""
+"""Maximum total pixels of a turntable."""
 _MARGIN = 1.04
 _FINE = 3
 """Rays a pixel, along each side."""
 _BAND = 16
-"""Lines of pixels rendered at once."""
+"""Lines of pixels rendered at a time."""
 _LIGHT = np.array([0.86, 1.0, 0.72], np.float32)
-"""Brightness of faces across planes, rows and columns: the light falls from above."""
+"""Brightness of faces across planes, rows and columns. The light comes from above."""
 
 
 def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) -> Array:
@@ -40,22 +40,22 @@ def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) 
     Parameters
     ----------
     volume : array_like
-        Shape (D, H, W) or (D, H, W, C).
+        Volume of shape (D, H, W) or (D, H, W, C).
     at : sequence of 3 int, optional
-        Plane, row and column to cut at; by default the middle. Negative ones count from the end.
+        Plane, row and column of the slices. By default the middle. Negative numbers count from the end.
     gap : int
-        Pixels between the slices. They and what remains beside unequal slices are white (the largest value).
+        Pixels between the slices. These, and the rest next to unequal slices, are white (the largest value).
 
     Returns
     -------
     ndarray
-        In the volume's dtype. The first slice shows rows and columns, the second planes and columns, the third planes
-        and rows.
+        Image in the volume's dtype. The first slice shows rows and columns, the second planes and columns, the third
+        planes and rows.
 
     Raises
     ------
     InvalidInput
-        Not a volume, or a place outside it.
+        If the volume is invalid, or a place is outside it.
 
     Examples
     --------
@@ -90,33 +90,33 @@ def oblique_slice(
     size: int | Sequence[int] | None = None,
     interpolation: Interpolation = "linear",
 ) -> Array:
-    """Return the cut of a volume along any plane.
+    """Return an oblique slice of a volume along any plane.
 
     Parameters
     ----------
     volume : array_like
-        Shape (D, H, W) or (D, H, W, C).
+        Volume of shape (D, H, W) or (D, H, W, C).
     point : sequence of 3 float, optional
-        (plane, row, column) of a point of the cut, in voxels; by default the middle of the volume.
+        (plane, row, column) of a point of the slice, in voxels. By default the middle of the volume.
     normal : sequence of 3 float, optional
-        Direction that the cut is across. The picture's columns run along the volume's as well as they can, or along
-        its rows where the cut is across the columns.
+        Normal of the slice. The image's columns are as parallel to the volume's columns as possible, or to its rows if
+        the normal is along the columns.
     axes : (2, 3) array_like, optional
-        Instead of ``normal``: the steps of the picture's rows and of its columns, in voxels.
+        The steps of the image's rows and columns in voxels, instead of ``normal``.
     size : int or (rows, columns), optional
-        Of the picture, in pixels, whose middle is the point; by default all of the volume that is cut.
+        Size of the image in pixels, with the point in its middle. By default the whole slice.
     interpolation : {"linear", "cubic", "nearest"}
-        "nearest" for labels.
+        Interpolation. Use "nearest" for labels.
 
     Returns
     -------
     ndarray
-        In the volume's dtype; 0 outside it.
+        Image in the volume's dtype; 0 outside the volume.
 
     Raises
     ------
     InvalidInput
-        Not a volume, a point or a direction; or a cut that misses the volume.
+        If the volume, the point or the direction is invalid, or the slice misses the volume.
 
     Examples
     --------
@@ -161,32 +161,33 @@ def render_block(
     elevation: float = 30,
     interpolation: Interpolation = "linear",
 ) -> NDArray[np.uint8]:
-    """Return a picture of a volume as a block of its material, seen from its front, its right and above.
+    """Render a volume as a block of its material, seen from its front, its right and above.
 
-    The front is plane 0, as a picture shows it; to its right lies the last column, above it row 0.
+    The front is plane 0. To its right is the last column, and above it is row 0.
 
     Parameters
     ----------
     volume : array_like
-        Shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey; of more than 3 channels the first ones.
+        Volume of shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey. Only the first 3 of more
+        channels are shown.
     size : int
         Pixels of the longer side, 16 to 4096.
     azimuth : float
-        Degrees that the eye moves to the right; at 0 the front is seen alone.
+        Rotation of the view to the right in degrees. If 0, only the front is visible.
     elevation : float
-        Degrees that it moves up, within 90 either way.
+        Rotation of the view upwards in degrees, -90 to 90.
     interpolation : {"linear", "cubic", "nearest"}
-        Between voxels; "nearest" shows each as a square.
+        Interpolation between voxels. "nearest" shows each voxel as a square.
 
     Returns
     -------
     ndarray
-        Shape (rows, columns, 4), uint8: colours, and alpha 0 outside. Edges are smooth.
+        Image of shape (rows, columns, 4), uint8: colours, and alpha 0 outside. Edges are smooth.
 
     Raises
     ------
     InvalidInput
-        Not a volume, or not such angles.
+        If the volume or the angles are invalid.
 
     Examples
     --------
@@ -219,39 +220,41 @@ def turntable(
     overwrite: bool = True,
     progress: Progress | bool | None = None,
 ) -> None:
-    """Write an animated GIF of a volume that turns once, without end.
+    """Write an endless animated GIF of a rotating volume.
 
     Parameters
     ----------
     volume : array_like
-        Shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey; of more than 3 channels the first ones.
+        Volume of shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey. Only the first 3 of more
+        channels are shown.
     path : path_like
-        With the suffix .gif; written whole or not at all.
+        File with the suffix .gif. It is written completely or not at all.
     frames : int
-        Pictures of a turn, 2 to 360.
+        Number of images of a turn, 2 to 360.
     size : int
-        Side of the picture, 16 to 1024 pixels.
+        Side of the image, 16 to 1024 pixels.
     elevation : float
-        Degrees that the eye is above, within 90 either way.
+        Elevation of the view in degrees, -90 to 90.
     seconds : float
-        Length of a turn, in seconds.
+        Duration of a turn, in seconds.
     background : sequence of 3 int
-        Colour around, 0 to 255 each.
+        Colour of the background, 0 to 255 each.
     interpolation : {"linear", "cubic", "nearest"}
-        Between voxels; "nearest" shows each as a square.
+        Interpolation between voxels. "nearest" shows each voxel as a square.
     overwrite : bool
-        Whether a file that exists may be replaced.
+        If True, an existing file may be replaced.
     progress : callable or True, optional
-        Called with the name of the stage and the share that is done; raising stops the work. True shows a bar.
+        Called with the name of the stage and its completed share. An exception that it raises stops the work. True
+        shows a bar.
 
     Raises
     ------
     InvalidInput
-        Not a volume, or numbers beyond what is allowed.
+        If the volume is invalid, or a number is out of its range.
     LimitExceeded
-        More than 2^26 pixels in all.
+        If there are more than 2^26 pixels in total.
     FileError
-        Another suffix, or the file cannot be written.
+        If the suffix differs, or the file cannot be written.
 
     Examples
     --------
@@ -286,7 +289,7 @@ def turntable(
                 seen = _render(colours, _view(360 * i / count, above), (side, side), pixel, interpolation)
             alpha = seen[..., 3:] / np.float32(255)
             pictures.append(np.rint(seen[..., :3] * alpha + ground * (1 - alpha)).astype(np.uint8))
-        # One palette for all, for colours that change from picture to picture flicker.
+        # Use one palette for all images, because changing palettes flicker.
         few = Image.fromarray(np.concatenate(pictures[:: max(1, count // 6)]))
         palette = few.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
         images: list[Any] = []
@@ -303,7 +306,7 @@ def turntable(
 
 
 def check_cube(size: int = 512, azimuth: float = 40, elevation: float = 30) -> tuple[int, float, float]:
-    """Check what a block is to look like, before a volume is there; raises as `render_block` does."""
+    """Check the options of a block before the volume is read. Raises as `render_block` does."""
     turned = as_float(azimuth, "azimuth", -1e6, 1e6), as_float(elevation, "elevation", -90, 90)
     return as_int(size, "size", 16, _LARGEST), *turned
 
@@ -311,7 +314,7 @@ def check_cube(size: int = 512, azimuth: float = 40, elevation: float = 30) -> t
 def check_turntable(
     frames: int = 24, size: int = 320, elevation: float = 25, seconds: float = 4
 ) -> tuple[int, int, float, float]:
-    """Check what a turntable is to look like, before a volume is there; raises as `turntable` does."""
+    """Check the options of a turntable before the volume is read. Raises as `turntable` does."""
     count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
     above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
     if count * side * side > _MOST:
@@ -322,11 +325,11 @@ def check_turntable(
 def _render(
     colours: Floats, view: NDArray[np.float64], sides: tuple[int, int], pixel: float, interpolation: Interpolation
 ) -> NDArray[np.uint8]:
-    """Look along parallel rays at a block whose middle is that of the picture."""
+    """Cast parallel rays at a block in the middle of the image."""
     shape = np.array(colours.shape[:3])
     half, (down, right, forward) = shape / 2, view
     out = np.zeros((*sides, 4), np.uint8)
-    # A ray that is parallel to a face never meets it.
+    # A ray parallel to a face never meets it.
     slope = np.where(np.abs(forward) < 1e-6, 1e-6, forward)
     across = ((np.arange(sides[1] * _FINE) + 0.5) / _FINE - sides[1] / 2) * pixel
     for top in range(0, sides[0], _BAND):
@@ -356,7 +359,7 @@ def _render(
 
 
 def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
-    """Return the directions down, right and away from the eye, as (plane, row, column)."""
+    """Return the directions down, right and away from the viewer, as (plane, row, column)."""
     a, e = radians(azimuth), radians(elevation)
     return np.array(
         [
@@ -368,7 +371,7 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
 
 
 def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
-    """Return the steps of rows and columns on a plane, (2, 3): those given, or unit steps across a normal."""
+    """Return the steps of rows and columns on a plane, (2, 3): the given ones, or unit steps across a normal."""
     if (normal is None) == (axes is None):
         raise InvalidInput("normal, axes: needs one of the two")
     if axes is not None:
@@ -376,7 +379,7 @@ def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
         if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
             raise InvalidInput("axes: needs two directions of three numbers that are not parallel")
         return steps
-    # Of a normal along an axis they are those of a slice.
+    # A normal along an axis gives the steps of an ordinary slice.
     across = as_direction(normal, "normal")
     n = across / np.linalg.norm(across)
     along = np.eye(3)[2 if abs(n[2]) < 0.9 else 1]
@@ -389,7 +392,7 @@ def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
 def _clip_ray(
     steps: NDArray[np.float64], point: NDArray[np.float64], shape: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the least and the largest steps from the point that stay in the box."""
+    """Return the minimum and maximum number of steps from the point within the box."""
     corners = np.array(list(product((0, 1), repeat=3))) * (shape - 1)
     normal = np.cross(*steps)
     side = (corners - point) @ normal

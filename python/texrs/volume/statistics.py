@@ -1,7 +1,7 @@
-"""Statistics of the materials of a picture or a volume: their colours, their shares and how their pieces lie.
+"""Statistics of the materials of an image or a volume: colours, area fractions, and connected pieces.
 
-Values are brought to [0, 1] by the dtype, or, of floats beyond that, by their own range (`compare` uses one range for
-both of what it compares).
+Values are scaled to [0, 1] by the dtype, or floats beyond this by their own range (`compare` uses one range for both
+arrays).
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ __all__ = [
 ]
 
 _SAMPLE = 2**15
-"""Pixels that classes are found on."""
+"""Number of pixels that classes are computed from."""
 _RESTARTS, _TURNS = 6, 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Classes:
-    """Colours that stand for the materials of a texture, from dark to light.
+    """Colours that represent the materials of a texture, from dark to light.
 
     Attributes
     ----------
     centres : (K, C) float32
-        The mean colour of each, in [0, 1].
+        Mean colour of each class, in [0, 1].
 
     Examples
     --------
@@ -58,14 +58,14 @@ class Classes:
     __repr__ = brief
 
     def of(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.uint8]:
-        """Return the class of each pixel or voxel: the nearest centre; the lower one of two as near.
+        """Return the class of each pixel or voxel: the nearest centre, or the lower of two equally near ones.
 
         Parameters
         ----------
         image : (H, W[, C]) or (D, H, W[, C]) array_like
-            Of the channels of the exemplar.
+            Image with the channels of the exemplar.
         axes : int, optional
-            2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+            2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
 
         Returns
         -------
@@ -75,7 +75,7 @@ class Classes:
         Raises
         ------
         InvalidInput
-            Not a picture or a volume of finite numbers, or other channels.
+            If the image has other channels, or is not finite.
 
         Examples
         --------
@@ -98,19 +98,19 @@ class Classes:
         Parameters
         ----------
         image : (H, W[, C]) or (D, H, W[, C]) array_like
-            Of the channels of the exemplar.
+            Image with the channels of the exemplar.
         axes : int, optional
-            2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+            2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
 
         Returns
         -------
         (K,) float64
-            They sum to 1.
+            Shares with the sum 1.
 
         Raises
         ------
         InvalidInput
-            Not a picture or a volume of finite numbers, or other channels.
+            If the image has other channels, or is not finite.
 
         Examples
         --------
@@ -136,18 +136,18 @@ class Classes:
 
 @dataclass(frozen=True, slots=True)
 class ComponentStatistics:
-    """How many connected pieces of a material there are, and how large (see `component_statistics`).
+    """Number and sizes of the connected pieces of a material (see `component_statistics`).
 
     Attributes
     ----------
     count : int
-        Number of pieces of at least the least size.
+        Number of pieces of at least the minimum size.
     density : float
-        Pieces for each 100 000 pixels or voxels, or units of area or volume if a spacing was given.
+        Pieces in 100 000 pixels or voxels, or in 100 000 units of area or volume if a spacing was given.
     mean, median : float
-        Size, in pixels or voxels, or units of area or volume; NaN if there are none.
+        Size in pixels or voxels, or in units of area or volume. NaN without pieces.
     deciles : tuple of float
-        The nine sizes that 10 %, 20 % ... of the pieces are not above.
+        The nine sizes that 10 %, 20 % ... of the pieces do not exceed.
 
     Examples
     --------
@@ -171,24 +171,24 @@ class ComponentStatistics:
 
 
 def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
-    """Return the mean of the colour channels; transparency counts as mid grey.
+    """Return the mean of the colour channels. Transparent pixels count as mid grey.
 
     Parameters
     ----------
     image : (H, W[, C]) or (D, H, W[, C]) array_like
-        A picture or a volume, with or without channels.
+        Image or volume, with or without channels.
     axes : int, optional
-        2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+        2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
 
     Returns
     -------
     (H, W) or (D, H, W) float32
-        In [0, 1].
+        Lightness in [0, 1].
 
     Raises
     ------
     InvalidInput
-        Not a picture or a volume of finite numbers.
+        If it is not an image or a volume of finite numbers.
 
     Examples
     --------
@@ -203,26 +203,26 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
 
 
 def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> Classes:
-    """Return the colours that best stand for an exemplar's own (k-means), from dark to light.
+    """Find the colours that best represent an exemplar (k-means), from dark to light.
 
     Parameters
     ----------
     exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
-        A picture or a volume, with or without channels.
+        Image or volume, with or without channels.
     count : int
-        How many, 2 to 16. An exemplar of fewer colours has as many classes as colours.
+        Number of classes, 2 to 16. An exemplar of fewer colours has one class for each colour.
     axes : int, optional
-        2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+        2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
 
     Returns
     -------
     Classes
-        The colours; they tell the class of any pixel.
+        The colours, which classify any pixel.
 
     Raises
     ------
     InvalidInput
-        Not a picture or a volume of finite numbers, or a count out of range.
+        If it is not an image or a volume of finite numbers, or the count is out of range.
 
     Examples
     --------
@@ -252,27 +252,27 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
 def two_point_correlation(
     mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None
 ) -> NDArray[np.float64]:
-    """Return the two-point correlation S2 along each axis: how often both ends of a step are in a material.
+    """Return the two-point correlation S2 along each axis: the probability that both ends of a step are in a material.
 
     Parameters
     ----------
     mask : array_like
-        Bool, (H, W) or (D, H, W): where the material is.
+        Mask of the material, bool, (H, W) or (D, H, W).
     reach : int
-        Longest step in pixels, at least 1; one that is longer than a side is NaN there.
+        Longest step in pixels, at least 1. Steps longer than a side give NaN.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Column k is then a distance of k times the smallest of them, interpolated
-        between steps. Default: 1.
+        Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
+        interpolated between steps. Default: 1.
 
     Returns
     -------
     ndarray
-        Shape (A, reach + 1); at step 0 the material's share.
+        Curves of shape (A, reach + 1). Step 0 is the material's share.
 
     Raises
     ------
     InvalidInput
-        Not a mask of two or three axes, or a reach below 1.
+        If it is not a mask of two or three axes, or reach is below 1.
 
     Examples
     --------
@@ -289,27 +289,27 @@ def two_point_correlation(
 def lineal_path_function(
     mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None
 ) -> NDArray[np.float64]:
-    """Return the lineal path along each axis: how often all of a step, with its ends, is in a material.
+    """Return the lineal path function along each axis: the probability that a whole segment is in a material.
 
     Parameters
     ----------
     mask : array_like
-        Bool, (H, W) or (D, H, W).
+        Mask of the material, bool, (H, W) or (D, H, W).
     reach : int
-        Longest step in pixels, at least 1; one that is longer than a side is NaN there.
+        Longest step in pixels, at least 1. Steps longer than a side give NaN.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Column k is then a distance of k times the smallest of them, interpolated
-        between steps. Default: 1.
+        Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
+        interpolated between steps. Default: 1.
 
     Returns
     -------
     ndarray
-        Shape (A, reach + 1); at step 0 the material's share.
+        Curves of shape (A, reach + 1). Step 0 is the material's share.
 
     Raises
     ------
     InvalidInput
-        Not a mask of two or three axes, or a reach below 1.
+        If it is not a mask of two or three axes, or reach is below 1.
 
     Examples
     --------
@@ -333,26 +333,26 @@ def lineal_path_function(
 def component_statistics(
     mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | None = None
 ) -> ComponentStatistics:
-    """Return how many connected pieces a material has, of neighbours that share a side, and how large they are.
+    """Return the number and sizes of the connected pieces of a material. Neighbours share a side.
 
     Parameters
     ----------
     mask : array_like
-        Bool, (H, W) or (D, H, W).
+        Mask of the material, bool, (H, W) or (D, H, W).
     least : int
-        Pixels or voxels, at least 1; smaller pieces are grain and are not counted.
+        Minimum size of a piece in pixels or voxels, at least 1. Smaller pieces are grain and are not counted.
     spacing : sequence of float, optional
         Distances between samples along each axis. Sizes and the density are then in its unit. Default: 1.
 
     Returns
     -------
     ComponentStatistics
-        Their number, density and sizes.
+        Number, density and sizes of the pieces.
 
     Raises
     ------
     InvalidInput
-        Not a mask of two or three axes.
+        If it is not a mask of two or three axes.
 
     Examples
     --------
@@ -384,7 +384,7 @@ def component_statistics(
 def _find_means(
     points: Floats, weights: NDArray[np.float64], k: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], float]:
-    """Return k centres by Lloyd's turns, and the spread about them; starts are spread out by their distance."""
+    """Return k centres by Lloyd iterations, and their spread. Initial centres are spread by distance."""
     p = points.astype(np.float64)
     centres = p[rng.choice(len(p), 1, p=weights / weights.sum())]
     while len(centres) < k:

@@ -1,4 +1,4 @@
-"""Statistics of how the values of a picture or a volume are arranged: frequency, orientation, artefacts.
+"""Statistics of the arrangement of values in an image or a volume: frequency, orientation, artefacts.
 
 Each takes values of one channel, such as a `lightness`, in 2-D or in 3-D.
 """
@@ -29,33 +29,33 @@ __all__ = [
 ]
 
 _BAND = (1 / 30, 0.45)
-"""Cycles a voxel: longer waves are the trend of a slice, shorter ones its grain."""
+"""Frequencies in cycles a voxel. Lower ones are the trend of a slice, and higher ones its grain."""
 
 
 def autocorrelation(
     values: ArrayLike, reach: int = 12, *, spacing: Sequence[float] | None = None
 ) -> NDArray[np.float64]:
-    """Return the correlation of values with those some steps further, along each axis.
+    """Return the correlation of values with those a number of steps further, along each axis.
 
     Parameters
     ----------
     values : array_like
-        (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as a `lightness`.
     reach : int
-        Longest step in pixels, at least 1; one that is longer than a side is NaN there.
+        Longest step in pixels, at least 1. Steps longer than a side give NaN.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Column k is then a distance of k times the smallest of them, interpolated
-        between steps. Default: 1.
+        Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
+        interpolated between steps. Default: 1.
 
     Returns
     -------
     ndarray
-        Shape (A, reach + 1); 1 at step 0. One less this is the variogram over the variance.
+        Curves of shape (A, reach + 1), 1 at step 0. One minus this is the variogram divided by the variance.
 
     Raises
     ------
     InvalidInput
-        Not finite numbers of two or three axes, or a reach below 1.
+        If values are not finite numbers of two or three axes, or reach is below 1.
 
     Examples
     --------
@@ -75,28 +75,28 @@ def autocorrelation(
 def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = False) -> float:
     """Return the mean spectral frequency of a texture, in cycles a pixel.
 
-    Of each axis slice: it is cut into windows that overlap by half, under a Hann window; frequencies from 1/30 to
-    0.45 are weighted by their power. The result is the mean over the slices.
+    Each axis slice is cut into windows that overlap by half, with a Hann window. Frequencies from 1/30 to 0.45 are
+    weighted by their power. The result is the mean over the slices.
 
     Parameters
     ----------
     values : array_like
-        (H, W) or (D, H, W), such as a `lightness`. A picture is its own only slice.
+        Values (H, W) or (D, H, W), such as a `lightness`. An image is its own only slice.
     window : int, optional
-        Side of the windows, at least 16; by default 64, or the shortest side. What is compared needs the same.
+        Side of the windows, at least 16. Default: 64, or the shortest side. Compared values need the same windows.
     whole : bool
-        Whether the spectrum is that of the volume, not of its slices: turning the volume does not change it, where
-        slices see an oblique layer as wider.
+        If True, use the spectrum of the volume and not of its slices. It does not change when the volume is rotated,
+        but slices show an oblique layer as wider.
 
     Returns
     -------
     float
-        From 1/30 to 0.45; NaN where nothing changes.
+        Frequency from 1/30 to 0.45. NaN if all values are equal.
 
     Raises
     ------
     InvalidInput
-        Not finite numbers of two or three axes, a side below 16, or a window that is longer than a side.
+        If values are not finite numbers of two or three axes, a side is below 16, or a window is longer than a side.
 
     Examples
     --------
@@ -117,26 +117,26 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
 
 
 def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tuple[NDArray[np.float64], ...]:
-    """Return, for each axis, the mean change from each plane (or line) to the next, over the median of all.
+    """Return the mean change from each plane or line to the next along each axis, divided by the median.
 
-    Values far from 1 at regular places are the traces of an algorithm's lattice.
+    Values far from 1 at regular places are traces of an algorithm's lattice.
 
     Parameters
     ----------
     values : array_like
-        (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as a `lightness`.
     wrap : bool or one an axis
         Axes along which the last plane is followed by the first.
 
     Returns
     -------
     tuple of ndarray
-        For each axis one number a step: number i stands for that from plane i to plane i + 1.
+        One number a step for each axis. Number i belongs to the step from plane i to plane i + 1.
 
     Raises
     ------
     InvalidInput
-        Not finite numbers of two or three axes, or not such a choice of axes.
+        If values are not finite numbers of two or three axes, or wrap is invalid.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
     31
 
     """
-    # Of halves, for two values may differ by more than single precision can be; shares are the same.
+    # Use halves, because the difference of two values may exceed single precision. The ratios are the same.
     v = as_values(values) * np.float32(0.5)
     out = []
     for axis, cyclic in enumerate(as_wrap(wrap, axes=v.ndim)):
@@ -161,24 +161,24 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
 
 
 def speckle(values: ArrayLike, threshold: float = 0.35) -> float:
-    """Return the share of voxels (pixels) that differ from the median of their surroundings, 3 a side.
+    """Return the share of voxels or pixels that differ from the median of their neighbourhood, 3 a side.
 
     Parameters
     ----------
     values : array_like
-        (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as a `lightness`.
     threshold : float
-        By how much they differ at least, in the units of the values, from 0.
+        Minimum difference, in the units of the values, at least 0.
 
     Returns
     -------
     float
-        0 to 1.
+        Share from 0 to 1.
 
     Raises
     ------
     InvalidInput
-        Not finite numbers of two or three axes, or a negative threshold.
+        If values are not finite numbers of two or three axes, or the threshold is negative.
 
     Examples
     --------
@@ -205,21 +205,21 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
     Parameters
     ----------
     exemplar : array_like
-        (H, W) or (D, H, W), such as a `lightness`.
+        Values of the exemplar, (H, W) or (D, H, W), such as a `lightness`.
     values : array_like
-        Those of the output, (H, W) or (D, H, W).
+        Values of the output, (H, W) or (D, H, W).
     quantiles : int
-        How many are compared, 2 to 2^16.
+        Number of quantiles, 2 to 2^16.
 
     Returns
     -------
     ndarray
-        One number a slice, those across the first axis first; of a picture one number, of the whole.
+        One number a slice, slices across the first axis first. An image gives one number.
 
     Raises
     ------
     InvalidInput
-        Not finite numbers of two or three axes, or a number of quantiles out of range.
+        If values are not finite numbers of two or three axes, or the number of quantiles is out of range.
 
     Examples
     --------
@@ -240,24 +240,24 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
 
 
 def texture_normal(values: ArrayLike, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
-    """Return the direction in which an exemplar changes most, the normal of its layers.
+    """Return the direction of the largest change of an exemplar, the normal of its layers.
 
     Parameters
     ----------
     values : array_like
-        (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as a `lightness`.
     spacing : sequence of float, optional
-        Distances between samples along each axis. The direction is one of space. Default: 1.
+        Distances between samples along each axis. The direction is in space. Default: 1.
 
     Returns
     -------
     (A,) float64
-        Of length 1; its largest entry is positive.
+        Direction of length 1. Its largest entry is positive.
 
     Raises
     ------
     InvalidInput
-        Not finite numbers of two or three axes.
+        If values are not finite numbers of two or three axes.
 
     Examples
     --------
@@ -284,25 +284,25 @@ def orientation_errors(
     step: int = 1,
     spacing: Sequence[float] | None = None,
 ) -> Floats:
-    """Return the angle between the layers of a texture and where a field turns those of its exemplar.
+    """Return the angle between the layers of a texture and the exemplar's layers after a field.
 
-    The normal that is there is the main direction of the structure tensor (gradients of a Gaussian of sigma 1, summed
-    under one of sigma 4). The wanted one is J^T n, as normals go, for the exemplar's normal n.
+    The actual normal is the main direction of the structure tensor (gradients of a Gaussian of sigma 1, summed under
+    one of sigma 4). The expected one is J^T n, the transformation of normals, with the exemplar's normal n.
 
     Parameters
     ----------
     values : array_like
-        (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as a `lightness`.
     field : Field, optional
-        By default the identity.
+        Field of the texture. Default: the identity.
     normal : array_like, optional
-        n, (A,); by default `texture_normal` of the values themselves, which is that of an exemplar.
+        Normal n of the exemplar, (A,). By default `texture_normal` of the values themselves.
     margin : int
-        Pixels at the border that are left out: there the structure tensor sees too little.
+        Pixels at the border that are left out, because the structure tensor lacks data there.
     step : int
-        Every so many pixels along each axis are looked at.
+        Distance in pixels between measured points along each axis.
     spacing : sequence of float, optional
-        Distances between samples along each axis. The field, the normal and the angles are those of space. Default: 1.
+        Distances between samples along each axis. The field, the normal and the angles are in space. Default: 1.
 
     Returns
     -------
@@ -312,7 +312,7 @@ def orientation_errors(
     Raises
     ------
     InvalidInput
-        Another number of axes, or a normal of no length, or nothing within the margin.
+        If the number of axes differs, the normal has no length, or the margin leaves nothing.
 
     Examples
     --------
@@ -335,7 +335,9 @@ def orientation_errors(
     inner = (slice(edge, -edge or None, each),) * v.ndim
     tensor = _measure_structure(v, 4.0, spacing)[inner]
     out = np.empty(tensor.shape[: v.ndim], np.float32)
-    for i, plane in enumerate(tensor):  # A plane at once: a dense field of a large volume is many times its size.
+    for i, plane in enumerate(
+        tensor
+    ):  # Process a plane at a time: a dense field of a large volume is many times its size.
         found = np.linalg.eigh(plane)[1][..., -1]
         wanted = n
         if turned is not None:
@@ -365,14 +367,15 @@ def _measure_structure(v: Floats, sigma: float, spacing: Sequence[float] | None)
 
 
 def _average_frequency(arrays: list[Floats], side: int) -> float:
-    """Return the mean over some arrays of the mean frequency of each; NaN where none changes at all."""
+    """Return the mean over some arrays of the mean frequency of each. NaN if all are constant."""
     axes = arrays[0].ndim
     weights, square = np.ones((side,) * axes, np.float32), np.zeros((side,) * axes)
     for a in range(axes):
         line = (slice(None),) + (np.newaxis,) * (axes - 1 - a)
         weights *= np.hanning(side + 2)[1:-1][line].astype(np.float32)
         square += np.fft.fftfreq(side)[line] ** 2
-    # A real spectrum repeats itself: of the last axis half of it is enough, but for its ends twice.
+    # The spectrum of real data is symmetric. Keep half of the last axis, and count each column twice, except the first
+    # and (for even sides) the last.
     half = side // 2 + 1
     at = np.sqrt(square[..., :half])
     share = np.where((np.arange(half) == 0) | (2 * np.arange(half) == side), 1.0, 2.0)

@@ -1,8 +1,7 @@
-"""Volumes seen through: voxels that let light pass, added up from the front to the back along parallel rays.
+"""Transparent rendering of volumes: colours are accumulated from front to back along parallel rays.
 
-A transfer function says of each value which colour it shows, and how much of the light it keeps back. It is applied to the
-voxels and not between them, so that no colour is shown that no voxel has; surfaces where it changes are shaded, with the light
-over the eye's shoulder.
+A transfer function gives the colour of each value, and its opacity. It is applied to the voxels and not between them,
+so that no colour appears that no voxel has. Surfaces, where it changes, are shaded with light from behind the viewer.
 """
 
 from __future__ import annotations
@@ -24,24 +23,24 @@ from texrs.volume.rendering import _MARGIN, _view, check_cube
 __all__ = ["Stop", "parse_transfer", "render_volume"]
 
 Stop: TypeAlias = tuple[float, "str | Sequence[float] | None", float]
-"""A value, the colour that is shown there, and the share of the light that a voxel keeps back."""
+"""A value, its colour, and its opacity in one voxel."""
 
 _BAND = 32
-"""Lines of pixels rendered at once."""
+"""Lines of pixels rendered at a time."""
 _AT_ONCE = 16
-"""Steps along rays that are looked up at once."""
+"""Steps along rays that are looked up at a time."""
 _ENOUGH = np.float32(0.002)
-"""Share of the light below which nothing more is seen."""
+"""Share of the light below which nothing more is visible."""
 _AMBIENT = 0.55
-"""Brightness of what is turned away from the light."""
+"""Brightness of surfaces turned away from the light."""
 _LIGHT = (-0.45, -0.35, -0.82)
-"""Where it comes from: down, right and away from the eye."""
+"""Direction of the light: down, right and away from the viewer."""
 _LEVELS = 12
-"""Of each channel, for the colour that is taken for the ground."""
+"""Levels of each channel for the search of the background colour."""
 _NEAR, _FAR = 0.35, 0.75
-"""Shares of the largest difference from the ground at which voxels begin to be seen, and are wholly."""
+"""Shares of the largest difference from the background: voxels begin to be visible, and are fully visible."""
 _THICK = 8.0
-"""Voxels of things that are seen, of a hundred along the longest side, after which little light is left."""
+"""Number of visible voxels, of a hundred along the longest side, that absorb most of the light."""
 
 
 def render_volume(
@@ -53,40 +52,41 @@ def render_volume(
     transfer: str | Sequence[Stop] | None = None,
     shading: bool = True,
 ) -> NDArray[np.uint8]:
-    """Return a picture of a volume that is seen through, from the same side as by `cube`.
+    """Render a transparent volume, from the same side as `render_block`.
 
     Parameters
     ----------
     volume : array_like
-        Shape (D, H, W) or (D, H, W, C); of more than 3 channels the first ones, a fourth of which is transparency.
+        Volume of shape (D, H, W) or (D, H, W, C). Only the first 3 of more channels are shown; a fourth one is
+        transparency.
     size : int
         Pixels of the longer side, 16 to 4096.
     azimuth : float
-        Degrees that the eye moves to the right; at 0 the front is seen alone.
+        Rotation of the view to the right in degrees. If 0, only the front is visible.
     elevation : float
-        Degrees that it moves up, within 90 either way.
+        Rotation of the view upwards in degrees, -90 to 90.
     transfer : str or sequence of (value, colour, alpha), optional
-        Stops by rising value, between which colour and alpha change evenly. The value is the lightness, from 0 to 1 (of
-        integers all of their range, of floats beyond that their own); the colour is "#rrggbb", three numbers from 0 to 255,
-        or None, the voxel's own; alpha, from 0 to 1, is the share of the light that one voxel keeps back. As a text
-        ``value:colour:alpha,...``, as in ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. By default all is seen in its own colour that
-        differs from the most frequent one.
+        Stops by rising value. Colour and alpha change linearly between them. The value is the lightness, from 0 to 1
+        (the full range of integers, or the own range of floats beyond that). The colour is "#rrggbb", three numbers
+        from 0 to 255, or None for the voxel's own. Alpha, from 0 to 1, is the opacity of one voxel. A text has the
+        form ``value:colour:alpha,...``, as in ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. By default all voxels that differ
+        from the most frequent colour are shown in their own colour.
     shading : bool
-        Whether surfaces are shaded.
+        If True, surfaces are shaded.
 
     Returns
     -------
     ndarray
-        Shape (rows, columns, 4), uint8: colours, and alpha, 0 where nothing is seen.
+        Image of shape (rows, columns, 4), uint8: colours, and alpha, 0 where nothing is visible.
 
     Raises
     ------
     InvalidInput
-        Not a volume, or not such a transfer function.
+        If the volume or the transfer function is invalid.
 
     Notes
     -----
-    Front to back as Levoy has it [1]_, at every half voxel.
+    Front to back as in Levoy [1]_, at every half voxel.
 
     References
     ----------
@@ -119,7 +119,7 @@ def parse_transfer(text: str) -> list[Stop]:
     Raises
     ------
     InvalidInput
-        Not such a text.
+        If the text is invalid.
 
     Examples
     --------
@@ -141,7 +141,7 @@ def parse_transfer(text: str) -> list[Stop]:
 
 
 def check_transfer(transfer: str | Sequence[Stop] | None) -> NDArray[np.float64] | None:
-    """Check what is to be seen, before a volume is there; raises as `render_volume` does."""
+    """Check a transfer function before the volume is read. Raises as `render_volume` does."""
     return None if transfer is None else _as_stops(parse_transfer(transfer) if isinstance(transfer, str) else transfer)
 
 
@@ -177,7 +177,7 @@ def _as_colour(colour: object) -> tuple[float, float, float]:
 
 
 def _classify(voxels: NDArray[np.generic], stops: NDArray[np.float64] | None) -> Floats:
-    """Return what each voxel shows, (D, H, W, 4): colours times alpha, and alpha."""
+    """Return colours times alpha, and alpha, of each voxel, (D, H, W, 4)."""
     unit = to_unit(voxels[..., :3] if voxels.shape[-1] > 4 else voxels)
     clear = unit[..., -1] if voxels.shape[-1] in (2, 4) else None
     own = as_rgb(unit[..., :-1] if clear is not None else unit)
@@ -195,10 +195,10 @@ def _classify(voxels: NDArray[np.generic], stops: NDArray[np.float64] | None) ->
 
 
 def _set_apart(own: Floats) -> NDArray[np.float64]:
-    """Return how much of the light each voxel keeps back, by how far its colour is from the most frequent one."""
+    """Return the opacity of each voxel from the difference of its colour from the most frequent one."""
     flat = own.reshape(-1, 3)
     levels = np.minimum((flat * np.float32(_LEVELS)).astype(np.int64), _LEVELS - 1) @ np.array([_LEVELS**2, _LEVELS, 1])
-    # A colour may lie between two levels: neighbours along each channel count too.
+    # A colour may be between two levels, so neighbours along each channel count too.
     counts = np.bincount(levels, minlength=_LEVELS**3).reshape(_LEVELS, _LEVELS, _LEVELS)
     around = counts.copy()
     for axis in range(3):
@@ -218,28 +218,28 @@ def _set_apart(own: Floats) -> NDArray[np.float64]:
 
 
 def _shade(shown: Floats, view: NDArray[np.float64]) -> None:
-    """Darken colours where opacity rises towards the light's far side."""
+    """Darken colours where opacity rises towards the side away from the light."""
     alpha = shown[..., 3]
     slopes = [np.gradient(alpha, axis=k) if alpha.shape[k] > 1 else np.zeros_like(alpha) for k in range(3)]
     light = (np.array(_LIGHT)[:, np.newaxis] * view).sum(axis=0)
     light = light / np.sqrt((light**2).sum())
     steep = np.sqrt(slopes[0] ** 2 + slopes[1] ** 2 + slopes[2] ** 2)
-    # Opacity rises inwards: the normal goes the other way.
+    # Opacity rises inwards, so the normal has the opposite direction.
     towards = -(slopes[0] * np.float32(light[0]) + slopes[1] * np.float32(light[1]) + slopes[2] * np.float32(light[2]))
     facing = np.clip(towards / np.maximum(steep, np.float32(1e-6)), 0, 1)
-    # Where opacity hardly changes there is no surface, and nothing to shade.
+    # Surfaces to shade exist only where opacity changes clearly.
     sure = np.clip(steep / max(float(steep.max()) * 0.25, 1e-6), 0, 1)
     bright = 1 - sure * (1 - (np.float32(_AMBIENT) + np.float32(1 - _AMBIENT) * facing))
     shown[..., :3] *= bright[..., np.newaxis]
 
 
 def _look(shown: Floats, view: NDArray[np.float64], sides: tuple[int, int], pixel: float) -> NDArray[np.uint8]:
-    """Add up what parallel rays meet, from the front to the back, at every half voxel."""
+    """Accumulate parallel rays from front to back, at every half voxel."""
     from scipy.ndimage import maximum_filter
 
     shape = np.array(shown.shape[:3])
     half, (down, right, forward) = shape / 2, view
-    # Half a voxel of a share a of the light: two of them let through what one does.
+    # Convert opacity to half a voxel: two half voxels let through as much light as one voxel.
     thin = shown.copy()
     kept = 1 - np.sqrt(1 - np.minimum(shown[..., 3], np.float32(1)))
     thin[..., :3] *= np.where(shown[..., 3] > 0, kept / np.maximum(shown[..., 3], np.float32(1e-12)), 0)[
@@ -258,7 +258,7 @@ def _look(shown: Floats, view: NDArray[np.float64], sides: tuple[int, int], pixe
             [np.add.outer(along * down[k], across * right[k]) + (half[k] - 0.5) for k in range(3)], axis=-1
         ).reshape(-1, 3)
         total, light = np.zeros((len(eye), 4), np.float32), np.ones(len(eye), np.float32)
-        # Where rays enter and leave; one that is parallel to a face never meets it.
+        # Find where rays enter and leave. A ray parallel to a face never meets it.
         slope = np.where(np.abs(forward) < 1e-9, 1e-9, forward)
         ends = np.sort(np.stack([(-0.5 - eye) / slope, (shape - 0.5 - eye) / slope]), axis=0)
         enter, leave = ends[0].max(axis=-1), ends[1].min(axis=-1)

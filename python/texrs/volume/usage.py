@@ -1,4 +1,4 @@
-"""Which parts of the exemplar a synthesis uses, how often, and in how large pieces."""
+"""Parts of the exemplar that a synthesis uses: how often, and in how large pieces."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from texrs.volume._values import check_field
 __all__ = ["CellReuse", "cell_reuse", "coherence"]
 
 _CLOSE = 0.6
-"""Exemplar voxels that two neighbours may be off and still go on in one piece."""
+"""Maximum deviation in exemplar voxels of two neighbours within one piece."""
 
 
 @dataclass(frozen=True, slots=True)
 class CellReuse:
-    """How a synthesis uses its exemplar (see `cell_reuse`).
+    """Use of the exemplar by a synthesis (see `cell_reuse`).
 
     Attributes
     ----------
     coherent : float
-        Share of neighbours along the axes that go on in one piece of the exemplar.
+        Share of neighbours along the axes within one piece of the exemplar.
     largest : float
         Largest connected patch of such neighbours, as a share of the output.
     most_used : float
-        Use of the most used cell of the exemplar over the mean of all, 1 or more.
+        Use of the most used cell of the exemplar, divided by the mean; 1 or more.
     unused : float
-        Share of the cells that are not used at all.
+        Share of the cells that are never used.
 
     Examples
     --------
@@ -54,16 +54,16 @@ class CellReuse:
 
 
 def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
-    """Return where a voxel and the next along an axis go on in one piece: ``max |S(p + e) - S(p) - J e| < 0.6``.
+    """Return a mask of voxels in one piece with the next along an axis: ``max |S(p + e) - S(p) - J e| < 0.6``.
 
     Parameters
     ----------
     source : SourceMap
-        Of a picture or a volume.
+        Source map of an image or a volume.
     axis : int
-        Along which, from 0.
+        Number of the axis, from 0.
     field : Field, optional
-        Where J is taken from; by default from the map's own frames.
+        Field that J is taken from. By default the map's own frames.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
     Raises
     ------
     InvalidInput
-        Not a source map, an axis that it lacks, or a field of other axes.
+        If the source map or the axis is invalid, or the field has other axes.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
     here = tuple(slice(0, -1) if a == along else slice(None) for a in range(source.axes))
     there = tuple(slice(1, None) if a == along else slice(None) for a in range(source.axes))
     out: Bools = source.exemplar[here] == source.exemplar[there]
-    # A plane at once, for a dense field of a large volume is many times its size.
+    # Process a plane at a time: a dense field of a large volume is many times its size.
     for i in range(out.shape[0]):
         at = np.float32(0) if along else np.float32(1)
         first = source.coordinates[i][here[1:]]
@@ -98,26 +98,26 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
 
 
 def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) -> CellReuse:
-    """Return how a synthesis uses its exemplar.
+    """Measure how a synthesis uses its exemplar.
 
     Parameters
     ----------
     source : SourceMap
-        Of a picture or a volume, from one exemplar or several.
+        Source map of an image or a volume, from one exemplar or several.
     field : Field, optional
-        Where J is taken from; by default from the map's own frames.
+        Field that J is taken from. By default the map's own frames.
     cell : int
-        Side of the exemplar's cells, in voxels, at least 1. Cells that its border cuts count by what is left of them.
+        Side of the exemplar's cells, in voxels, at least 1. Cells that the border cuts count by their remaining size.
 
     Returns
     -------
     CellReuse
-        How coherent the output is, and how often each part of the exemplar is used.
+        Coherence of the output, and use of each part of the exemplar.
 
     Raises
     ------
     InvalidInput
-        Not a source map, or a field of other axes.
+        If the source map is invalid, or the field has other axes.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
 
 
 def _count_cell_use(source: SourceMap, number: int, side: int) -> Floats:
-    """Return the uses of a voxel of each cell of an exemplar, on average."""
+    """Return the mean number of uses of a voxel in each cell of an exemplar."""
     shape = np.array(source.shapes[number])
     cells = -(-shape // side)
     place = np.floor(source.coordinates[source.exemplar == number] + np.float32(0.5)).astype(np.int64)
@@ -154,7 +154,7 @@ def _count_cell_use(source: SourceMap, number: int, side: int) -> Floats:
 
 
 def _find_steps(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...], along: int) -> Floats:
-    """Return J e of the voxels of one plane."""
+    """Return J e for the voxels of one plane."""
     if field is not None:
         if field.constant is not None:
             return np.asarray(field.jacobians(np.zeros(source.axes))[:, along])
@@ -170,7 +170,7 @@ def _find_steps(source: SourceMap, field: Field | None, i: int, here: tuple[slic
 
 
 def _check(source: SourceMap, field: Field | None) -> Field | None:
-    """Return the field that J is taken from: the one that is given, or the map's own, where that is a field."""
+    """Return the field that J is taken from: the given one, or the map's own if it is a field."""
     if not isinstance(source, SourceMap):
         raise InvalidInput(f"source: needs a source map, got {type(source).__name__}")
     check_field(field, source.axes)

@@ -1,4 +1,4 @@
-"""A volume in a notebook or in a page of its own, slice by slice."""
+"""Viewer of a volume in a notebook or in its own page, slice by slice."""
 
 from __future__ import annotations
 
@@ -17,23 +17,22 @@ __all__ = ["Viewer"]
 
 
 class Viewer:
-    """A volume that shows itself in a notebook: a slice along each axis, moved by sliders.
+    """A volume that is shown in a notebook by a slice along each axis, with sliders.
 
-    Nothing is needed to look at it but a browser, neither a kernel nor a network; what it is shown by has at most about a
-    megabyte, for which large volumes are shown at every second voxel, or fewer. Results, exemplars and samples of volumes show
-    themselves so.
+    A browser is enough to view it, without a kernel or a network. The page has at most about a megabyte, so large
+    volumes are shown at every second voxel or fewer. Results, exemplars and samples of volumes are shown in this way.
 
     Parameters
     ----------
     volume : array_like or path_like
-        Shape (D, H, W) or (D, H, W, C); of other numbers of channels than 3 and 4 the first is shown.
+        Volume of shape (D, H, W) or (D, H, W, C). Only the first channel is shown unless there are 3 or 4.
     labels : bool
-        The values are labels: each is given a colour.
+        If True, the values are labels, and each gets a colour.
 
     Raises
     ------
     InvalidInput
-        Not a volume, or not labels.
+        If the volume or the labels are invalid.
 
     Examples
     --------
@@ -68,14 +67,14 @@ class Viewer:
         Parameters
         ----------
         path : path_like
-            With the suffix .html; written whole or not at all.
+            File with the suffix .html. It is written completely or not at all.
         overwrite : bool
-            Whether a file that exists may be replaced.
+            If True, an existing file may be replaced.
 
         Raises
         ------
         FileError
-            Another suffix, or the file cannot be written.
+            If the suffix differs, or the file cannot be written.
 
         Examples
         --------
