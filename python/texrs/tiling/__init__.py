@@ -301,7 +301,7 @@ def measure_unchanged(image: Array, given: Array) -> float:
     same = np.ones((rows, columns), bool)
     for channel in range(shown.shape[-1]):
         same &= shown[..., channel] == before[..., channel]
-    return round(float(same.sum()) / (image.shape[0] * image.shape[1]), 4)
+    return float(round(same.sum() / (image.shape[0] * image.shape[1]), 4))
 
 
 def _keeps_colours(image: Array | Exemplar | Material, screening: float) -> bool:
