@@ -146,7 +146,7 @@ def test_labels_by_hand(here: Path, capsys: Capture) -> None:
     before = files(here)
     capsys.readouterr()
     assert main(["design", "in.png", "--element-labels", "in.png", *TINY, "-o", "out.png"]) == 2
-    assert "in.png: needs integers of shape" in capsys.readouterr().err
+    assert "in.png: must be integers of shape" in capsys.readouterr().err
     assert files(here) == before
 
 

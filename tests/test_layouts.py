@@ -235,13 +235,19 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
             lambda: ElementAnalysis.of_labels(DOTS.image, 1 + np.arange(128 * 128).reshape(128, 128)),
             "separate elements need",
         ),
-        (lambda: texrs.splice(DOTS, replace(WALL, known=np.ones((160, 160), np.int32))), "layout.known: must be labels of shape"),
+        (
+            lambda: texrs.splice(DOTS, replace(WALL, known=np.ones((160, 160), np.int32))),
+            "layout.known: must be labels of shape",
+        ),
         (
             lambda: texrs.splice(DOTS, replace(WALL, known=np.full((160, 160), 2**31 - 1, np.int32))),
             "layout.known: must be labels of shape",
         ),
         (lambda: texrs.splice(DOTS, WALL, layout_scale=0), "layout_scale: needs a number"),
-        (lambda: texrs.splice(DOTS, WALL, layout_scale=1, method="paper"), "layout_scale: cannot be combined with method"),
+        (
+            lambda: texrs.splice(DOTS, WALL, layout_scale=1, method="paper"),
+            "layout_scale: cannot be combined with method",
+        ),
     ],
 )
 def test_what_is_no_layout_gets_a_sentence(make: Callable[[], object], words: str) -> None:

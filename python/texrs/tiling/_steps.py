@@ -23,7 +23,8 @@ USUAL = 95
 LONG = 0.25
 """Least length of a seam, as a share of the side that it crosses. Shorter seams are not measured."""
 MOST = 2048
-"""Maximum number of pairs of blocks of all seams at a level. If there are more, only every second, third or further pair is compared."""
+"""Maximum number of pairs of blocks of all seams at a level. If there are more, only every
+second, third or further pair is compared."""
 TINY = 0.002
 """Step that is not visible, in units of the guide. It is added to the steps at other places."""
 LEAST = 0.05
