@@ -1,4 +1,4 @@
-"""Materials: maps of one surface in register, which every verb takes for an example and gives back as a whole."""
+"""Materials: maps of one surface in register. Every verb takes them as examples and returns all their maps."""
 
 from texrs._lighting_correction import flatten_lighting
 from texrs.materials._applying import apply

@@ -1,4 +1,4 @@
-"""One map looked up through a source map as its name says, or as its values do."""
+"""Look-up of one map through a source map, according to its name or its values."""
 
 from __future__ import annotations
 
@@ -37,43 +37,46 @@ def apply(
     finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
-    """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
+    """Apply a source map to a map of the exemplar, with the finish of the verb that made it.
 
-    ``apply(result.source_map, exemplar)`` is ``result.image``, bit for bit, unless elements are lit again (`texrs.splice`).
-    Seams disappear, samples are interpolated, and known pixels are kept, in the same way. A map without a finish is not
-    corrected.
+    ``apply(result.source_map, exemplar)`` is ``result.image``, bit for bit, unless elements are lit again
+    (`texrs.splice`). Seams are corrected, samples are interpolated, and known pixels are kept, in the same way. A map
+    without a finish is not corrected.
 
     Parameters
     ----------
     source : SourceMap
-        Source map of a picture or a volume.
+        Source map of an image or a volume.
     exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one an exemplar
-        Any map of the exemplar's height and width (and depth), any dtype and channels. The name of a file gives its role, as
-        in a folder of maps (`texrs.materials.guess_role`). Each channel of a packed map is looked up by itself.
+        Any map of the exemplar's height and width (and depth), any dtype and channels. The name of a file gives its
+        role, as in a folder of maps (`texrs.materials.guess_role`). Each channel of a packed map is looked up by
+        itself.
     map_type : {"colour", "normal", "vector", "label"}, optional
-        "colour": also heights and all other values that may be mixed; if the finish removes uneven light, it does so here.
-        "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values without
-        a meaning between them; the nearest sample is taken, and nothing is corrected. Default: as the name of the file says;
-        without a role, "label" for integers that form regions of unrelated values, else "colour".
+        Type of the map. "colour": also heights and other values that may be mixed. If the finish removes uneven light,
+        it does so here. "normal", "vector": tangent-space normals, directions on the surface, as in
+        `SourceMap.render`. "label": values without a meaning between them. The nearest sample is used, and nothing is
+        corrected. Default: from the file name. Without a role: "label" for integers that form regions of unrelated
+        values, else "colour".
     green : {"up", "down"}, optional
-        Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: as the name of the file
-        says, else "up".
+        Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: from the file name,
+        else "up".
     finish : RenderOptions, optional
-        Another finish than that of the map.
+        Finish instead of the source map's own.
     progress : callable or True, optional
-        Called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a bar.
+        Called as ``progress("blend", share)`` during the seam correction. An exception that it raises stops the work.
+        True shows a bar.
 
     Returns
     -------
     array
-        Shape of the output with the map's channels, in the map's dtype.
+        Output with the map's channels, in the map's dtype.
 
     Raises
     ------
     InvalidInput
-        Another number of exemplars, or of another size, than the map was made from; an unknown type of map.
+        If the number or size of exemplars differs from the source map, or the type is unknown.
     FileError
-        A file cannot be read.
+        If a file cannot be read.
 
     See Also
     --------
@@ -107,7 +110,7 @@ def apply(
 
 
 def find_named(name: str | None, *, report: bool = False) -> Role | None:
-    """Return the role that the name of a file gives, alone or with the other names in its folder; report the latter."""
+    """Return the role in a file name, by itself or with the other names in its folder. Report the latter."""
     if name is None:
         return None
     file = FilePath(name)
@@ -121,7 +124,7 @@ def find_named(name: str | None, *, report: bool = False) -> Role | None:
 
 
 def find_packed(name: str | None) -> Role | None:
-    """Return the role that the name of a file gives if its channels are different quantities, and report it."""
+    """Return the role in a file name if its channels are different quantities, and report it."""
     role = find_named(name)
     if role is None or not role.packed:
         return None
@@ -133,7 +136,7 @@ def find_packed(name: str | None) -> Role | None:
 def look_up(
     source: SourceMap, several: Sequence[Map], finish: RenderOptions | None, watch: Callable[[float], object]
 ) -> Array:
-    """Return what a source map makes of one map of each exemplar: each group of channels as it must be, by the role."""
+    """Return a source map applied to one map of each exemplar. Each group of channels is treated by its role."""
     groups = list(zip(*(split_channels(each, source.axes) for each in several), strict=True))
     made = []
     for done, group in enumerate(groups):
@@ -151,7 +154,7 @@ def look_up(
 def choose_kind(
     name: str | None, pixels: Sequence[Array], axes: int, map_type: Kind | None = None, green: Green | None = None
 ) -> tuple[Kind, Green]:
-    """Return how a map is looked up: as stated, as the name of its file says, or as its values do; report the last two."""
+    """Return the look-up of a map: as stated, by its file name, or by its values. Report the last two."""
     if map_type is not None:
         as_choice(map_type, "map_type", ("colour", "normal", "vector", "label"))
     if green is not None:
@@ -177,7 +180,7 @@ def choose_kind(
 
 
 def find_kind(role: Role | None) -> Kind:
-    """Return how maps of a role are looked up."""
+    """Return the look-up of maps of a role."""
     if role is None:
         return "colour"
     if role.labelled:
@@ -188,7 +191,7 @@ def find_kind(role: Role | None) -> Kind:
 
 
 def choose_finish(finish: RenderOptions, name: str | None) -> RenderOptions:
-    """Return a finish that removes uneven light from colours alone."""
+    """Return a finish that removes uneven light from colours only."""
     role = find_named(name)
     return (
         replace(finish, flatten_lighting=False)

@@ -1,4 +1,4 @@
-"""The maps of a material as the files of a convention: its names, its packings and its direction of y."""
+"""Arrangement of a material's maps as the files of a convention: its names, its packings and its direction of y."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from texrs.materials._surface import list_signed
 __all__ = ["arrange_maps"]
 
 SAME = {"smoothness": "roughness", "reflectance": "metallic", "emissiveness": "emission"}
-"""Quantities that mean the same as another."""
+"""Quantities with the same meaning as another."""
 METAL, DULL = 255, 10
-"""Reflectance of labPBR, of 255: of metal in the colour of its albedo, and of other surfaces (4 %)."""
+"""Reflectance of labPBR, of 255: metal with the colour of its albedo, and other surfaces (4 %)."""
 ANY = "material"
-"""The name of a material that has none, if a convention needs one."""
+"""Name of a material without a name, if a convention needs one."""
 
 
 def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]:
-    """Return the files of a convention by name. A map whose role the convention has keeps its pixels.
+    """Return the files of a convention by name. Maps whose role is in the convention keep their pixels.
 
-    A quantity that the convention has no file for is a map of its own, under its own name.
+    A quantity without a file in the convention becomes a map of its own, under its own name.
     """
     convention, name = CONVENTIONS[key], _name_set(maps, key)
     plain = unpack_maps(make_plain(maps))
@@ -41,7 +41,7 @@ def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]
     kept: set[Role] = set()
     covered: set[str] = set()
     built: set[str] = set()
-    # Files that the material has come first, so that none is made of them.
+    # Existing files come first, so that they are not derived from others.
     for file in sorted(convention.files, key=lambda file: file.role not in roles):
         stem = convention.start + (name + file.end).lstrip("_")
         words = _find_words(file.role) | ({"opacity"} if file.opacity else set())
@@ -119,7 +119,7 @@ def _list_all(plain: Mapping[str, Map], axes: int) -> dict[str, Map]:
 
 
 def _make_file(file: File, found: Mapping[str, Map], shape: tuple[int, ...], stem: str) -> Map | None:
-    """Return the map of a file from the quantities that there are."""
+    """Return the map of a file, from the existing quantities."""
     role = file.role
     if role is Role.COLOUR:
         colour = found.get("colour")
@@ -135,7 +135,7 @@ def _make_file(file: File, found: Mapping[str, Map], shape: tuple[int, ...], ste
         shares[word] = replace(found[word], pixels=(found[word].pixels + 1) / 2)
     made = join(shares, role, shape, stem)
     if role in (Role.LABPBR_NORMAL, Role.LABPBR_SPECULAR) and made.pixels.dtype != np.uint8:
-        # Its codes are those of 8 bits.
+        # The codes are those of 8 bits.
         made = replace(made, pixels=to_pixels(to_share(made.pixels), np.dtype(np.uint8)))
     return made
 

@@ -1,4 +1,4 @@
-"""The conventions of tools and libraries: the names of their files, and what each channel of a file holds."""
+"""Conventions of tools and libraries: file names, and the content of each channel."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """Names and packings that belong together. If several files have one quantity, the first is written."""
+    """Names and packings that belong together. If several files contain one quantity, the first is written."""
 
     title: str
     files: tuple[File, ...]
@@ -38,7 +38,7 @@ class Convention:
 
 
 def _list(text: str) -> tuple[File, ...]:
-    """Return the files of a line for each: the end of the name, the role, and "+ opacity" if the alpha holds it."""
+    """Return the files from lines: the end of the name, the role, and "+ opacity" if alpha is the opacity."""
     files = []
     for line in text.strip().splitlines():
         end, role, *more = line.split()
@@ -154,7 +154,7 @@ _Emissive emission
 """),
     ),
 }
-"""By the words of ``--convention``."""
+"""Conventions by the words of ``--convention``."""
 LETTERS = {file.end[1:].lower(): file.role for file in CONVENTIONS["unreal"].files} | {
     "bc": Role.COLOUR,
     "s": Role.OTHER,
@@ -172,12 +172,12 @@ MEANINGS = {
 
 
 def as_convention(value: object, name: str) -> str:
-    """Check the word for a convention.
+    """Return the convention with a name.
 
     Raises
     ------
     InvalidInput
-        The convention is not known.
+        If the convention is not known.
 
     """
     if not isinstance(value, str) or value not in CONVENTIONS:
@@ -198,17 +198,17 @@ def list_conventions() -> str:
 
 
 def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
-    """Return the roles of the files of a folder by their names, and how those were found that no name says alone.
+    """Return the roles of the files of a folder by their names, and the source of uncertain roles.
 
-    Words at the end of a name count first (see `guess_role`). Then short ends count if other files make them clear, as in
-    Unreal (``T_Rock_N``) and labPBR (``stone``, ``stone_n``, ``stone_s``). Last, a name with which others begin is that of the
-    colours (``rock`` next to ``rock_normal``).
+    Words at the end of a name count first (see `guess_role`). Then short ends count if other files make them clear, as
+    in Unreal (``T_Rock_N``) and labPBR (``stone``, ``stone_n``, ``stone_s``). Last, a name that is the beginning of
+    others is the colour map (``rock`` next to ``rock_normal``).
     """
     found = {stem: each[0] for stem in stems if (each := find_role(stem)) is not None}
     why: dict[str, str] = {}
     bases = {stem: _cut(stem) for stem in stems}
     shared = Counter(base for base in bases.values() if base)
-    # Letters that follow each other, as in shot_a, shot_b and shot_d, are numbers.
+    # Consecutive letters, as in shot_a, shot_b and shot_d, are numbers.
     ends = {stem: words[-1][1] for stem in stems if (words := split_name(stem))}
     doubtful = {bases[s] for s, end in ends.items() if len(end) == 1 and end not in LETTERS and s not in found}
     for stem in stems:
@@ -230,7 +230,8 @@ def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
     plain = [stem for stem in stems if stem not in found and shared[stem] and Role.COLOUR not in found.values()]
     for stem in plain[:1]:
         found[stem], why[stem] = Role.COLOUR, "the other maps go on from its name"
-    # A word in the middle counts if no other file has its role: rock_albedo_wet, not rock_color_chart next to rock_color.
+    # A word in the middle counts if no other file has its role: rock_albedo_wet, not rock_color_chart next to
+    # rock_color.
     pairs = zip(min(stems, default=""), max(stems, default=""), strict=False)
     common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     common = common[: max(common.rfind(sign) for sign in "_-. ") + 1]
@@ -247,14 +248,14 @@ def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
 
 
 def report_guesses(why: Mapping[str, str], roles: Mapping[str, Role], said: Collection[str]) -> None:
-    """Report the roles that no name says alone, except those that the caller states."""
+    """Report the roles that one name alone does not give, except those that the caller states."""
     for name, reason in why.items():
         if name not in said:
             assume(f"{name}: read as {roles[name].value} ({reason})")
 
 
 def cut_name(file: str) -> str:
-    """Return the name of a file without the word for its map, so that all files of a material have the same."""
+    """Return the name of a file without the word of its map, the same for all files of a material."""
     found, words = find_role(file), split_name(file)
     if found is not None:
         return (file[: found[1]].rstrip("_-. ") + file[found[2] :]).lstrip("_-. ")
@@ -262,7 +263,7 @@ def cut_name(file: str) -> str:
 
 
 def _cut(stem: str) -> str:
-    """Return a name without the word for its map, or ""."""
+    """Return a name without the word of its map, or ""."""
     found, words = find_role(stem), split_name(stem)
     place = found[1] if found else words[-1][0] if len(words) > 1 else 0
     return stem[:place].rstrip("_-. ")

@@ -1,4 +1,4 @@
-"""Maps in another depth: the same light, directions, shares and labels, encoded as readers of the file expect.
+"""Maps in another depth: the same light, directions, shares and labels, encoded as readers of the format expect.
 
 * Colours and emission are sRGB as integers, and linear light as floats. Their alpha is a share in both.
 * Components of normals and vectors, -1 to 1, are 0 to the maximum as integers. Floats stay as they are.
@@ -26,23 +26,23 @@ __all__ = ["choose_dtype", "convert"]
 SPREAD = (Role.HEIGHT, Role.OTHER)
 """Roles whose values have no fixed range."""
 WHOLE = 2**24
-"""Single precision holds all whole numbers up to this one."""
+"""Largest whole number up to which single precision holds all."""
 
 
 def choose_dtype(dtype: np.dtype[Any], depth: int | None) -> np.dtype[Any]:
-    """Return the dtype of a depth: integers of 8 or 16 bits, floats of 32; the same one without a depth."""
+    """Return the dtype of a depth: integers of 8 or 16 bits, floats of 32. Without a depth the dtype is unchanged."""
     if depth is None or dtype == np.bool_:
         return dtype
     return np.dtype(np.float32 if depth == 32 else f"u{depth // 8}")
 
 
 def convert(name: str, each: Map, depth: int | None, axes: int = 2) -> Map:
-    """Return a map in a depth, and in the space that a reader of its dtype expects.
+    """Return a map in a depth, in the colour space that readers of its dtype expect.
 
     Raises
     ------
     InvalidInput
-        Labels are larger than the dtype can hold.
+        If labels are larger than the dtype allows.
 
     """
     pixels, dtype = each.pixels, choose_dtype(each.pixels.dtype, depth)
@@ -70,7 +70,7 @@ def keep_labels(name: str, pixels: Array, dtype: np.dtype[Any]) -> Array:
 
 
 def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any], axes: int) -> Floats:
-    """Return values in the other space; alpha is a share in both."""
+    """Return values in the other colour space. Alpha stays a share."""
     clear = each.pixels.shape[axes:] in ((2,), (4,))
     light = to_light(each.pixels, each.space)
     if clear:
@@ -86,12 +86,12 @@ def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any], axes: int) 
 
 
 def to_float(pixels: Array, dtype: np.dtype[Any]) -> Array:
-    """Return integers as shares of their range, and floats as they are."""
+    """Return integers as shares of their range. Floats are unchanged."""
     return to_pixels(pixels, dtype) if pixels.dtype.kind == "f" else to_unit(pixels)
 
 
 def read_vectors(pixels: Array, role: Role) -> Floats:
-    """Return signed integers as floats: of normals and vectors -1 to 1, of others shares."""
+    """Return signed integers as floats: -1 to 1 for normals and vectors, shares for others."""
     if role.normal or role is Role.VECTOR:
         return np.asarray(pixels / np.float32(np.iinfo(pixels.dtype).max), np.float32)
     return to_unit(pixels)

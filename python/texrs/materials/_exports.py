@@ -1,4 +1,4 @@
-"""What a material is shown and written as."""
+"""Display and files of a material."""
 
 from __future__ import annotations
 
@@ -25,40 +25,41 @@ class Exports(Mapping[str, Map]):
     @property
     @abstractmethod
     def axes(self) -> int:
-        """2 for pictures, 3 for volumes."""
+        """2 for images, 3 for volumes."""
 
     @property
     @abstractmethod
     def weights(self) -> Mapping[str, float]:
-        """What was said of how much maps count when decisions are made."""
+        """Given weights of maps for decisions."""
 
     def preview(
         self, *, tiles: tuple[int, int] = (2, 2), light: tuple[float, float] = (135.0, 45.0), side: int = 2048
     ) -> NDArray[np.uint8]:
-        """Return a picture of the material under a light, seen from straight above.
+        """Render an image of the material under a light, seen from straight above.
 
-        Colours, normals (heights where there are none), roughness, metal, occlusion, emission and opacity all count; without
-        colours the surface is grey. A flat, dull surface shows its own colours; what is transparent is shown over squares.
+        Colours, normals (or heights without normals), roughness, metallic, occlusion, emission and opacity are used.
+        Without colours the surface is grey. A flat, dull surface shows its own colours. Transparent parts are shown
+        over squares.
 
         Parameters
         ----------
         tiles : (int, int)
-            How often the material is shown, down and across: more than once shows whether it wraps.
+            Number of repetitions down and across. More than one shows whether the material is tileable.
         light : (float, float)
-            Where the light comes from, in degrees: counter-clockwise from the right, which makes 135 the upper left; and how
-            high above the surface, 1 to 90.
+            Direction of the light in degrees: counter-clockwise from the right, so 135 is the upper left; and
+            elevation above the surface, 1 to 90.
         side : int
-            Pixels that the longer side of the picture may have; what is larger is averaged.
+            Maximum pixels of the longer side of the image. Larger materials are averaged.
 
         Returns
         -------
         (H, W, 3) uint8 array
-            sRGB.
+            Image in sRGB.
 
         Raises
         ------
         InvalidInput
-            A volume, or something else that cannot be shown.
+            If it is a volume, or cannot be shown.
 
         Examples
         --------
@@ -84,28 +85,29 @@ class Exports(Mapping[str, Map]):
         convention: str | None = None,
         mipmaps: bool = False,
     ) -> list[FilePath]:
-        """Write each map to a file, all or none.
+        """Write all maps to files, or none.
 
         A map that was read from a file gets the name of that file, others get their own name.
 
         Parameters
         ----------
         folder : path_like
-            Made where it is missing; files of these names are replaced.
+            Folder, created if needed. Files with these names are replaced.
         depth : {8, 16, 32}, optional
-            Bits of each sample: integers of 8 or 16, floats of 32. By default those of each map.
+            Bits of each sample: integers of 8 or 16, floats of 32. By default the bits of each map.
         suffix : str, optional
-            Of all files, such as ``".tif"``, which says the format; by default PNG, or TIFF and EXR for what it cannot hold.
+            Suffix of all files, such as ``".tif"``, which selects the format. By default PNG, or TIFF and EXR for maps
+            that PNG cannot hold.
         pack : {"orm", "none"}, optional
-            "orm" writes occlusion, roughness and metallic, as far as there are any, to one file ``orm`` as red, green and blue.
-            "none" writes each quantity of packed maps to a file of its own. By default maps stay as they are.
+            "orm" writes occlusion, roughness and metallic, if present, to one file ``orm`` as red, green and blue.
+            "none" writes each quantity of packed maps to its own file. By default maps are not repacked.
         convention : str, optional
-            Names, packings and direction of y: "ambientcg", "polyhaven", "gltf", "unreal", "unity", "urp", "hdrp", "labpbr",
-            "substance" or "substance-unreal". By default the names and packings of the maps that were read.
+            Names, packings and direction of y: "ambientcg", "polyhaven", "gltf", "unreal", "unity", "urp", "hdrp",
+            "labpbr", "substance" or "substance-unreal". By default those of the maps that were read.
         mipmaps : bool
-            Whether each map is also written in half, a quarter, ... of its size, until each side is 1, to the folder
-            ``mipmaps``: ``albedo.1.png``, ``albedo.2.png``, ... Colours are averaged as light, normals keep their length,
-            labels and masks are not mixed.
+            If True, each map is also written at a half, a quarter, ... of its size, until each side is 1. The folder
+            is ``mipmaps``: ``albedo.1.png``, ``albedo.2.png``, ... Colours are averaged as light, normals keep their
+            length, and labels and masks are not mixed.
 
         Returns
         -------
@@ -115,14 +117,14 @@ class Exports(Mapping[str, Map]):
         Raises
         ------
         FileError
-            A file cannot be written. What was there is as it was.
+            If a file cannot be written. Existing files are unchanged.
         InvalidInput
-            Another depth, way to pack or convention, or values that the format cannot hold.
+            If the depth, the packing or the convention is invalid, or the format cannot hold the values.
 
         Warns
         -----
         InputWarning
-            The convention has no file for a channel of a packed map.
+            If the convention has no file for a channel of a packed map.
 
         Examples
         --------
@@ -162,19 +164,19 @@ class Exports(Mapping[str, Map]):
         return pack_maps(self, self.axes) if pack == "orm" else unpack_maps(self)
 
     def save_exr(self, path: Path, *, depth: Literal[16, 32] | None = None) -> FilePath:
-        """Write all maps to one EXR file, a layer each, that `Material.read` reads again.
+        """Write all maps to one EXR file, each as a layer, for `Material.read`.
 
-        The channels of ``albedo`` are ``albedo.R``, ``albedo.G`` and ``albedo.B``, those of normals end in X, Y and Z, others
-        in Y. As everywhere in EXR, colours are linear light: sRGB is decoded. The header keeps roles, spaces and dtypes, so
-        that integers of up to 16 bit, labels and linear floats come back to the bit.
+        The channels of ``albedo`` are ``albedo.R``, ``albedo.G`` and ``albedo.B``. Names of normals end in X, Y and Z,
+        others in Y. Colours are linear light, as in all EXR files: sRGB is decoded. The header stores roles, spaces
+        and dtypes, so that integers of up to 16 bit, labels and linear floats are restored to the bit.
 
         Parameters
         ----------
         path : path_like
-            With the suffix .exr.
+            File with the suffix .exr.
         depth : {16, 32}, optional
-            Bits of the floats that are written, and then come back as such; by default those that hold what is there. Labels
-            are always whole numbers.
+            Bits of the floats that are written, which are then also read. By default enough for the values. Labels are
+            always whole numbers.
 
         Returns
         -------
@@ -184,9 +186,9 @@ class Exports(Mapping[str, Map]):
         Raises
         ------
         FileError
-            Another suffix, or the file cannot be written. A former file is unchanged.
+            If the suffix differs, or the file cannot be written. An existing file is unchanged.
         InvalidInput
-            A volume, another depth, or values that EXR cannot hold whole.
+            If it is a volume, the depth is invalid, or EXR cannot hold the values exactly.
 
         Examples
         --------
@@ -213,22 +215,23 @@ class Exports(Mapping[str, Map]):
         repeat: int = 2,
         depth: Literal[8, 16] = 8,
     ) -> list[FilePath]:
-        """Write a glTF 2.0 scene that shows the material on a plane and on a sphere.
+        """Write a glTF 2.0 scene with the material on a plane and on a sphere.
 
-        The material is that of the standard: base colours with opacity as alpha, occlusion, roughness and metal packed as red,
-        green and blue, normals with y up (those of DirectX are turned; heights give them where there are none), emission,
-        also brighter than white. It repeats without a step where it wraps.
+        The material follows the standard. Base colours have opacity as alpha. Occlusion, roughness and metallic are
+        packed as red, green and blue. Normals have y up (DirectX normals are converted, and heights replace missing
+        normals). Emission may be brighter than white. It repeats without a step if it is tileable.
 
         Parameters
         ----------
         path : path_like
-            With the suffix .glb, one file; or .gltf, with a .bin and the pictures beside it (``stones_basecolor.png``, ...).
+            File with the suffix .glb, one file; or .gltf, with a .bin and the images next to it
+            (``stones_basecolor.png``, ...).
         shapes : sequence of {"plane", "sphere"}
-            What it is shown on, from the left to the right.
+            Shapes that show it, from left to right.
         repeat : int
-            How often along each side of the plane and from pole to pole, 1 to 64.
+            Number of repetitions along each side of the plane and from pole to pole, 1 to 64.
         depth : {8, 16}
-            Bits of the pictures. Some viewers read 8 alone.
+            Bits of the images. Some viewers read 8 only.
 
         Returns
         -------
@@ -238,9 +241,9 @@ class Exports(Mapping[str, Map]):
         Raises
         ------
         FileError
-            Another suffix, or a file cannot be written. What was there is as it was.
+            If the suffix differs, or a file cannot be written. Existing files are unchanged.
         InvalidInput
-            A volume, or another shape, number or depth.
+            If it is a volume, or a shape, number or depth is invalid.
 
         Examples
         --------
@@ -260,18 +263,19 @@ class Exports(Mapping[str, Map]):
         return write_gltf(self, path, shapes, repeat, depth)
 
     def save_materialx(self, path: Path, *, depth: Literal[8, 16, 32] | None = None) -> list[FilePath]:
-        """Write a MaterialX document: a standard surface whose inputs are the maps, in files beside it.
+        """Write a MaterialX document: a standard surface with the maps as inputs, in files next to it.
 
-        Normals have y up (those of DirectX are turned; heights give them where there are none); heights displace the surface
-        as far as fits the normals, on a surface as wide as the picture is shown once. Occlusion, which renderers work out
-        themselves, and what a surface has no input for, are left out.
+        Normals have y up (DirectX normals are converted, and heights replace missing normals). Heights displace the
+        surface by the amount that fits the normals, on a surface as wide as one repetition. Occlusion, which renderers
+        compute, and maps without an input in the surface are left out.
 
         Parameters
         ----------
         path : path_like
-            With the suffix .mtlx. Maps are named after it and after themselves: ``stones.mtlx``, ``stones_albedo.png``.
+            File with the suffix .mtlx. Names of maps are its name and their own: ``stones.mtlx``,
+            ``stones_albedo.png``.
         depth : {8, 16, 32}, optional
-            Bits of each sample of the maps: integers of 8 or 16, floats of 32. By default those of each map.
+            Bits of each sample of the maps: integers of 8 or 16, floats of 32. By default the bits of each map.
 
         Returns
         -------
@@ -281,9 +285,9 @@ class Exports(Mapping[str, Map]):
         Raises
         ------
         FileError
-            Another suffix, or a file cannot be written. What was there is as it was.
+            If the suffix differs, or a file cannot be written. Existing files are unchanged.
         InvalidInput
-            A volume, another depth, or no map that a surface has.
+            If it is a volume, the depth is invalid, or no map is an input of a surface.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""A material in one EXR file, a layer a map.
+"""A material in one EXR file, each map as a layer.
 
 ================ ================================ ===========================================================
 Role             Channels of the layer            Values
@@ -9,9 +9,9 @@ labels           Y                                whole numbers of 32 bit
 more than 4      0, 1, 2, ...                     as above, also normals without z that have 3 or 4 channels
 ================ ================================ ===========================================================
 
-Linear floats are kept as they are. Roles, spaces, dtypes and weights stand in the header, so that integers come back to the
-bit: those of 8 bit are half floats in the file, those of 16 bit floats. Files of other programs are read by the names of
-layers.
+Linear floats are stored unchanged. Roles, spaces, dtypes and weights are in the header, so that integers are restored
+to the bit. 8-bit integers are half floats in the file, and 16-bit integers are floats. Files of other programs are
+read by the names of layers.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ __all__ = ["read_exr", "write_exr"]
 NAMES = ("Y", "YA", "RGB", "RGBA")
 VECTORS = ("X", "XY", "XYZ", "XYZA")
 ORDER = "RGBXYZUVWA"
-"""In which letters of channels follow each other."""
+"""Order of the letters of channels."""
 PASSES = {
     **dict.fromkeys(["combined", "beauty", "rgba", "rgb", "image", "noisyimage"], Role.COLOUR),
     **dict.fromkeys(["indexob", "indexma", "objectid", "materialid"], Role.LABELS),
@@ -54,11 +54,11 @@ PASSES = {
 }
 """Roles of the layers of renderers, Blender's first, by their names without capitals; other names are as in folders."""
 PICTURE = "colour"
-"""The map whose channels belong to no layer."""
+"""Map whose channels are in no layer."""
 
 
 def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: Mapping[str, float]) -> FilePath:
-    """Write each map as a layer, and in the header what values cannot say."""
+    """Write each map as a layer. The header stores the other properties."""
     target = as_path(path)
     if target.suffix.lower() != ".exr":
         raise FileError(f"{path}: layers are written to .exr, not to {target.suffix!r}")
@@ -85,7 +85,7 @@ def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: M
 
 
 def name_channels(role: Role, count: int) -> list[str]:
-    """Return what the channels of a map are called."""
+    """Return the channel names of a map."""
     if count > 4 or (role.bare and count > 2):
         # The third channel of normals without z is not their z.
         return [str(k) for k in range(count)]
@@ -94,7 +94,7 @@ def name_channels(role: Role, count: int) -> list[str]:
 
 
 def store(name: str, pixels: Array, each: Map, depth: int | None) -> Array:
-    """Return values as a layer holds them: float16, float32, or uint32 for labels."""
+    """Return values in the type of a layer: float16, float32, or uint32 for labels."""
     kind, size = pixels.dtype.kind, pixels.dtype.itemsize
     if kind != "f" and (each.role is Role.LABELS or (each.role is Role.MASK and size == 4)):
         return pixels.astype(np.int32 if kind == "i" else np.uint32).view(np.uint32)
@@ -107,14 +107,14 @@ def store(name: str, pixels: Array, each: Map, depth: int | None) -> Array:
         return (pixels / largest * (2 if kind == "u" else 1) - (1 if kind == "u" else 0)).astype(wanted)
     light = to_light(pixels, each.space)
     if each.space == "srgb" and pixels.shape[-1] in (2, 4):
-        # Transparency is a share, whatever colours are encoded in.
+        # Transparency is a share, for any encoding of colours.
         light[..., -1:] = to_light(pixels[..., -1:], "linear")
     stored = light.astype(wanted)
     return multiply(stored, name) if each.role.coloured and has_alpha(stored) else stored
 
 
 def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Array:
-    """Return the values that a layer was made of."""
+    """Return the original values from a layer."""
     if stored.dtype == np.uint32:
         return stored.view(np.int32).astype(dtype) if dtype.kind == "i" else stored.astype(dtype)
     if role.coloured and has_alpha(stored):
@@ -136,7 +136,7 @@ def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Arra
 
 
 def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role], dict[str, float]]:
-    """Return the maps of a file, a layer each, the roles that were said of them, and the weights."""
+    """Return the maps of a file, one for each layer, their given roles, and the weights."""
     channels, words = read_layers(path)
     known = parse(words, channels)
     full_names = {id(pixels): full for full, pixels in channels.items()}
@@ -194,7 +194,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
 
 
 def split_layer(name: str, letters: Mapping[str, Array]) -> dict[str, dict[str, Array]]:
-    """Return the picture of a layer, and each other channel, such as a depth, under a name of its own."""
+    """Return the image of a layer, and each other channel, such as a depth, under its own name."""
     picture = next((p for p in ("RGBA", "YA") if p[0] in letters and not {"X", "Y"} <= letters.keys()), None)
     if picture is None:
         return {name: dict(letters)}
@@ -204,7 +204,7 @@ def split_layer(name: str, letters: Mapping[str, Array]) -> dict[str, dict[str, 
 
 
 def guess_pass(name: str, pixels: Array) -> tuple[Role | None, str]:
-    """Return the role of a layer of another program, and what was assumed; or None, and the reason."""
+    """Return the role of a layer of another program, and the assumption; or None, and the reason."""
     word = re.sub(r"[^a-z0-9]", "", name.rpartition(".")[2].lower())
     if word.startswith("crypto"):
         return None, "Cryptomatte is not read"
@@ -247,7 +247,7 @@ def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
 
 
 def parse(words: str | None, there: Container[str]) -> dict[str, dict[str, Any]]:
-    """Return what the header says of maps and their channels; nothing if it says something else."""
+    """Return the description of maps and their channels in a header, or nothing if it has another content."""
     try:
         maps = json.loads(words or "{}").get("maps", {})
         for each in maps.values():

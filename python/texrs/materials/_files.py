@@ -1,4 +1,4 @@
-"""Folders of maps: read by the usual names, written under the same ones."""
+"""Folders of maps: read by their usual names, written under the same names."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from texrs.source_map._vectors import stores_z
 __all__ = ["read_maps", "write_maps"]
 
 DOCUMENTS = (".txt", ".md", ".json", ".html", ".htm", ".pdf", ".csv", ".yaml", ".yml", ".toml", ".url")
-"""Suffixes of files that describe maps and never are maps."""
+"""Suffixes of files that describe maps and are not maps."""
 SYSTEM = ("thumbs.db", "desktop.ini")
 """Files of file managers that are not hidden."""
 NAMED = 8
 """Maximum number of names in a notice."""
 PRIMARIES = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
-"""White, red, green and blue of sRGB: x and y of each."""
+"""White, red, green and blue of sRGB, as x and y of each."""
 LOSSY = (".jpg", ".jpeg")
-"""Suffixes of files whose channels are not kept exactly."""
+"""Suffixes of lossy formats."""
 FULL = 255
-"""The third channel of normals whose z is not stored."""
+"""Value of the third channel of normals whose z is not stored."""
 MOST = 64
-"""Maps that a material may have."""
+"""Maximum number of maps in a material."""
 AT_ONCE = 4
-"""Files that are written at once."""
+"""Number of files that are written in parallel."""
 SMALLER = "mipmaps"
-"""Folder of what is not a map of the material itself, so that reading finds maps of one size."""
+"""Folder of mipmaps, so that reading finds maps of one size."""
 
 
 def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Map], set[str]]:
-    """Return the maps of a folder, by their names without what is common to all, and those whose role is given."""
+    """Return the maps of a folder by their names without the common part, and the maps with a given role."""
     path, there = list_places(path)
     files, left = list_files(there, axes)
     stems = {name: split_suffix(name)[0] for name in files}
@@ -94,7 +94,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
 
 
 def list_files(places: Iterable[FilePath], axes: int) -> tuple[dict[str, FilePath], dict[str, list[str]]]:
-    """Return the files that may be maps, by name, and the names of all others by the reason."""
+    """Return the files that may be maps, by name, and the names of all others by reason."""
     files: dict[str, FilePath] = {}
     formats, inner = list[str](), list[str]()
     known = READ_IMAGES if axes == 2 else READ_VOLUMES
@@ -124,7 +124,7 @@ def split_suffix(name: str, known: Sequence[str] = READ) -> tuple[str, str]:
 
 
 def show_names(names: Sequence[str]) -> str:
-    """Return names on one line, and how many more there are."""
+    """Return names on one line, and the number of further names."""
     shown = ", ".join(names[:NAMED])
     return shown if len(names) <= NAMED else f"{shown} and {len(names) - NAMED} more"
 
@@ -148,7 +148,7 @@ def describe_unused(left: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def read_map(file: FilePath, role: Role, axes: int) -> Map:
-    """Return the map in a file; its colours are encoded as the file states, or as is usual."""
+    """Return the map in a file. Its colours are encoded as the file states, or as usual."""
     pixels = (io.read if axes == 2 else io.read_volume)(file)
     space = find_space(role, pixels.dtype)
     if role.coloured:
@@ -177,7 +177,7 @@ def restore_z(file: FilePath, pixels: Array) -> Array:
 
 
 def report_colours(file: Path, notes: io.Metadata, space: Space) -> None:
-    """Report the colour space that a file states, if it is not sRGB."""
+    """Report the colour space in a file if it is not sRGB."""
     stated = []
     if notes.profile is not None and (title := name_profile(notes.profile)) is not None:
         stated.append(f"the ICC profile {title!r}")
@@ -191,7 +191,7 @@ def report_colours(file: Path, notes: io.Metadata, space: Space) -> None:
 
 
 def name_profile(profile: bytes) -> str | None:
-    """Return what an ICC profile calls itself, unless it is sRGB."""
+    """Return the name of an ICC profile, unless it is sRGB."""
     from PIL import ImageCms
 
     title = "unknown"
@@ -202,7 +202,7 @@ def name_profile(profile: bytes) -> str | None:
 
 
 def list_places(path: Path | Sequence[Path]) -> tuple[Path, list[FilePath]]:
-    """Return a folder and the files in it; of a list of files, their folder and the files."""
+    """Return a folder and its files, or the folder of a list of files and the files."""
     if not isinstance(path, list | tuple):
         folder = as_path(cast(Path, path))
         if not folder.is_dir():
@@ -218,7 +218,7 @@ def list_places(path: Path | Sequence[Path]) -> tuple[Path, list[FilePath]]:
 
 
 def shorten(names: list[str]) -> list[str]:
-    """Return names without what all of them begin with, up to a place where words part.
+    """Return names without their common beginning, up to a word boundary.
 
     Examples
     --------
@@ -244,7 +244,7 @@ def write_maps(
     suffix: str | None = None,
     mipmaps: bool = False,
 ) -> list[FilePath]:
-    """Write each map under its name; all files take their names when all are written."""
+    """Write each map under its name. All files get their names after all are written."""
     place = as_path(folder)
     smaller = place / SMALLER
     for needed in (place, smaller) if mipmaps else (place,):
@@ -274,13 +274,13 @@ def write_maps(
 
 
 def prepare(name: str, each: Map, file: FilePath) -> Array:
-    """Return values as the format of a file has them: in EXR files colours are multiplied by alpha."""
+    """Return values in the convention of the format: EXR files have colours multiplied by alpha."""
     multiplied = file.suffix.lower() == ".exr" and each.role.coloured and has_alpha(each.pixels)
     return multiply(each.pixels, name) if multiplied else each.pixels
 
 
 def choose_suffix(each: Map, depth: int | None, axes: int = 2) -> str:
-    """Return the format that keeps a map as it is: PNG for 8 and 16 bit of up to four channels, TIFF or EXR for the rest."""
+    """Return the format that keeps a map exactly: PNG for 8 and 16 bit of up to four channels, TIFF or EXR for others."""
     shape, dtype = each.pixels.shape, choose_dtype(each.pixels.dtype, depth)
     if axes == 3 or (len(shape) == 3 and shape[-1] > 4):
         return ".tif"

@@ -1,7 +1,8 @@
-"""A material as glTF 2.0 that viewers open: on a plane and on a sphere, in one .glb, or with its pictures beside it.
+"""A material as glTF 2.0 for viewers: on a plane and on a sphere, in one .glb, or with its images next to it.
 
-As the standard has it (sections 3.9 and 3.7.2): base colours in sRGB with opacity as their alpha; occlusion, roughness and
-metal as red, green and blue of one picture; normals with y up; tangents whose w is 1, for nothing is mirrored.
+According to the standard (sections 3.9 and 3.7.2), base colours are in sRGB with opacity as their alpha. Occlusion,
+roughness and metallic are red, green and blue of one image. Normals have y up, and tangents have w = 1, because
+nothing is mirrored.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ VERTICES, INDICES = 34962, 34963
 LINEAR, MIPMAPS, REPEAT = 9729, 9987, 10497
 BEAM = "KHR_materials_emissive_strength"
 APART = 1.15
-"""From the middle to the middle of each shape, where there are two."""
+"""Distance of the centres of two shapes."""
 WORDS = {"VEC2": 2, "VEC3": 3, "VEC4": 4, "SCALAR": 1}
 
 
@@ -77,7 +78,7 @@ def write_shapes(
     *,
     apart: float = 0.0,
 ) -> list[FilePath]:
-    """Write shapes and their materials, whose textures are pictures by number, and return the files."""
+    """Write shapes and their materials, whose textures are image numbers, and return the files."""
     suffix = target.suffix.lower()
     document, data = lay_out(shapes, materials, target.stem, apart)
     files: dict[FilePath, bytes] = {}
@@ -104,7 +105,7 @@ def write_shapes(
         files[target] = json.dumps(document, indent=1).encode()
     else:
         files[target] = pack(json.dumps(document, separators=(",", ":")).encode(), data)
-    # What is opened first takes its name last: the document, when all that it names is there.
+    # The document, which is opened first, gets its name last, after all files that it names.
     order = list(files)[::-1]
     with ExitStack() as stack:
         for file in order:
@@ -113,7 +114,7 @@ def write_shapes(
 
 
 def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the pictures of a material by name, and the material whose textures are these, by number from the first."""
+    """Return the images of a material by name, and the material whose textures are their numbers from the first."""
     maps = make_plain(maps)
     pictures: dict[str, Array] = {}
     rough: dict[str, Any] = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0], "metallicFactor": METAL, "roughnessFactor": ROUGH}
@@ -163,7 +164,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
 
 
 def to_depth(values: Floats, depth: int) -> Array:
-    """Return shares as integers of so many bits."""
+    """Return shares as integers of a number of bits."""
     kind = np.dtype(f"u{depth // 8}")
     return np.rint(np.clip(values, 0, 1) * np.float64(np.iinfo(kind).max)).astype(kind)
 
@@ -171,7 +172,7 @@ def to_depth(values: Floats, depth: int) -> Array:
 def lay_out(
     shapes: Sequence[tuple[str, Mesh]], materials: Sequence[dict[str, Any]], name: str, apart: float
 ) -> tuple[dict[str, Any], bytes]:
-    """Return a document of the shapes, side by side, and the buffer of their vertices."""
+    """Return a document with the shapes side by side, and the buffer of their vertices."""
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": f"texrs {__version__}"},
         "scene": 0,
@@ -211,7 +212,7 @@ def lay_out(
         primitive = {"attributes": numbers, "indices": indices, "material": mesh.material}
         before = next((mesh for mesh in document["meshes"] if mesh["name"] == shape), None)
         if before is not None:
-            # Another material of the same shape.
+            # This is another material of the same shape.
             before["primitives"].append(primitive)
             continue
         document["meshes"].append({"name": shape, "primitives": [primitive]})
@@ -223,7 +224,7 @@ def lay_out(
 
 
 def describe(array: NDArray[Any], kind: str, view: int, bounds: bool) -> dict[str, Any]:
-    """Return an accessor of all of a view."""
+    """Return an accessor of a whole view."""
     count = array.size // WORDS[kind]
     found: dict[str, Any] = {
         "bufferView": view,
@@ -239,12 +240,12 @@ def describe(array: NDArray[Any], kind: str, view: int, bounds: bool) -> dict[st
 
 
 def pad(data: bytes, by: bytes) -> bytes:
-    """Return bytes up to a multiple of four."""
+    """Return bytes padded to a multiple of four."""
     return data + by * (-len(data) % 4)
 
 
 def pack(document: bytes, data: bytes) -> bytes:
-    """Return a .glb of a document and its buffer."""
+    """Return a .glb from a document and its buffer."""
     parts = b""
     for kind, content in ((b"JSON", pad(document, b" ")), (b"BIN\0", pad(data, b"\0"))):
         parts += struct.pack("<I", len(content)) + kind + content

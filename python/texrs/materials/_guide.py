@@ -1,7 +1,7 @@
-"""What decisions are made on where there are several maps: the three channels that tell most of all of them.
+"""Guide image of several maps: the three most informative channels of all of them.
 
-A seam that the albedo hides may be seen in the normals. Each map is brought to a scale on which the same difference is about
-as visible, and weighted; the leading principal components of all channels together are kept.
+A seam that the albedo hides may be visible in the normals. Each map is scaled so that equal differences are about
+equally visible, and weighted. The leading principal components of all channels together are kept.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ WEIGHTS: dict[Role, float] = dict.fromkeys(Role, 0.5) | {
     Role.LABELS: 0.0,
     Role.OTHER: 0.25,
 }
-"""How much maps count, unless it is said: light falls on normals, heights are seen by them."""
+"""Default weights of maps: light depends on normals, and heights are visible through them."""
 DISPLAY = 1 / 2.2
-"""Power that light is shown by."""
+"""Exponent for the display of light."""
 TAILS = 0.005
 """Share of heights at either end that their range leaves out."""
 CHANNELS = 3
 LEAST = 1e-3
-"""Share of all that varies below which a component tells nothing."""
+"""Minimum share of the variance of a useful component."""
 SAMPLES = 1 << 18
-"""Pixels that components are measured on, about."""
+"""Approximate number of pixels that determine the components."""
 
 
 def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:
-    """Return what a map tells: (..., C) float32, of which a difference of 1 is as visible as that of black and white."""
+    """Return the features of a map, (..., C) float32. A difference of 1 is as visible as black against white."""
     image = pixels if pixels.ndim > axes else pixels[..., np.newaxis]
     if role.normal or role is Role.VECTOR:
-        # The slopes: what they say of the light. The third number follows from them.
+        # Slopes determine the light. The third number follows from them.
         vector = _decode(image)
         return vector[..., : min(2, vector.shape[-1])] * np.float32(0.5)
     if role is Role.HEIGHT:
         values = to_unit(image) if image.dtype.kind in "b" else image.astype(np.float32)
-        # Of halves, for two heights may differ by more than single precision can be; shares are the same.
+        # Use halves, because the difference of two heights may exceed single precision. Shares are the same.
         if float(values.max()) - float(values.min()) > float(np.finfo(np.float32).max):
             values = values * np.float32(0.5)
         low, high = np.quantile(values, [TAILS, 1 - TAILS])
@@ -64,7 +64,7 @@ def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:
 
 
 def _decode(image: Array) -> Floats:
-    """Return vectors within [-1, 1]: unsigned values mean 2 v - 1, and so do floats that are never negative."""
+    """Return vectors within [-1, 1]. Unsigned values, and floats that are never negative, mean 2 v - 1."""
     values = to_unit(image) if image.dtype.kind in "ub" else image.astype(np.float32)
     if image.dtype.kind == "i":
         return np.asarray(values / np.float32(np.iinfo(image.dtype).max), np.float32)
@@ -72,7 +72,7 @@ def _decode(image: Array) -> Floats:
 
 
 def make_guides(features: Sequence[Sequence[Floats]]) -> list[Floats]:
-    """Return guides of several exemplars that can be compared: the same components of all of them, in [0, 1]."""
+    """Return comparable guides of several exemplars: the same components of all, in [0, 1]."""
     stacks = [np.concatenate(list(each), axis=-1) for each in features]
     channels = stacks[0].shape[-1]
     flat = [s.reshape(-1, channels) for s in stacks]
@@ -80,9 +80,9 @@ def make_guides(features: Sequence[Sequence[Floats]]) -> list[Floats]:
     some = np.concatenate([f[::step] for f in flat]).astype(np.float64)
     mean = some.mean(axis=0)
     some -= mean
-    # Sums in one order: of a matrix product the last bits hang on the processor.
+    # Sum in one order, because the last bits of matrix products depend on the processor.
     spread = np.einsum("ni,nj->ij", some, some) / len(some)
-    # The last bits of a decomposition hang on it too.
+    # The last bits of a decomposition depend on it too.
     values, vectors = np.linalg.eigh(np.round(spread, 9))
     count = max(1, int(np.count_nonzero(values[::-1][:CHANNELS] > LEAST * values.sum())))
     leading = np.round(vectors[:, : -count - 1 : -1], 6)

@@ -1,4 +1,4 @@
-"""Labels told from pictures by their values alone: numbers of regions, between which no value has a meaning."""
+"""Recognition of labels by their values: numbers of regions, without meaningful values between them."""
 
 from __future__ import annotations
 
@@ -12,34 +12,39 @@ from texrs._typing import Array
 __all__ = ["REASON", "holds_labels"]
 
 REASON = "labels, because its integers form regions of unrelated values"
-"""Completes "read as" in notices."""
+"""Text after "read as" in notices."""
 FEWEST = 8
-"""Different values. Pictures of fewer are masks, phases or palettes, whose steps look like those of labels."""
+"""Minimum number of different values. Images with fewer are masks, phases or palettes, whose steps look like labels."""
 UNRELATED = 0.9
-"""Mean step between neighbours that differ, in ranks, divided by that between any two of them: 0.76 in photographs."""
+"""Mean step between different neighbours, in ranks, divided by the mean step between any two of them: 0.76 in
+photographs.
+"""
 UNIFORM, LARGELY = 0.9, 0.6
-"""Share of pixels in squares of one value, of all but the commonest value: regions as a whole, and regions with holes."""
+"""Shares of pixels in squares of one value, among all values except the most frequent: for solid regions, and for
+regions with holes.
+"""
 COMPACT = 4.0
 """Median area of the box around a value, divided by its pixels: numbered regions are compact, levels of grey are not."""
 GRADUAL = 0.7
-"""Share of steps from one value to the next: bands of a smooth picture are compact too, but lie side by side in order."""
+"""Share of steps from one value to the next. Bands of a smooth image are compact too, but are side by side in order."""
 LARGEST = 2**22
-"""Pixels that are looked at, from the middle."""
+"""Number of pixels that are examined, from the middle."""
 
 
 def holds_labels(pixels: Array, axes: int) -> bool:
-    """Return whether integers are numbers of regions, and neither a picture nor heights.
+    """Return whether integers are numbers of regions, and neither an image nor heights.
 
-    Measured on 106 pictures in 14 versions each (smoothed, posterised, doubled, of 8 and 16 bit) and in 9 segmentations. One
-    half chose the thresholds: none of 742 pictures is taken for labels, and 474 of 477 segmentations are. The other half has 1
-    of 742, a picture of doubled pixels, and 474 of 477. The six missing segmentations have less than eight labels.
+    Measured on 106 images in 14 versions each (smoothed, posterised, doubled, of 8 and 16 bit) and in 9 segmentations.
+    One half chose the thresholds: none of its 742 images is taken for labels, and 474 of its 477 segmentations are.
+    The other half has 1 of 742, an image of doubled pixels, and 474 of 477. The six missing segmentations have fewer
+    than eight labels.
 
     Parameters
     ----------
     pixels : ndarray
         Values of any dtype, with or without a channel axis.
     axes : int
-        2 for pictures, 3 for volumes.
+        2 for images, 3 for volumes.
 
     """
     if pixels.dtype.kind not in "ui" or pixels.shape[axes:] not in ((), (1,)) or min(pixels.shape[:axes]) < 2:
@@ -64,7 +69,7 @@ def holds_labels(pixels: Array, axes: int) -> bool:
 
 
 def find_uniform(ranks: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which pixels are in a square, or a cube, of two pixels a side that has one value."""
+    """Return a mask of the pixels in a square, or a cube, of two pixels a side with one value."""
     corners = [
         tuple(slice(start, n - 1 + start) for start, n in zip(corner, ranks.shape, strict=True))
         for corner in product((0, 1), repeat=ranks.ndim)

@@ -1,4 +1,4 @@
-"""Maps as what is shone upon: found by what they are for, and normals as vectors."""
+"""Maps for lighting: found by their roles, with normals as vectors."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ ONE = np.float32(1)
 
 
 def find_map(maps: Mapping[str, Map], *roles: Role) -> Map | None:
-    """Return the first map of the roles, those named first before others."""
+    """Return the first map with one of the roles, in the order of the roles."""
     return next((each for role in roles for each in maps.values() if each.role is role), None)
 
 
 def decode_normals(pixels: Array, role: Role, *, signed: bool) -> Floats:
-    """Return normals (..., 3) of unit length, x to the right, y up and z out of the picture.
+    """Return normals (..., 3) of unit length, x to the right, y up and z out of the image.
 
-    Unsigned values mean 2 v - 1, and so do floats unless ``signed``: a value of the whole map is negative. If z is not stored,
-    it is that of unit vectors.
+    Unsigned values mean 2 v - 1. Floats mean the same unless ``signed``: some value of the map is negative. If z is
+    not stored, it is computed for unit vectors.
     """
     values = pixels[..., : 2 if role.bare else 3]
     if values.dtype.kind == "i":

@@ -1,4 +1,4 @@
-"""One map of a material: its values, what it is for, and how it encodes light."""
+"""One map of a material: its values, its role, and its encoding of light."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Map", "Space", "find_space", "split_channels", "take_channels"]
 
 
 def find_space(role: Role, dtype: np.dtype[Any]) -> Space:
-    """Return how a file of this dtype encodes a map of this role: integers of colours are sRGB, all else is linear."""
+    """Return the usual encoding of a map in a file: integers of colours are sRGB, everything else is linear."""
     return "srgb" if role.coloured and dtype.kind in "ui" else "linear"
 
 
@@ -26,17 +26,17 @@ class Map:
     Attributes
     ----------
     pixels : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array
-        Its values, in any dtype that a picture may have.
+        Values, in any dtype of an image.
     role : Role
-        What it is for.
+        Role of the map.
     space : {"srgb", "linear"}
-        How its values encode light: integers of colours are sRGB, all else is linear, unless something else is said.
+        Encoding of light. By default integers of colours are sRGB, and everything else is linear.
     file : str
-        Name of the file that the map was read from, without the suffix; empty for a map made from an array. It is written to
-        a file of this name again.
+        Name of the file that the map was read from, without the suffix; empty for a map made from an array. The map is
+        written to a file of this name again.
     layer : tuple of str
-        Full names of the channels in the EXR file that the map was read from, such as ``"ViewLayer.Depth.Z"``. The map is
-        written to channels of these names again. Default: none.
+        Full names of the channels in the EXR file that the map was read from, such as ``"ViewLayer.Depth.Z"``. The map
+        is written to channels of these names again. Default: none.
 
     Examples
     --------
@@ -56,12 +56,12 @@ class Map:
 
     @property
     def depth(self) -> int:
-        """Bits of each sample."""
+        """Number of bits of each sample."""
         return 1 if self.pixels.dtype == np.bool_ else 8 * self.pixels.itemsize
 
     @property
     def channels(self) -> int:
-        """How many values each pixel has."""
+        """Number of values of each pixel."""
         return 1 if self.pixels.ndim == 2 else self.pixels.shape[-1]
 
     def __repr__(self) -> str:
@@ -76,7 +76,7 @@ def take_channels(each: Map, first: int, last: int, role: Role) -> Map:
 
 
 def split_channels(each: Map, axes: int) -> list[Map]:
-    """Return the channels of a map in groups that are looked up, blended and averaged alike: normals, codes, other values.
+    """Return the channels of a map in groups with the same treatment: normals, codes, other values.
 
     Most maps are one group. Packed data has no transparency, so the last of four channels is a group of its own.
     """

@@ -1,4 +1,4 @@
-"""Materials: maps in register, each with its role, that go wherever an example goes."""
+"""Materials: maps in register, each with its role, in place of an example."""
 
 from __future__ import annotations
 
@@ -40,37 +40,37 @@ CHANNELS: dict[Role, tuple[int, ...]] = {
 }
 """Number of channels that maps of a role may have; others have any."""
 AT_ONCE = 2
-"""Maps that are made at once: each takes up to 0.4 GB besides its result."""
+"""Number of maps that are made in parallel. Each takes up to 0.4 GB in addition to its result."""
 SHOWN = 512
-"""Pixels of the longer side in a notebook."""
+"""Maximum pixels of the longer side in a notebook."""
 
 
 class Material(Exports):
     """Maps in register, by name, such as the albedo, the normals and the heights of one surface.
 
-    A material goes wherever an example goes: `texrs.design`, `texrs.tile`, `texrs.inpaint` and all other verbs decide on what
-    its maps tell together (`guide`), and look every map up through the one source map, so that all stay in register: colours
-    and heights are blended, normals turned and brought back to unit length, labels and masks never mixed.
+    A material can replace an example in `texrs.design`, `texrs.tile`, `texrs.inpaint` and all other verbs. They decide
+    from all maps together (`guide`), and apply one source map to every map, so that all stay in register. Colours and
+    heights are blended, normals are rotated and normalised, and labels and masks are never mixed.
 
     Parameters
     ----------
     maps : mapping of str to array or Map
-        By name; the name gives the role (see `texrs.materials.guess_role`), unless ``roles`` does. Integers that form regions
-        of unrelated values are labels if nothing else is stated (`notices`). All have the same size.
+        Maps by name. The name gives the role (see `texrs.materials.guess_role`), unless ``roles`` does. Integers that
+        form regions of unrelated values are labels if nothing else is stated (`notices`). All have the same size.
     roles : mapping of str to Role or str, optional
-        What maps are for whose name does not say it, or says something else.
+        Roles of maps whose name gives none, or a wrong one.
     spaces : mapping of str to {"srgb", "linear"}, optional
-        How maps encode light; integers of colours and emission are sRGB, all else is linear.
+        Encoding of light in maps. By default integers of colours and emission are sRGB, and everything else is linear.
     weights : mapping of str to float, optional
-        How much maps count for decisions, 0 to 100; by default 1 for colours and normals, .75 for heights, .5 for roughness,
-        metal, occlusion, opacity, emission and masks, .25 for others and 0 for labels.
+        Weights of maps for decisions, 0 to 100. Default: 1 for colours and normals, 0.75 for heights, 0.5 for
+        roughness, metallic, occlusion, opacity, emission and masks, 0.25 for others and 0 for labels.
     axes : int
-        2 for pictures, 3 for volumes.
+        2 for images, 3 for volumes.
 
     Raises
     ------
     InvalidInput
-        No maps, of several sizes, a name that says no role, or a map that its role cannot have.
+        If maps are missing, sizes differ, a name gives no role, or a map does not fit its role.
 
     Examples
     --------
@@ -120,7 +120,7 @@ class Material(Exports):
                 )
         with collect() as settled:
             report_guesses(why, guessed, said)
-            # The name of an array is chosen by its caller, so it states that y is up.
+            # The caller chooses the name of an array, so the name states that y is up.
             self._settle(new, new)
         self._notices.assumed.extend(settled.assumed)
         self._weights = {name: as_float(w, f"weights[{name!r}]", 0, 100) for name, w in share.items()}
@@ -162,7 +162,7 @@ class Material(Exports):
         return Map(kept, chosen, space or usual)
 
     def _settle(self, names: Collection[str], said: Collection[str]) -> None:
-        """Give normals the role that their values show."""
+        """Give normals the role that matches their values."""
         if self._axes == 2:
             self._maps |= settle_normals(self._maps, names, said)
 
@@ -170,36 +170,36 @@ class Material(Exports):
     def read(
         cls, path: Path | Sequence[Path], *, roles: Mapping[str, Role | str] | None = None, axes: int = 2
     ) -> Material:
-        """Return the material whose maps are the files of a folder, or the layers of a file, by the usual names.
+        """Read a material from the files of a folder or the layers of a file, by their usual names.
 
         Parameters
         ----------
         path : path_like, or a list of path_like
             A folder, some files of a folder, or an EXR file of several layers.
         roles : mapping of str to Role or str, optional
-            What files are for, by their names, with or without the suffix; what layers are for, by theirs.
+            Roles of files by their names, with or without the suffix, or of layers by theirs.
         axes : int
-            2 for pictures, 3 for volumes.
+            2 for images, 3 for volumes.
 
         Returns
         -------
         Material
-            Its maps have the names of the files or layers without their common start (``albedo`` of ``rock_albedo``). `save`
-            writes the whole names. Normals have the role that their values show: without z, or with y down, if no name or
-            role states the contrary. `notices` lists these facts.
+            Its maps have the names of the files or layers without their common beginning (``albedo`` of
+            ``rock_albedo``). `save` writes the whole names. Normals have the role that matches their values: without
+            z, or with y down, if no name or role states the contrary. `notices` lists these facts.
 
         Raises
         ------
         FileError
-            Neither a folder nor such a file, nothing in it is a map, or something cannot be read.
+            If it is neither a folder nor such a file, contains no map, or cannot be read.
         InvalidInput
-            Maps of several sizes, or a role of a file or a layer that is not there.
+            If maps have several sizes, or a role names a missing file or layer.
 
         Warns
         -----
         InputWarning
-            Files, subfolders or layers are not used: the name gives no role, the format is not read, and so on. `notices`
-            keeps the reasons. Hidden files, texts, reports and mipmaps do not count.
+            If files, subfolders or layers are not used, because the name gives no role, the format is not supported,
+            and so on. `notices` contains the reasons. Hidden files, texts, reports and mipmaps do not count.
 
         Examples
         --------
@@ -244,7 +244,7 @@ class Material(Exports):
         return iter(self._maps)
 
     def __len__(self) -> int:
-        """Return how many maps there are."""
+        """Return the number of maps."""
         return len(self._maps)
 
     def __repr__(self) -> str:
@@ -253,39 +253,39 @@ class Material(Exports):
         return f"<Material of {' x '.join(map(str, self._shape))}: {maps}>"
 
     def _repr_png_(self) -> bytes:
-        """Show the material under a light in a notebook, or the middle plane of a volume."""
+        """Return an image of the lit material for a notebook, or of the middle plane of a volume."""
         if self._axes == 3:
             return as_png(self.base[self._shape[0] // 2])
         return as_png(self.preview(tiles=(1, 1), side=SHOWN))
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Samples along each axis, without the channels."""
+        """Number of samples along each axis, without the channels."""
         return self._shape
 
     @property
     def axes(self) -> int:
-        """2 for pictures, 3 for volumes."""
+        """2 for images, 3 for volumes."""
         return self._axes
 
     @property
     def notices(self) -> Notices:
-        """What reading the maps ignored and assumed: sentences, in ``ignored`` and ``assumed``."""
+        """Notices of reading the maps: sentences, in ``ignored`` and ``assumed``."""
         return self._notices
 
     @property
     def weights(self) -> Mapping[str, float]:
-        """What was said of how much maps count when decisions are made; the others count as their roles do."""
+        """Given weights of maps for decisions. Other maps have the weights of their roles."""
         return MappingProxyType(self._weights)
 
     @property
     def base(self) -> Array:
-        """The map that shows the material: its colours, or the first where it has none."""
+        """The map that represents the material: its colours, or its first map."""
         return self[self.base_name].pixels
 
     @property
     def base_name(self) -> str:
-        """The name of that map."""
+        """Name of this map."""
         return self.find(Role.COLOUR) or next(iter(self))
 
     @cached_property
@@ -295,12 +295,12 @@ class Material(Exports):
         return content_hash(self._axes, parts, sorted(self._weights.items()), *(m.pixels for m in self.values())).hex()
 
     def find(self, role: Role | str) -> str | None:
-        """Return the name of the first map of a role, if there is one.
+        """Return the name of the first map with a role, or None.
 
         Parameters
         ----------
         role : Role or str
-            Which.
+            Role to find.
 
         Returns
         -------
@@ -309,7 +309,7 @@ class Material(Exports):
         Raises
         ------
         InvalidInput
-            No such role.
+            If the role does not exist.
 
         Examples
         --------
@@ -328,7 +328,7 @@ class Material(Exports):
         Parameters
         ----------
         **maps : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array
-            By name; roles stay.
+            New values by name. Roles do not change.
 
         Returns
         -------
@@ -337,7 +337,7 @@ class Material(Exports):
         Raises
         ------
         InvalidInput
-            There is no such map, or its size is another.
+            If a map does not exist, or its size differs.
 
         Examples
         --------
@@ -357,16 +357,16 @@ class Material(Exports):
     def flatten_lighting(
         self, amount: float = 1.0, *, wrap: bool | tuple[bool, bool] = False, size: float | None = None
     ) -> Material:
-        """Return the material with its colours in even light; other maps stay.
+        """Return the material with its colours in even light. Other maps do not change.
 
         Parameters
         ----------
         amount : float
-            How much of the unevenness is taken out, 0 to 1.
+            Share of the unevenness to remove, 0 to 1.
         wrap : bool or (bool, bool)
-            Along which axes the maps are cyclic, so that they stay so.
+            Axes along which the maps are periodic. They stay periodic.
         size : float, optional
-            Pixels: what is larger is evened (see `texrs.materials.flatten_lighting`).
+            Size in pixels above which variation counts as light (see `texrs.materials.flatten_lighting`).
 
         Returns
         -------
@@ -375,7 +375,7 @@ class Material(Exports):
         Raises
         ------
         InvalidInput
-            A volume, or another amount or size.
+            If it is a volume, or the amount or size is invalid.
 
         Examples
         --------
@@ -401,16 +401,16 @@ class Material(Exports):
 
     @property
     def guide(self) -> Array:
-        """What decisions are made on: (..., C) uint16, up to three channels that tell most of all maps; or the only map."""
+        """Guide image for decisions: (..., C) uint16, up to three informative channels of all maps; or the only map."""
         return guide_materials([self])[0]
 
     def features(self) -> list[Floats]:
-        """Return what each map tells, times its weight: of one size, on scales that can be compared.
+        """Return the features of each map times its weight, in one size and on comparable scales.
 
         Returns
         -------
         list of (..., F) float32
-            One array a map that weighs something, of the material's rows and columns.
+            One array for each map with a weight above 0, with the material's rows and columns.
 
         Examples
         --------
@@ -431,24 +431,24 @@ class Material(Exports):
         return found
 
     def apply(self, source: SourceMap, *, progress: Progress | bool | None = None) -> Material:
-        """Return the material that a source map makes of this one, finished as the verb that made the map does.
+        """Apply a source map to this material, with the finish of the verb that made the map.
 
         Parameters
         ----------
         source : SourceMap
-            Which looks into one exemplar, of the size of the maps.
+            Source map into one exemplar of the size of the maps.
         progress : callable or True, optional
-            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+            Called as ``progress(stage, share)``. An exception that it raises stops the work. True shows a bar.
 
         Returns
         -------
         Material
-            The same maps, dtypes, roles and names.
+            Material with the same maps, dtypes, roles and names.
 
         Raises
         ------
         InvalidInput
-            The source map looks into pictures of another size, or into several.
+            If the source map has exemplars of another size, or several.
 
         Examples
         --------
@@ -464,25 +464,25 @@ class Material(Exports):
 
 
 def guide_materials(materials: Sequence[Material]) -> list[Array]:
-    """Return what decisions are made on, of materials that are compared with each other: of the same maps."""
+    """Return comparable guide images of materials with the same maps."""
     check_alike(materials)
     first = materials[0]
     if len(first) == 1:
-        # What a picture is decided on.
+        # Decisions are made from this image.
         return [np.asarray(next(iter(m.values())).pixels) for m in materials]
-    # In 16 bit a large texture of guides takes half the memory, and is the same on every processor.
+    # Large guides in 16 bit take half the memory, and are the same on every processor.
     return [
         np.rint(guide * np.float32(65535)).astype(np.uint16) for guide in make_guides([m.features() for m in materials])
     ]
 
 
 def apply_materials(materials: Sequence[Material], source: SourceMap, progress: Progress | None = None) -> Material:
-    """Return the material that a source map makes of several with the same maps."""
+    """Return a source map applied to several materials with the same maps."""
     check_alike(materials)
     first, made = materials[0], dict[str, Map]()
     finish = source.finish
     if finish is not None and finish.flatten_lighting:
-        # Colours alone are lit, and each map says how it encodes light.
+        # Only colours have light, and each map states its encoding.
         materials, finish = [m.flatten_lighting() for m in materials], replace(finish, flatten_lighting=False)
     names = list(first)
 

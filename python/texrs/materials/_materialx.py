@@ -1,6 +1,7 @@
-"""A material as a MaterialX 1.38 document: a standard surface, whose inputs are its maps, in files beside it.
+"""A material as a MaterialX 1.38 document: a standard surface with its maps as inputs, in files next to it.
 
-What a standard surface has no input for is left out: occlusion, which renderers work out, and masks, labels and directions.
+Maps without an input in a standard surface are left out: occlusion, which renderers compute, and masks, labels and
+directions.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ VERSION = "1.38"
 INTEGERS = (np.dtype(np.uint8), np.dtype(np.uint16))
 FLOATS = (np.dtype(np.float16), np.dtype(np.float32))
 UPWARD = {"DirectX": "OpenGL", "directx": "opengl", "DX": "GL", "Dx": "Gl", "dx": "gl"}
-"""Words for normals whose y grows down, and those for the others."""
+"""Words for normals with y down, and their replacements with y up."""
 SPACES = {"srgb": "srgb_texture", "linear": "lin_rec709"}
 USED = (
     Role.COLOUR,
@@ -80,7 +81,7 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
 
 
 def rename(name: str, role: Role) -> str:
-    """Return the name of a map that is written with y up, though its own name may say that y is down.
+    """Return the name of a map that is written with y up, even if its own name states y down.
 
     Examples
     --------
@@ -97,7 +98,7 @@ def rename(name: str, role: Role) -> str:
 
 
 def prepare(name: str, maps: Mapping[str, Map], depth: int | None) -> Map:
-    """Return a map as files of renderers hold it: colours of three or four channels, normals with y up, one number else."""
+    """Return a map as renderers expect it: colours of three or four channels, normals with y up, else one number."""
     each = maps[name]
     pixels = each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis]
     if each.role.coloured:
@@ -126,7 +127,7 @@ def spread_grey(pixels: Array) -> Array:
 
 
 def turn_green(pixels: Array) -> Array:
-    """Return normals whose y grows the other way."""
+    """Return normals with the opposite y."""
     turned = pixels.copy()
     turned[..., 1] = np.iinfo(pixels.dtype).max - turned[..., 1]
     return turned
@@ -135,7 +136,7 @@ def turn_green(pixels: Array) -> Array:
 def compose(
     name: str, files: Mapping[Role, str], maps: Mapping[Role, Map], relief: float | None
 ) -> ElementTree.Element:
-    """Return the document: images in a graph, the surface that they feed, and the material."""
+    """Return the document: a graph of images, the surface that they feed, and the material."""
     root = ElementTree.Element("materialx", version=VERSION, colorspace=SPACES["linear"])
     graph = ElementTree.SubElement(root, "nodegraph", name=f"NG_{name}")
     surface = ElementTree.Element("standard_surface", name=f"SR_{name}", type="surfaceshader")

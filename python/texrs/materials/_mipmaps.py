@@ -1,7 +1,7 @@
-"""Smaller and smaller copies of maps, each half as large, that stay what they are for.
+"""Mipmaps: copies of maps, each half as large, with the same meaning.
 
-Colours are averaged as light, those with transparency by how much of them there is; normals are averaged and brought back to
-unit length; labels and masks keep values that they have.
+Colours are averaged as light, weighted by their opacity. Normals are averaged and normalised. Labels and masks keep
+existing values.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def halve(each: Map, axes: int) -> Iterator[Map]:
 
 
 def pick(pixels: Array, shape: tuple[int, ...]) -> Array:
-    """Return the values in the middle of what each sample covers."""
+    """Return the values in the middle of the area of each sample."""
     for axis, wanted in enumerate(shape):
         at = (2 * np.arange(wanted) + 1) * pixels.shape[axis] // (2 * wanted)
         pixels = np.take(pixels, at, axis=axis)
@@ -72,7 +72,7 @@ def take_vectors(pixels: Array, shares: bool, bare: bool) -> Array:
 
 
 def take_light(pixels: Array, each: Map, clear: bool) -> Array:
-    """Return what can be averaged: light, times transparency where there is any."""
+    """Return values that can be averaged: light, multiplied by opacity if there is any."""
     light: Array = pixels if pixels.dtype == np.float64 and each.space == "linear" else to_light(pixels, each.space)
     if not clear:
         return light
@@ -81,7 +81,7 @@ def take_light(pixels: Array, each: Map, clear: bool) -> Array:
 
 
 def show_light(values: Array, each: Map, clear: bool) -> Array:
-    """Return averaged light as its map encodes it."""
+    """Return averaged light in the encoding of its map."""
     light: Array = values[..., :-1] if clear else values
     share = values[..., -1:] if clear else None
     light = light if share is None else light / np.maximum(share, LEAST)

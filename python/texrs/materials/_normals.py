@@ -1,4 +1,4 @@
-"""What the values of normals show: whether their z is stored, and whether y is up or down."""
+"""Properties of normals from their values: whether z is stored, and whether y is up or down."""
 
 from __future__ import annotations
 
@@ -20,18 +20,21 @@ from texrs.source_map._vectors import stores_z
 __all__ = ["settle_normals"]
 
 CUT = 512
-"""Pixels along each side of the part that is looked at."""
+"""Pixels along each side of the examined part."""
 ENOUGH, STRONG = 0.1, 0.3
-"""Least correlations of evidence that decides, and of evidence that contradicts a stated role. On photographs and scans the
-slopes of the right direction correlate by 0.11 to 0.55, those of the wrong one by as much below 0."""
+"""Minimum correlations of evidence that decides, and of evidence that contradicts a stated role.
+
+On photographs and scans the slopes of the right direction correlate by 0.11 to 0.55, and the wrong one by as much
+below 0.
+"""
 STEEP = 0.2
-"""Least z that slopes are taken with."""
+"""Minimum z for the computation of slopes."""
 OTHER = {Role.NORMAL: Role.NORMAL_DX, Role.NORMAL_XY: Role.NORMAL_DX_XY}
 OTHER |= {down: up for up, down in OTHER.items()}
 
 
 def settle_normals(maps: Mapping[str, Map], names: Collection[str], said: Collection[str]) -> dict[str, Map]:
-    """Return the normals of pictures among some maps, with the role that their values show, and report it.
+    """Return the normals of images among some maps, with the role that matches their values, and report it.
 
     Parameters
     ----------
@@ -81,10 +84,10 @@ def _find_bare(title: str, each: Map, maps: Mapping[str, Map], *, said: bool) ->
 
 
 def measure_y(each: Map, maps: Mapping[str, Map]) -> tuple[bool, float, str]:
-    """Return whether y is down, how strongly a correlation shows it, and what shows it.
+    """Return whether y is down, the correlation that shows it, and its source.
 
-    Heights show it if normals lean along both axes as heights grow. Otherwise the normals alone show it: slopes of a surface
-    grow along y as much as the slopes of y grow along x.
+    Heights show it if normals lean along both axes as heights grow. Otherwise the normals alone show it: slopes of a
+    surface change along y as much as the slopes of y change along x.
     """
     rows, columns = (slice(max(0, (n - CUT) // 2), max(0, (n - CUT) // 2) + CUT) for n in each.pixels.shape[:2])
     signed = list_signed({"": replace(each, pixels=each.pixels[..., : 2 if each.role.bare else 3])})[""]
@@ -92,7 +95,7 @@ def measure_y(each: Map, maps: Mapping[str, Map]) -> tuple[bool, float, str]:
     if min(vectors.shape[:2]) < 3:
         return each.role.down, 0.0, ""
     lean = -vectors[..., :2] / np.maximum(vectors[..., 2:], STEEP)
-    # Rows go down, so the slope along them is that of y down.
+    # Rows go down, so the slope along them is the slope of y down.
     right, along = lean[..., 0], -lean[..., 1]
     heights = _find_heights(each, maps)
     if heights is not None:

@@ -1,4 +1,4 @@
-"""Packed maps: several quantities in the channels of one map, taken apart and put together."""
+"""Packed maps: several quantities in the channels of one map, separated and combined."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ __all__ = ["flip_y", "join", "list_quantities", "make_plain", "pack_maps", "unpa
 
 PACKED = "orm"
 SHORT = {"occlusion": "ao"}
-"""Names of unpacked maps that are not those of their quantity."""
+"""Names of unpacked maps that differ from the name of their quantity."""
 ROLES = {role.value: role for role in Role}
 USUAL = {"occlusion": 1.0, "roughness": ROUGH, "smoothness": 1 - ROUGH, "metallic": METAL, "emissiveness": 1.0}
-"""Values of quantities that no map has; of others 0."""
+"""Values of missing quantities. Others are 0."""
 METALS = 230
-"""Least reflectance of metal in labPBR, of 255. A metal of 255 has the colour of its albedo."""
+"""Minimum reflectance of metal in labPBR, of 255. A metal of 255 has the colour of its albedo."""
 
 
 def unpack_maps(maps: Mapping[str, Map]) -> dict[str, Map]:
-    """Return one map for each quantity of packed maps, and all other maps; a quantity with a map of its own keeps it."""
+    """Return one map for each quantity of packed maps, and all other maps. A quantity with its own map keeps it."""
     kept: dict[str, Map] = {}
     for name, each in maps.items():
         if not each.role.packed:
@@ -52,9 +52,9 @@ def unpack_maps(maps: Mapping[str, Map]) -> dict[str, Map]:
 
 
 def lay_out(each: Map) -> tuple[str, ...]:
-    """Return the quantity in each channel that a map has."""
+    """Return the quantity in each channel of a map."""
     count = each.pixels.shape[-1]
-    # Metallic and smoothness are also written as grey and alpha.
+    # Metallic and smoothness may also be stored as grey and alpha.
     return (
         each.role.quantities[-2:]
         if each.role is Role.METALLIC_SMOOTHNESS and count == 2
@@ -68,7 +68,7 @@ def rename(each: Map, end: str) -> str:
 
 
 def make_plain(maps: Mapping[str, Map]) -> dict[str, Map]:
-    """Return maps as every renderer has them: one quantity each, normals with z, roughness instead of smoothness.
+    """Return maps for any renderer: one quantity each, normals with z, roughness instead of smoothness.
 
     Occlusion, roughness and metallic may stay packed as red, green and blue.
     """
@@ -113,7 +113,7 @@ def invert(pixels: Array) -> Array:
 
 
 def flip_y(each: Map) -> Map:
-    """Return normals with z whose y grows the other way."""
+    """Return normals with z and the opposite y."""
     pixels = each.pixels.copy()
     signed = pixels.dtype.kind == "i" or list_signed({"": each})[""]
     pixels[..., 1] = -pixels[..., 1] if signed else invert(pixels[..., 1])
@@ -121,9 +121,9 @@ def flip_y(each: Map) -> Map:
 
 
 def pack_maps(maps: Mapping[str, Map], axes: int) -> dict[str, Map]:
-    """Return maps of which occlusion, roughness and metallic are one, in the depth of the deepest.
+    """Return maps with occlusion, roughness and metallic as one map, in the largest depth.
 
-    Maps that are packed so already, or have none of the three, stay as they are.
+    Maps that are already packed, or have none of the three, stay unchanged.
     """
     if find_map(maps, Role.ORM) is not None or PACKED in maps:
         return dict(maps)
@@ -145,7 +145,7 @@ def pack_maps(maps: Mapping[str, Map], axes: int) -> dict[str, Map]:
 
 
 def list_quantities(maps: Mapping[str, Map], axes: int) -> dict[str, tuple[str, Map]]:
-    """Return for each quantity of packed maps the name of its map, and the map without a channel axis."""
+    """Return the quantities of packed maps, each with the name of its map and the map without a channel axis."""
     found: dict[str, tuple[str, Map]] = {}
     for name, each in maps.items():
         word = each.role.value if each.role is not Role.OTHER else name
@@ -160,7 +160,7 @@ def list_quantities(maps: Mapping[str, Map], axes: int) -> dict[str, tuple[str, 
 
 
 def join(found: Mapping[str, Map], role: Role, shape: tuple[int, ...], file: str) -> Map:
-    """Return a packed map of quantities, in the depth of the deepest; a quantity without a map is usual."""
+    """Return a packed map of quantities, in the largest depth. A quantity without a map has its usual value."""
     layout = role.layout
     several = [found[word].pixels.dtype for word in layout if word in found]
     dtype = choose_dtype(several)
@@ -180,7 +180,7 @@ def join(found: Mapping[str, Map], role: Role, shape: tuple[int, ...], file: str
 
 
 def choose_dtype(dtypes: list[np.dtype[np.generic]]) -> np.dtype[np.generic]:
-    """Return what holds maps of several dtypes."""
+    """Return the dtype that holds maps of several dtypes."""
     if len(set(dtypes)) == 1 and dtypes[0] != np.bool_:
         return dtypes[0]
     floats = [d for d in dtypes if d.kind == "f"]

@@ -1,8 +1,9 @@
-"""A material under a light: what its maps look like together.
+"""Preview of a lit material: all its maps together.
 
-Light comes from one direction and, weaker, from all of them; it is looked at from straight above. Diffuse light is Lambert's;
-highlights are those of small mirrors (Cook and Torrance 1982) spread as Walter et al. 2007 say (GGX), shadowed after Smith in
-Schlick's form, with Schlick's Fresnel term; of the surroundings they reflect what Karis 2014 fitted.
+Light comes from one direction and, weaker, from all directions. The view is from straight above. Diffuse light is
+Lambert's. Highlights are those of small mirrors (Cook and Torrance 1982). They are distributed as in Walter et al.
+2007 (GGX), and shadowed after Smith in Schlick's form, with Schlick's Fresnel term. Reflections of the surroundings
+use the fit of Karis 2014.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ from texrs.materials._surface import find_opacity, list_signed, measure_slopes, 
 __all__ = ["render_preview"]
 
 AMBIENT = 0.3
-"""Light from everywhere, where 1 shows a flat, dull surface in its own colours."""
+"""Light from everywhere. A flat, dull surface has its own colours at 1."""
 MIRROR = 0.04
-"""Share of light from straight above that what is not metal mirrors."""
+"""Share of light from straight above that non-metals reflect."""
 SHOULDER = 0.8
 """Linear light above which highlights are rolled off."""
 STRIP = 1 << 19
@@ -39,7 +40,7 @@ STRIP = 1 << 19
 def render_preview(
     maps: Mapping[str, Map], tiles: Sequence[int], light: Sequence[float], side: int
 ) -> NDArray[np.uint8]:
-    """Return the picture of maps under a light, of at most so many pixels along a side."""
+    """Return the image of lit maps, with a maximum number of pixels along a side."""
     down, right = (
         as_int(n, "tiles", 1, 64) for n in as_tuple(tiles, "tiles", 2, "how often it is shown (down, across)")
     )
@@ -74,20 +75,20 @@ def render_preview(
 
 
 def as_vector(azimuth: float, elevation: float) -> Floats:
-    """Return where the light comes from: x to the right, y up, z out of the picture."""
+    """Return the direction of the light: x to the right, y up, z out of the image."""
     a, e = radians(azimuth), radians(elevation)
     return np.array([cos(a) * cos(e), sin(a) * cos(e), sin(e)], np.float32)
 
 
 def shade(cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | None, toward: Floats) -> Floats:
-    """Return the light (..., 3) that a part of a surface throws straight up."""
+    """Return the light (..., 3) that a part of a surface reflects straight up."""
     shape = next(iter(cut.values())).pixels.shape[:2]
     colour = take_colour(find_map(cut, Role.COLOUR), shape)
     rough, metal, open_ = take_surface(cut)
     normal = take_normals(cut, signed, slopes, shape)
     facing = np.maximum(normal[..., 2:], np.float32(1e-3))
     lit = np.maximum(dot(normal, toward), 0)
-    # As much light as makes a flat surface 1 - AMBIENT bright.
+    # The amount of light makes a flat surface 1 - AMBIENT bright.
     strength = np.float32((1 - AMBIENT) / float(toward[2]))
     base = np.float32(MIRROR) * (1 - metal) + colour * metal
     dull = colour * (1 - metal)
@@ -103,7 +104,7 @@ def shade(cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | N
         lit / np.maximum(lit * (1 - shadow) + shadow, np.float32(1e-6))
     )
     fresnel = base + (1 - base) * np.float32((1 - float(half[2])) ** 5)
-    # The light's share of pi is that by which Lambert's is divided.
+    # The factor pi of the light cancels the divisor of Lambert's law.
     mirrored = np.float32(pi / 4) * lobe * hidden * fresnel / facing
     direct = strength * (lit * dull * (1 - fresnel) + mirrored)
     around = np.float32(AMBIENT) * open_ * (dull + reflect_surroundings(base, rough, facing))
@@ -115,13 +116,13 @@ def shade(cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | N
 
 
 def dot(vectors: Floats, other: Floats) -> Floats:
-    """Return products (..., 1) of vectors with one, summed in one order."""
+    """Return dot products (..., 1) of vectors with one vector, summed in one order."""
     product: Floats = vectors[..., :1] * other[0] + vectors[..., 1:2] * other[1] + vectors[..., 2:] * other[2]
     return product
 
 
 def reflect_surroundings(base: Floats, rough: Floats, facing: Floats) -> Floats:
-    """Return the share of even light that is mirrored (Karis 2014, after Lazarov)."""
+    """Return the reflected share of even light (Karis 2014, after Lazarov)."""
     one, two, three, four = (
         rough * np.float32(a) + np.float32(b)
         for a, b in ((-1.0, 1.0), (-0.0275, 0.0425), (-0.572, 1.04), (0.022, -0.04))
@@ -133,7 +134,7 @@ def reflect_surroundings(base: Floats, rough: Floats, facing: Floats) -> Floats:
 
 
 def lay_checks(part: slice, rows: int, columns: int) -> Floats:
-    """Return the squares in two greys that transparency is shown over, an even number of them along each side."""
+    """Return the squares in two greys behind transparent parts, an even number along each side."""
     square = max(1, ceil(max(rows, columns) / 32))
     counts = [2 * max(1, round(n / (2 * square))) for n in (rows, columns)]
     down = np.arange(part.start, part.stop) * counts[0] // rows
@@ -144,7 +145,7 @@ def lay_checks(part: slice, rows: int, columns: int) -> Floats:
 
 
 def roll_off(light: Floats) -> Floats:
-    """Return light in [0, 1], whose highlights come near to 1 instead of being cut off."""
+    """Return light in [0, 1] with highlights that approach 1 instead of being clipped."""
     over = np.maximum(light - np.float32(SHOULDER), 0)
     room = np.float32(1 - SHOULDER)
     rolled: Floats = np.minimum(light, np.float32(SHOULDER)) + room * (1 - exp_single(-over / room))

@@ -28,8 +28,9 @@ Role                   Words at the end of a name
 ``other``              specular, spec, reflectance, porosity, emissiveness, detail, translucency, translucent, other
 ====================== =======================================================================================
 
-A name has the role of its last word: ``metallic_paint_color`` is a colour map. Words end at ``_``, ``-``, ``.``, spaces and
-capitals. Numbers, sizes (``2k``, ``4096``), versions (``v2``) and words such as ``map``, ``png`` or ``tileable`` do not count.
+The last word of a name gives the role: ``metallic_paint_color`` is a colour map. Words end at ``_``, ``-``, ``.``,
+spaces and capitals. Numbers, sizes (``2k``, ``4096``), versions (``v2``) and words such as ``map``, ``png`` or
+``tileable`` do not count.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ __all__ = ["Role", "as_role", "guess_role"]
 
 
 class Role(Enum):
-    """The role of a map, which decides how it is looked up, blended, turned and written.
+    """Role of a map, which determines its look-up, blending, rotation and encoding.
 
     Parameters
     ----------
@@ -91,12 +92,14 @@ class Role(Enum):
 
     @property
     def coloured(self) -> bool:
-        """Whether its values are seen, so that 8 and 16 bit are encoded as sRGB."""
+        """Whether its values are visible colours, so that 8 and 16 bit are encoded as sRGB."""
         return self in (Role.COLOUR, Role.EMISSION)
 
     @property
     def layout(self) -> tuple[str, ...]:
-        """Quantity in each channel, such as ("occlusion", "roughness", "metallic"); empty if all channels are one quantity."""
+        """Quantity in each channel, such as ("occlusion", "roughness", "metallic"); empty if all channels are one
+        quantity.
+        """
         return LAYOUTS.get(self, ())
 
     @property
@@ -139,7 +142,7 @@ LAYOUTS: dict[Role, tuple[str, ...]] = {
 }
 """Quantity in each channel of a map; "" is a channel without a meaning."""
 CODED = ("reflectance", "porosity", "emissiveness")
-"""Quantities of labPBR whose values are codes from a certain number on, so that nothing may be mixed."""
+"""Quantities of labPBR whose values are codes above a certain number, which must not be mixed."""
 WORDS: dict[Role, str] = {
     Role.COLOUR: "albedo alb basecolor basecolour basemap color colour col diffuse diff bc albedotransparency albedoopacity",
     Role.NORMAL: "normal normals nor nrm norm normalgl norgl nrmgl normalopengl",
@@ -173,7 +176,7 @@ AMERICAN = {"color": "colour", "normal-gl": "normal"}
 
 
 def split_name(name: str) -> list[tuple[int, str]]:
-    """Return the words of a name in small letters, each with its place; a run of capitals is a word.
+    """Return the words of a name in lower case, each with its position. A run of capitals is a word.
 
     Examples
     --------
@@ -191,7 +194,7 @@ def split_name(name: str) -> list[tuple[int, str]]:
 
 
 def find_role(name: str) -> tuple[Role, int, int] | None:
-    """Return the role that a name says, and where its words begin and end; None if it says none."""
+    """Return the role in a name, and where its words begin and end, or None."""
     words = split_name(name)
     while words and NEUTRAL.fullmatch(words[-1][1]) and not _match(words):
         words.pop()
@@ -203,25 +206,26 @@ def find_role(name: str) -> tuple[Role, int, int] | None:
 
 
 def states_y(name: str) -> bool:
-    """Return whether the name of a normal map says if y is up or down."""
+    """Return whether the name of a normal map states that y is up or down."""
     found = find_role(name)
     words = split_name(name)
     if found is None:
-        # T_Rock_N of Unreal.
+        # This is T_Rock_N of Unreal.
         return name.startswith("T_") and words[-1][1] == "n"
     return re.search("gl|dx|directx", name[found[1] : found[2]].lower().replace("_", "")) is not None
 
 
 def _match(words: list[tuple[int, str]]) -> int:
-    """Return how many words at the end are those of a role."""
+    """Return the number of words at the end that belong to a role."""
     counts = range(min(3, len(words)), 0, -1)
     return next((c for c in counts if "".join(word for _, word in words[-c:]) in ROLES), 0)
 
 
 def guess_role(name: str) -> Role | None:
-    """Return the role that a name says, or None if it says none.
+    """Return the role in a name, or None.
 
-    The last words count, as many as have a role: ``ambient_occlusion`` is one role, ``metallic_paint_color`` is a colour map.
+    The longest sequence of last words with a role counts: ``ambient_occlusion`` is one role, ``metallic_paint_color``
+    is a colour map.
 
     Parameters
     ----------
@@ -235,7 +239,7 @@ def guess_role(name: str) -> Role | None:
     Raises
     ------
     TypeError
-        The name is not a text.
+        If the name is not a text.
 
     Examples
     --------
@@ -250,12 +254,12 @@ def guess_role(name: str) -> Role | None:
 
 
 def as_role(value: object, name: str) -> Role:
-    """Check a role, or the word for it.
+    """Return the role with a name. A role is returned unchanged.
 
     Raises
     ------
     InvalidInput
-        The role is not known.
+        If the role is not known.
 
     """
     if isinstance(value, Role):

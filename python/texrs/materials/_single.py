@@ -15,7 +15,7 @@ from texrs.materials._roles import Role, guess_role
 __all__ = ["SingleMap", "read_single"]
 
 UNIT, SPARE = 0.1, 8
-"""Largest difference of the usual length of normals from 1, and least number of pixels for each value of labels."""
+"""Maximum difference of the usual length of normals from 1, and minimum number of pixels for each value of labels."""
 
 
 class SingleMap(Material):
@@ -23,10 +23,10 @@ class SingleMap(Material):
 
 
 def read_single(path: str) -> SingleMap | None:
-    """Return the only map of a material; None if the name or the values of a file are those of an image.
+    """Return the only map of a material. None if the name or the values of a file are those of an image.
 
-    Colours and heights are looked up and corrected like any image. Normals and vectors turn with the surface. Labels keep their
-    values.
+    Colours and heights are looked up and corrected like any image. Normals and vectors turn with the surface. Labels
+    keep their values.
     """
     role = guess_role(Path(path).stem)
     if role is None or not (role.normal or role.labelled or role is Role.VECTOR):
@@ -35,7 +35,7 @@ def read_single(path: str) -> SingleMap | None:
         try:
             read = Material.read([path])
         except (FileError, InvalidInput):
-            # The reader of images says what is wrong.
+            # The reader of images reports the error.
             return None
     each = next(iter(read.values()))
     if not _agrees(each.pixels, each.role):
@@ -51,7 +51,7 @@ def read_single(path: str) -> SingleMap | None:
 
 
 def _agrees(pixels: Array, role: Role) -> bool:
-    """Return whether values are those of a role."""
+    """Return whether values match a role."""
     kind, flat = pixels.dtype.kind, pixels.reshape(-1, pixels.shape[2] if pixels.ndim == 3 else 1)
     if role.labelled:
         return kind in "bui" and len(np.unique(flat, axis=0)) * SPARE <= len(flat)
