@@ -97,8 +97,9 @@ class Role(Enum):
 
     @property
     def layout(self) -> tuple[str, ...]:
-        """Quantity in each channel, such as ("occlusion", "roughness", "metallic"); empty if all channels are one
-        quantity.
+        """Quantity in each channel, such as ("occlusion", "roughness", "metallic").
+
+        Empty if all channels are one quantity.
         """
         return LAYOUTS.get(self, ())
 
