@@ -280,7 +280,8 @@ def _join_edges(
 
 def find_boldest(made: Synthesis) -> float:
     """Return the boldness of the boldest border or seam of a result."""
-    return max(each[name] or 0.0 for each in made.report["tiling"].values() for name in ("seam", "step"))
+    figures: list[float] = [each[k] or 0.0 for each in made.report["tiling"].values() for k in ("seam", "step")]
+    return max(figures, default=0.0)
 
 
 def list_visible(made: Synthesis) -> list[str]:
