@@ -132,7 +132,7 @@ def test_bad_input_is_refused_before_anything_is_measured(floor, change, monkeyp
     def measure(*_):
         raise AssertionError("measured")
 
-    monkeypatch.setattr("texrs.papers.perspective.request.measure_scale", measure)
+    monkeypatch.setattr("texrs.papers.perspective.request.measure_known_scale", measure)
     with pytest.raises(InvalidInput, match=next(iter(change))):
         texrs.perspective(floor.image, **change)
 

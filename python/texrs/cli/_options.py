@@ -367,15 +367,14 @@ def _shorten(
 ) -> str:
     """Return the first sentence or two of a description, or one for each word, in the words of the command line.
 
-    If the option shows its default, a last sentence "Default: ..." is dropped.
+    A last sentence "Default: ..." is kept, unless the option shows its default.
     """
     # References are for readers of the documentation only.
     text = re.sub(r"\s*\((?:see )?(?:`|section|Eq\.)[^)]*\)|\s*\[\d+\]_|[:;,] see `texrs[^`]*`", "", text)
     # Drop the description of None, unless it is the default: users cannot request it.
     beside = ("See ", "`texrs.") if default is None else ("See ", "`texrs.", "None")
     first, *further = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
-    if shown and further and further[-1].startswith("Default: "):
-        further.pop()
+    last = [further.pop()] if further and further[-1].startswith("Default: ") else []
     if "yes" in words:
         further = [re.sub(r"\bFalse\b", "no", re.sub(r"\bTrue\b", "yes", each)) for each in further]
     if len(first) > LONGEST:
@@ -384,7 +383,7 @@ def _shorten(
     of_words = [s for s in further if re.match(r"\W*(\w*)", s)[1] in words]  # type: ignore[index]
     second = next((s for s in further if not s.startswith(beside)), "")
     short = [first, second] if second and len(first + second) < LONGEST else [first]
-    chosen = " ".join([first, *of_words] if of_words else short)
+    chosen = " ".join([*([first, *of_words] if of_words else short), *([] if shown else last)])
     chosen = re.sub(r"``(\w+)``", lambda found: flags.get(found[1], found[1]), chosen)
     if flag:
         chosen = re.sub(r"\bFalse\b", f"--no-{flag[2:]}", re.sub(r"\bTrue\b", flag, chosen))

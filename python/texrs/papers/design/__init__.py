@@ -162,7 +162,7 @@ def design(
         printed generator moves whole colour layers, once each or ``operations`` times. They are stitched at the plain
         cost, holes take the best match, and colours are corrected without a weight on the values. The ``segmentation``
         of elements has no effect then, nor have ``translate``, ``rotate`` and ``mirror`` of their deformation, nor the
-        amount of ``screening``. Default: the algorithm with the departures above.
+        amount of ``screening``. Default: the algorithm with departures from the paper.
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
         the work stops. True shows a progress bar. Default: none.

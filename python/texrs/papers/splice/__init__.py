@@ -156,7 +156,7 @@ def splice(
     method : {None, "paper", "preview"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
         triangles between the moved elements; elements are not kept rigid and holes are not filled. Default: the
-        algorithm with the departures above.
+        algorithm with departures from the paper.
     strength : float
         Share of the way that elements move from their own layout, 0, to the other layout, 1. Separate elements at the
         texture's own size give the texture itself with 0. Default: 1.
@@ -393,7 +393,7 @@ def self_splice(
     method : {None, "paper", "preview"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
         triangles between the moved elements; elements are not kept rigid and holes are not filled. Default: the
-        algorithm with the departures above.
+        algorithm with departures from the paper.
     refine : bool
         If True, deformed pixels are refined: those of connected figures, and of separate elements that show too little
         of their background. Default: True.
