@@ -235,8 +235,8 @@ def test_what_is_too_large_is_told_how_it_is_made(
 
 def test_python_is_told_in_its_own_words() -> None:
     for verb, words in (
-        (texrs.design, "texrs.CornerTiles makes"),
-        (texrs.tile, "texrs.CornerTiles makes"),
+        (texrs.design, "texrs.CornerTiles creates"),
+        (texrs.tile, "texrs.CornerTiles creates"),
         (texrs.synthesize, "texrs.PlaneTexture.to_zarr and to_dask make it in parts"),
     ):
         with pytest.raises(LimitExceeded, match=words):
