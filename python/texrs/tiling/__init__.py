@@ -63,7 +63,7 @@ __all__ = ["Tiling", "check_tiling", "tile"]
 
 SHARE, LEAST = 8, 25
 """Least overlap that is chosen: the side divided by the first number, at most the second number in pixels."""
-LARGER = "texrs.CornerTiles makes an endless design, and gives it in parts"
+LARGER = "texrs.CornerTiles creates an unbounded design in parts"
 """Advice for results that are too large."""
 MOST = 7
 """Maximum overlap, in sixteenths of the side."""

@@ -134,7 +134,7 @@ def perspective(
         requested scales that it lacks become the nearest existing ones, with a warning. Numbers of 1/8 to 4: copies in
         these sizes, no plane.
     wrap : bool or (rows, columns), optional
-        Axes along which the result is periodic. The target must also be periodic. Default: none.
+        Axes along which the result is periodic. Default: none. The target must also be periodic.
     seed : int
         Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     interpolation : {"nearest", "linear", "cubic"}
