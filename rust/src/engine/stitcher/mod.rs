@@ -2,7 +2,7 @@
 //!
 //! 1. *chart*: a patch is a box of the exemplar, mapped from the output by the frames around its centre;
 //! 2. *search*: for all exemplar coordinates at once, the difference between the patch and the points that are known
-//!   already;
+//!    already;
 //! 3. *cut*: minimum cuts insert the best few candidates and judge the pairs that result, and the cheapest is kept;
 //! 4. *recover*: other patches are tried over the worst seams;
 //! 5. *heal*: torn elements are completed or removed.
