@@ -88,7 +88,7 @@ def test_a_file_of_points_states_its_order(here: Path, content: str, found: list
 def test_errors_speak_of_x_and_y(here: Path, capsys: Capture) -> None:
     assert main(["analyse", "wall.png", "-o", "e.npz", "--background", "10,150", "-q"]) == 2
     err = capsys.readouterr().err
-    assert "--background: point 0, (x, y) = [10.0, 150.0], lies outside of the image of 160 x 120" in err
+    assert "--background: point 0, (x, y) = [10.0, 150.0], is outside the image of 160 x 120" in err
     assert "if the two numbers of each point are exchanged, all are inside" in err
     assert say_places("box: needs (row, column, height, width), got [1, 2, 3, 4]") == (
         "box: needs (x, y, width, height), got [2, 1, 4, 3]"

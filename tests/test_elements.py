@@ -236,20 +236,20 @@ HALF[:, :40] = True
     [
         (
             {"box": (300, 50, 20, 20)},
-            "box: reaches from 290 to 310 along the rows, outside of the image, which has 160",
+            "box: reaches from 290 to 310 along the rows, outside the image, which has 160",
         ),
         ({"box": (80, 96, 20)}, "box: needs \\(row, column, height, width\\)"),
         ({"box": (80, np.nan, 20, 20)}, "box: needs"),
-        ({"box": (80, 96, 1, 20)}, "box: sides of at least 3"),
+        ({"box": (80, 96, 1, 20)}, "box: sides must be at least 3"),
         ({"box": "here"}, "box: needs"),
-        ({"background": []}, "background: marks nothing"),
-        ({"background": [(5, 900)]}, "background: point 0, .* outside of the image"),
+        ({"background": []}, "background: must not be empty"),
+        ({"background": [(5, 900)]}, "background: point 0, .* outside the image"),
         ({"background": [(5, 5), (np.nan, 3)]}, "background: must be finite, but point 1"),
-        ({"background": [(5, 5), (5, 5)]}, "background: point 1, .* is there twice"),
+        ({"background": [(5, 5), (5, 5)]}, "background: point 1, .* occurs twice"),
         ({"background": [BOX[:2]]}, "background: contradicts the box"),
         ({"mask": MASK, "background": [tuple(CENTRES[3])]}, "background: contradicts the mask"),
         ({"layout": "F=x"}, "layout: must be one of disjoint"),
-        ({"mask": HALF, "box": None, "background": None}, "box: is needed with this mask"),
+        ({"mask": HALF, "box": None, "background": None}, "box: must be given"),
         (
             {"mask": HALF, "box": (80, 30, 30, 30), "background": None},
             "layout: contradicts the mask: disjoint means",
@@ -259,13 +259,13 @@ HALF[:, :40] = True
             "layout: contradicts the mask: connected means",
         ),
         ({"mask": MASK[:5]}, "mask: needs shape"),
-        ({"mask": np.ones_like(MASK)}, "mask: is all foreground"),
+        ({"mask": np.ones_like(MASK)}, "mask: must contain foreground and background, got only foreground"),
         ({"points": [(10, 10), (20, np.inf)]}, "points: must be finite, but point 1"),
-        ({"points": [(10, 10), (20, 10), (10, 10)]}, "points: point 2, .* is there twice"),
+        ({"points": [(10, 10), (20, 10), (10, 10)]}, "points: point 2, .* occurs twice"),
         ({"points": [(10, 10), (20, 400)]}, "points: point 1, .* outside"),
         ({"points": [(10, 10, 3)]}, "points: needs points \\(row, column\\)"),
         ({"search": {"rotations": 0}}, "rotations: needs an integer from 1 to 72"),
-        ({"search": {"scales": []}}, "scales: needs 1 to 16 numbers"),
+        ({"search": {"scales": []}}, "scales: must be 1 to 16 numbers"),
         ({"search": {"scales": [9.0]}}, "scales\\[0\\]: needs a number"),
         ({"search": {"threshold": 3}}, "threshold: needs a number from -1 to 1"),
         ({"search": {"channel": "third"}}, "channel: must be one of"),
@@ -294,7 +294,7 @@ def test_options_are_checked_where_they_are_made() -> None:
 
 
 def test_too_few_elements() -> None:
-    with pytest.raises(InvalidInput, match="image: [012] elements were found, at least 3 are needed; try another box"):
+    with pytest.raises(InvalidInput, match="image: must show at least 3 elements, found [012]; try another box"):
         analyse(IMAGE, search=ElementSearch(threshold=0.9999), method="paper", **GOOD)
 
 
@@ -309,7 +309,7 @@ def test_too_few_elements() -> None:
     ids=["black", "grey", "too small", "checks"],
 )
 def test_nothing_to_be_found(image: np.ndarray) -> None:
-    with pytest.raises(InvalidInput, match="^box: none could be proposed for this image; give one, or the points$"):
+    with pytest.raises(InvalidInput, match="^box: no box could be proposed for this image; give a box or the points$"):
         analyse(image.astype(np.float32))
 
 

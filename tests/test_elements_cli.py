@@ -135,7 +135,7 @@ def test_database(here: Path, capsys: Capture) -> None:
         ("analyse in.png -o before.npz --background 10,nan", "--background: needs X,Y"),
         (
             "analyse in.png -o before.npz --background 900,10",
-            r"--background: point 0, \(x, y\) = \[900.0, 10.0\], lies outside",
+            r"--background: point 0, \(x, y\) = \[900.0, 10.0\], is outside",
         ),
         ("analyse in.png -o before.npz --layout F=e", "--layout: must be one of default, disjoint, connected, jointed"),
         (
@@ -143,7 +143,7 @@ def test_database(here: Path, capsys: Capture) -> None:
             "--layout: contradicts the mask",
         ),
         ("analyse in.png -o before.npz --points nan.csv", "--points: must be finite, but point 1"),
-        ("analyse in.png -o before.npz --points twice.csv", "--points: point 2, .* is there twice"),
+        ("analyse in.png -o before.npz --points twice.csv", "--points: point 2, .* occurs twice"),
         ("analyse in.png -o before.npz --points words.csv", "words.csv: line 2 needs x,y, got 'here,there'"),
         ("analyse in.png -o before.npz --points empty.csv", "empty.csv: holds no points"),
         ("analyse in.png -o before.npz --points none.csv", "none.csv: cannot be read"),

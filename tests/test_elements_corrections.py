@@ -101,7 +101,7 @@ def test_what_is_doubtful_is_said_and_what_to_give() -> None:
     plain = elements.analyse(samples.load("bark", size=(96, 96)).image)
     low = {name for name, sure in plain.report["confidence"].items() if sure < 0.65}
     said = plain.report["warnings"]
-    assert "layout is proposed, 49% sure: say how the elements hang together" in said
+    assert "layout is proposed, 49% sure: give the layout of the elements" in said
     assert {name for name in ("box", "layout", "background") if any(d.startswith(f"{name} is") for d in said)} == low
     given = elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint")
     assert not [d for d in given.report["warnings"] if "proposed" in d]
@@ -122,17 +122,17 @@ def test_numbers_are_seen_on_their_elements(found: ElementAnalysis) -> None:
 @pytest.mark.parametrize(
     ("steps", "message"),
     [
-        ("drop", "corrections: needs a list of steps, got str"),
-        ([{"op": "paint"}], "step 0 needs an 'op' among drop, add"),
+        ("drop", "corrections: must be a list of steps, got str"),
+        ([{"op": "paint"}], "step 0: 'op' must be one of drop, add"),
         ([{"op": "drop"}], "step 0, drop, needs elements"),
         ([{"op": "drop", "elements": [1], "points": []}], "step 0, drop, has no option points"),
         ([{"op": "drop", "elements": [999]}], "step 0, drop: elements: needs an integer from 0"),
         ([{"op": "drop", "elements": [0.5]}], "elements: needs an integer"),
-        ([{"op": "drop", "elements": [object()]}], "step 0 holds"),
-        ([{"op": "drop", "elements": float("nan")}], "step 0 holds"),
+        ([{"op": "drop", "elements": [object()]}], "step 0: must contain only"),
+        ([{"op": "drop", "elements": float("nan")}], "step 0: must contain only"),
         ([{"op": "add", "points": [[500, 3]]}], "step 0, add: points: point 0, .* outside"),
         ([{"op": "add", "points": "here"}], "points: needs points"),
-        ([{"op": "move", "element": 0, "to": [[1, 2], [3, 4]]}], "to: needs one place"),
+        ([{"op": "move", "element": 0, "to": [[1, 2], [3, 4]]}], "to: must be one place"),
         ([{"op": "layout", "layout": "net"}], "layout: must be one of disjoint"),
         ([{"op": "background", "points": [[48, 48]], "radius": 1000}], "leaves no foreground"),
         ([{"op": "foreground", "points": [[48, 48]], "radius": -1}], "radius: needs a number"),
@@ -145,5 +145,5 @@ def test_bad_corrections(found: ElementAnalysis, steps: object, message: str) ->
 
 def test_elements_must_be_left(found: ElementAnalysis) -> None:
     drop: Callable[[int], dict[str, object]] = lambda n: {"op": "drop", "elements": list(range(n))}  # noqa: E731
-    with pytest.raises(InvalidInput, match="leave 2 elements"):
+    with pytest.raises(InvalidInput, match="must leave at least 3 elements, left 2"):
         correct(found, [drop(len(found.points) - 2)])

@@ -147,7 +147,7 @@ def test_a_saved_entry_has_the_same_labels(tmp_path: Path) -> None:
 
 
 def test_a_mask_of_another_shape_gets_a_sentence() -> None:
-    with pytest.raises(InvalidInput, match=r"mask: needs bool of shape \(96, 96\), got bool \(5, 5\)"):
+    with pytest.raises(InvalidInput, match=r"mask: must be bool of shape \(96, 96\), got bool \(5, 5\)"):
         _ = replace(ENTRY, mask=np.ones((5, 5), bool)).labels
 
 

@@ -341,9 +341,9 @@ def test_regular_layouts() -> None:
     [
         ({"points": np.zeros((0, 2))}, "at least three"),
         ({"points": np.array([[5.0, 5], [9, 9]])}, "at least three elements for a layout, got 2"),
-        ({"points": np.array([[5.0, 5], [5, 5], [9, 9], [7, 20]])}, "is there twice"),
+        ({"points": np.array([[5.0, 5], [5, 5], [9, 9], [7, 20]])}, "occurs twice"),
         ({"points": np.array([[5.0, 5], [np.nan, 5], [9, 9]])}, "must be finite"),
-        ({"points": np.array([[5.0, 5], [500, 5], [9, 9]])}, "lies outside of the image"),
+        ({"points": np.array([[5.0, 5], [500, 5], [9, 9]])}, "is outside the image"),
         ({"mask": np.zeros((5, 5), bool)}, "mask: must be bool of shape"),
         ({"mask": np.ones(SIZE, bool)}, "only foreground"),
         ({"mask": np.zeros(SIZE, bool)}, "no foreground"),

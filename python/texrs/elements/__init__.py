@@ -1,9 +1,10 @@
-"""Elements: where the repeated elements of a texture are, and what belongs to them (Liu et al. 2009, section 3).
+"""Analyse the repeated elements of a texture: their places and pixels (Liu et al. 2009, section 3).
 
-`analyse` finds them, from a box around one and a few places between them, or by itself; `correct` puts right what it got
-wrong, and `to_html` shows it; `load` reads what `ElementAnalysis.save` wrote. `ElementAnalysis.of_sample` takes the truth of a
-generated texture. `ElementAnalysis.instances` are the elements one by one, and `ElementAnalysis.arrangement` is how they lie.
-`Layout` is how they are connected, and `ElementSearch` how they are looked for.
+`analyse` finds the elements by itself, or from a box around one of them and a few places between them. `correct`
+corrects its mistakes, and `to_html` shows the result. `load` reads a file that `ElementAnalysis.save` wrote.
+`ElementAnalysis.of_sample` takes the known elements of a generated texture. `ElementAnalysis.instances` lists the
+elements one by one, and `ElementAnalysis.arrangement` describes their positions. `Layout` specifies how elements are
+connected, and `ElementSearch` how they are searched for.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The analysis of a texture (section 3): where its elements are, what belongs to them, how they are connected."""
+"""Analyse a texture (section 3): positions, pixels and layout of its elements."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from texrs.materials import Material
 from texrs.point_sets import directions, spacing
 
 FEWEST = 3
-"""Elements without which there is no layout."""
+"""Minimum number of elements in a layout."""
 SHORTEST = 16
-"""Least side of an image."""
+"""Minimum side of an image, in pixels."""
 AGAIN = 0.8
-"""Share of the elements of a proposed box that those of a better one must be."""
+"""Minimum number of elements for a better box, as a share of those that the proposed box found."""
 SURE = 0.9
-"""Confidence of what is proposed of the colours of a material, from which on its other maps are not asked."""
+"""Confidence of proposals from the colours of a material that makes an analysis of its other maps unnecessary."""
 LITTLE, MUCH = 0.02, 0.95
-"""Shares of foreground outside of which a mask cannot be right."""
+"""Minimum and maximum plausible share of foreground in a mask."""
 
 
 def analyse(
@@ -55,51 +55,59 @@ def analyse(
     corrections: Sequence[Mapping[str, object]] | None = None,
     progress: Progress | bool | None = None,
 ) -> ElementAnalysis:
-    """Find the elements of a texture, what belongs to them and how they are connected [1]_.
+    """Find the elements of a texture, their pixels and their layout [1]_.
 
-    Everything may be left out: then the element, the background and the layout are proposed, and the report says how sure
-    that is. Where joints part all of a picture, as of a wall or a comb, its cells are the elements, each as it is; with a
-    ``box``, if they are about as large. Otherwise, and with a ``search`` of one's own, what looks like the chosen one is.
+    All arguments except the image are optional. The element, the background and the layout are proposed if they are
+    not given, and the report contains the confidence of each proposal. If joints divide the whole image, as in a wall
+    or a honeycomb, the elements are the cells, each with its own shape. With a ``box``, the cells must be about as
+    large as the box. Otherwise, or with a ``search``, the elements are the places that look like the chosen element.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array, or Material
-        The texture, sides of at least 16; any dtype. A material is decided on by its colours where they
-        tell surely, else by all its maps if these tell more; it is shown by its colours.
+        Texture with sides of at least 16, of any dtype. The colours of a material are analysed first. If their result
+        is uncertain, all maps are analysed as well, and the more certain result is used. The result contains the
+        colours.
     box : (row, column, height, width), optional
-        Centre and size, in pixels, of the box around one element. Of a connected foreground it holds a mesh or a knot.
+        Centre and size of the box around one element, in pixels. For a connected foreground, a box around one mesh or
+        one knot.
     mask : (H, W) array of bool, path or Mask, optional
-        Mask of the foreground: of the chosen element if it lies within the box, else of the whole image, which is then not cut.
+        Mask of the foreground. If it is within the box, it is the foreground of the chosen element. Otherwise it is
+        the foreground of the whole image, and no graph cut is made.
     background : (n, 2) points or (H, W) array of bool, optional
-        Places (row, column) that lie between the elements, each good for 4 pixels around, or all that is known.
+        Points (row, column) between the elements, where each marks a radius of 4 pixels; or a mask of all known
+        background.
     layout : Layout or str, optional
-        Separate elements ("disjoint"), a connected foreground ("connected"), or elements parted by joints ("jointed"); the
-        paper's "F=d", "F=c" and "B=c" are accepted.
+        Layout of the elements: separate ("disjoint"), a connected foreground ("connected"), or separated by joints
+        ("jointed"). The paper's "F=d", "F=c" and "B=c" are accepted.
     points : (n, 2) array, optional
-        The elements (row, column), instead of a search.
+        Centres of the elements (row, column). They replace the search.
     search : ElementSearch
-        How the element is looked for: directions, sizes, least similarity, and how colours are modelled.
+        Options of the search: directions, sizes, minimum similarity and colour model.
     method : {None, "paper"}
-        "paper": the published algorithm, its misprints repaired: one channel, no cut, nearest samples, no cleaning.
+        Method of the analysis. "paper" is the published algorithm with its misprints corrected: one channel, no cut,
+        nearest samples, no cleaning.
     wrap : bool or (rows, columns)
-        Whether the texture repeats without a seam.
+        Axes along which the texture is tileable. A single bool applies to both.
     seed : int
-        Chooses the samples of the mixtures.
+        Seed for the samples of the mixtures.
     corrections : sequence of dict, optional
         Corrections of the result (`texrs.elements.correct`).
     progress : callable or True, optional
-        Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+        Function that is called as ``progress(stage, share)``. An exception from it stops the work. True shows a
+        progress bar.
 
     Returns
     -------
     ElementAnalysis
-        Points by falling similarity, mask, layout and the directions in which the points line up.
+        The analysis: points by falling similarity, mask, layout and the directions of rows of points.
 
     Raises
     ------
     InvalidInput
-        An argument of another shape, type or range; a box outside of the image; a background that contradicts box or
-        mask; a layout that contradicts the mask; corrections that cannot be made; or fewer than three elements.
+        An argument has another shape, type or range, or the box is outside the image. The background contradicts the
+        box or the mask, or the layout contradicts the mask. Corrections are impossible, or fewer than three elements
+        are found.
 
     References
     ----------
@@ -128,16 +136,16 @@ def analyse(
     watch = progress or (lambda stage, share: None)
     guide = _repeat_channel(guidance(pixels))
 
-    # 1. The element, the background and the layout: as said, or proposed.
+    # 1. Use the given element, background and layout, or propose them.
     plain = search == ElementSearch() and not how.literal and not any(how.wrap)
     cellular = start_from_cells(guide, given, watch) if plain else None
     start = propose(guide, given, how.wrap, partial(watch, "propose")) if cellular is None else cellular.start
     _check(given, start, how)
 
-    # 2. Where the texture looks like the element.
+    # 2. Find where the texture looks like the element.
     seen = _detect(guide, given, start, how, partial(watch, "search")) if cellular is None else cellular.found
 
-    # 3. What belongs to the elements.
+    # 3. Find the pixels of the elements.
     watch("separate", 0.0)
     with answering(watch, "separate", 0.0):
         parted = _separate(guide, given, start, seen, how) if cellular is None else cellular.parted
@@ -145,8 +153,8 @@ def analyse(
     start, parted = _extend(guide, given, start, parted, how) if cellular is None else (start, parted)
     if len(parted.points) < FEWEST:
         raise InvalidInput(
-            f"image: {len(parted.points)} elements were found, at least {FEWEST} are needed; try another box, more "
-            f"rotations or scales, a lower threshold (it was {seen.threshold:.2f}), or give the points"
+            f"image: must show at least {FEWEST} elements, found {len(parted.points)}; try another box, "
+            f"more rotations or scales, a threshold below {seen.threshold:.2f}, or give the points"
         )
     watch("separate", 0.3)
     again = _reanalyse(pixels, given, start, parted, how, lambda name, share: watch("separate", 0.3))
@@ -163,7 +171,7 @@ def analyse(
 
 
 def _choose_map(material: Material, look: Callable[[Array], ElementAnalysis]) -> ElementAnalysis:
-    """Return what is found in the colours of a material, or in all its maps where that is surer."""
+    """Return the analysis of a material's colours, or of all its maps if that is more certain."""
     entries: list[ElementAnalysis] = []
     trouble: InvalidInput | None = None
     for pixels in (material.base, material.guide):
@@ -180,17 +188,17 @@ def _choose_map(material: Material, look: Callable[[Array], ElementAnalysis]) ->
 
 
 def _be_sure(entry: ElementAnalysis) -> float:
-    """Return how sure the least sure of what was proposed is."""
+    """Return the confidence of the least certain proposal."""
     return float(min(entry.report["confidence"].values(), default=1.0))
 
 
 def _repeat_channel(guide: Floats) -> Floats:
-    """Return colours of two channels with the first one twice: what is compared has one or three."""
+    """Return colours with one or three channels, by repeating the first of two."""
     return np.concatenate([guide, guide[..., :1]], axis=-1) if guide.shape[-1] == 2 else guide
 
 
 def _check(given: Arguments, start: Start, how: Settings) -> None:
-    """Check that what is said of a texture, and what was proposed for the rest, does not contradict itself."""
+    """Check that the arguments and the proposals do not contradict each other."""
     check_consistency(given.mask, start.background, start.box, start.layout)
     trouble = "" if given.whole is None else find_contradiction(given.whole, start.layout, how.wrap)
     if trouble:
@@ -198,7 +206,7 @@ def _check(given: Arguments, start: Start, how: Settings) -> None:
 
 
 def _detect(guide: Floats, given: Arguments, start: Start, how: Settings, progress: Any) -> Detections:
-    """Find the places that look like the element, or take the points that are listed, all equally like it."""
+    """Find the places that look like the element, or use the given points with full similarity."""
     if given.points is not None:
         size = guide.shape[:2]
         pixels = np.clip(np.floor(given.points + 0.5).astype(np.intp), 0, np.array(size) - 1)
@@ -218,7 +226,7 @@ def _detect(guide: Floats, given: Arguments, start: Start, how: Settings, progre
 
 
 def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Separation:
-    """Separate the elements from the ground, and make detections and mask agree as far as the layout says how."""
+    """Separate the elements from the background, and reconcile detections and mask for the layout."""
     mask = given.whole if given.whole is not None else _cut(guide, given, start, found, how)
     plain = Separation(found.points, found.scores, np.arange(len(found.points)), mask, "cut")
     if how.literal or not len(found.points):
@@ -228,7 +236,7 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
         own = given.shape if given.shape is not None else _mask.ellipse(start.box.size)
         certain = given.whole is not None
         agreed = reconcile(mask, found, own, how.wrap, certain=certain)
-        # What a user lists stays as it is; the mask alone follows.
+        # The user's points stay as they are. Only the mask is adapted.
         return replace(plain, mask=agreed.mask, made_by=agreed.made_by) if listed else agreed
     jointed = start.layout == Layout.JOINTED
     if not listed and (jointed or mask[find_nearest_pixels(found.points, mask.shape)].mean() < 0.5):
@@ -239,7 +247,7 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
 def _extend(
     guide: Floats, given: Arguments, start: Start, parted: Separation, how: Settings
 ) -> tuple[Start, Separation]:
-    """Extend separate elements by what all of them have around them; what a user says of them stays."""
+    """Extend separate elements by their common surroundings. Data from the user stay unchanged."""
     said = given.points is not None or given.whole is not None or given.shape is not None
     if said or how.literal or start.layout != Layout.DISJOINT or not len(parted.points):
         return start, parted
@@ -253,7 +261,7 @@ def _extend(
 
 
 def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Bools:
-    """Cut the foreground out by its colours (section 3.3)."""
+    """Cut out the foreground by its colours (section 3.3)."""
     mask = _mask.cut_foreground(
         to_lab(guide),
         np.concatenate([[start.box.centre], found.pixels]),
@@ -275,9 +283,11 @@ def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: 
 def _reanalyse(
     pixels: Array, given: Arguments, start: Start, parted: Separation, how: Settings, progress: Progress
 ) -> ElementAnalysis | None:
-    """Analyse again from the box of a usual piece of the mask: what was proposed may lie beside the middle of an element.
+    """Analyse again from the box of a typical mask component.
 
-    Return None where the box was said, or where that finds far fewer elements.
+    The proposed box may not be centred on an element.
+
+    Return None if the box was given, or if the new box finds far fewer elements.
     """
     disjoint = start.layout == Layout.DISJOINT and parted.made_by == "cut"
     if "box" not in start.proposed or not disjoint or how.literal or given.points is not None:
@@ -304,7 +314,7 @@ def _reanalyse(
 def _make_entry(
     pixels: Array, given: Arguments, start: Start, found: Detections, parted: Separation, how: Settings
 ) -> ElementAnalysis:
-    """Return the entry of a texture, with a report of what was found and decided."""
+    """Return the entry of a texture, with a report of the results and decisions."""
     report: dict[str, Any] = {
         "proposed": start.proposed,
         "warnings": _list_doubts(given, start, parted, how),
@@ -337,7 +347,7 @@ def _make_entry(
 
 
 def _list_doubts(given: Arguments, start: Start, parted: Separation, how: Settings) -> list[str]:
-    """Return what speaks against the result, in words."""
+    """Return warnings about the result, as texts."""
     share = parted.mask.mean()
     found = [] if given.whole is not None else [find_contradiction(parted.mask, start.layout, how.wrap)]
     if not LITTLE <= share <= MUCH:
@@ -346,6 +356,6 @@ def _list_doubts(given: Arguments, start: Start, parted: Separation, how: Settin
 
 
 def _sample_places(marked: Bools, most: int = 64) -> list[list[int]]:
-    """Return at most about so many of the pixels that are marked, evenly spread."""
+    """Return about ``most`` marked pixels at most, evenly spread."""
     places: NDArray[np.intp] = np.argwhere(marked)
     return [[int(r), int(c)] for r, c in places[:: max(1, len(places) // most)]]

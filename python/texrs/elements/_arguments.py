@@ -1,4 +1,4 @@
-"""What is said of a texture to `texrs.elements.analyse`, checked: box, layout, background, mask and points."""
+"""Check the arguments of `texrs.elements.analyse`: box, layout, background, mask and points."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Shape = tuple[int, int]
 Wrap = tuple[bool, bool]
 
 LEAST, MOST = 3, 100_000
-"""Sides of a box in pixels, and points of a list, at the least and at most."""
+"""Minimum side of a box in pixels, and maximum number of points."""
 CENTRE = 0.5
-"""Part of a box, as a share of its sides, that is foreground for sure unless the foreground is a net."""
+"""Central part of a box, as a share of its sides, that certainly is foreground unless the foreground is a net."""
 MAIN = 0.5
-"""Share of the foreground, or the background, that is in one piece where it is connected."""
+"""Minimum share of a connected foreground, or background, in its largest component."""
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Centre and sides of an element's box, whole pixels; the sides are odd."""
+    """Centre and sides of the box of an element, in whole pixels. The sides are odd."""
 
     centre: tuple[int, int]
     size: tuple[int, int]
@@ -37,24 +37,24 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arguments:
-    """What is said of a texture, checked; None where nothing is.
+    """Checked arguments about a texture. Each is None if it was not given.
 
     Attributes
     ----------
     box : Box
-        Of one element.
+        Box of one element.
     layout : Layout
-        How its elements hang together.
+        Layout of the elements.
     background : (H, W) bool
-        What is no element for sure.
+        Pixels that certainly are not in an element.
     mask : (H, W) bool
-        Foreground, of the chosen element or of the whole image.
+        Foreground of the chosen element or of the whole image.
     shape : (h, w) bool
-        The foreground in the box of the chosen element, where the mask tells.
+        Foreground in the box of the chosen element, if the mask specifies it.
     whole : (H, W) bool
-        The mask, where it is that of the whole image.
+        The mask, if it covers the whole image.
     points : (n, 2) float64
-        The elements.
+        Centres of the elements.
 
     """
 
@@ -78,7 +78,7 @@ class Arguments:
         mask: object,
         points: object,
     ) -> Arguments:
-        """Check the arguments of an image of that size."""
+        """Check the arguments for an image of a given size."""
         place = None if box is None else as_box(box, size)
         ground = as_background(background, size)
         kind = None if layout is None else as_layout(layout)
@@ -87,25 +87,27 @@ class Arguments:
         if marked is None:
             return cls(place, kind, ground, None, None, None, listed)
         if not marked.any() or marked.all():
-            raise InvalidInput(f"mask: is {'all' if marked.any() else 'no'} foreground")
+            raise InvalidInput(
+                f"mask: must contain foreground and background, got only {'foreground' if marked.any() else 'background'}"
+            )
         place = choose_usual_box(marked, kind, wrap) if place is None else place
         return cls(place, kind, ground, marked, *split_mask(marked, place, wrap), listed)
 
 
 def as_box(value: object, shape: Shape, name: str = "box") -> Box:
-    """Check a box: (row, column, height, width), centre and size, inside the image."""
+    """Check a box (row, column, height, width): centre and size, inside the image."""
     wanted = f"{name}: needs (row, column, height, width), the centre and the size of a box in pixels"
     numbers = try_array(value, np.float64)
     if numbers.shape != (4,) or not np.isfinite(numbers).all():
         raise InvalidInput(f"{wanted}, got {value!r}")
     if min(numbers[2:]) < LEAST:
-        raise InvalidInput(f"{name}: sides of at least {LEAST} pixels are needed, got {numbers[2:].tolist()}")
+        raise InvalidInput(f"{name}: sides must be at least {LEAST} pixels, got {numbers[2:].tolist()}")
     for axis, side in enumerate(shape):
         low, high = numbers[axis] - numbers[axis + 2] / 2, numbers[axis] + numbers[axis + 2] / 2
         if low < -1 or high > side:
             along = ("rows", "columns")[axis]
             raise InvalidInput(
-                f"{name}: reaches from {low:g} to {high:g} along the {along}, outside of the image, "
+                f"{name}: reaches from {low:g} to {high:g} along the {along}, outside the image, "
                 f"which has {side}; (row, column) is the centre"
             )
     row, column = (int(np.clip(np.floor(numbers[a] + 0.5), 0, shape[a] - 1)) for a in range(2))
@@ -114,12 +116,12 @@ def as_box(value: object, shape: Shape, name: str = "box") -> Box:
 
 
 def as_points(value: object, shape: Shape, name: str) -> Points:
-    """Check a list of points (row, column) inside the image, all finite and different."""
+    """Check a list of points (row, column): inside the image, finite and different."""
     wanted = f"{name}: needs points (row, column), shape (n, 2)"
     try:
         points = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError, MemoryError):
-        raise InvalidInput(f"{wanted}, got what is no array of numbers") from None
+        raise InvalidInput(f"{wanted}, got a value that is not an array of numbers") from None
     if points.size == 0:
         return np.zeros((0, 2))
     if points.shape == (2,):
@@ -127,7 +129,7 @@ def as_points(value: object, shape: Shape, name: str) -> Points:
     if points.ndim != 2 or points.shape[1] != 2:
         raise InvalidInput(f"{wanted}, got shape {points.shape}")
     if len(points) > MOST:
-        raise InvalidInput(f"{name}: up to {MOST} points are allowed, got {len(points)}")
+        raise InvalidInput(f"{name}: must have at most {MOST} points, got {len(points)}")
     if not np.isfinite(points).all():
         row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
         raise InvalidInput(f"{name}: must be finite, but point {row} is {points[row].tolist()}")
@@ -138,17 +140,17 @@ def as_points(value: object, shape: Shape, name: str) -> Points:
         fits = ((turned >= -0.5) & (turned <= np.array(shape) - 0.5)).all()
         hint = "; if the two numbers of each point are exchanged, all are inside" if fits else ""
         raise InvalidInput(
-            f"{name}: point {row}, (row, column) = {points[row].tolist()}, lies outside of the image of {shape}{hint}"
+            f"{name}: point {row}, (row, column) = {points[row].tolist()}, is outside the image of {shape}{hint}"
         )
     different, first = np.unique(points, axis=0, return_index=True)
     if len(different) < len(points):
         row = sorted(set(range(len(points))) - set(first.tolist()))[0]
-        raise InvalidInput(f"{name}: point {row}, {points[row].tolist()}, is there twice")
+        raise InvalidInput(f"{name}: point {row}, {points[row].tolist()}, occurs twice")
     return points
 
 
 def as_background(value: object, shape: Shape) -> Bools | None:
-    """Check what is known of the background, points or a mask; None where nothing is said."""
+    """Check the known background, points or a mask. None if it is not given."""
     if value is None:
         return None
     array = try_array(value) if not isinstance(value, Sequence) or len(value) else np.zeros((0, 2))
@@ -158,24 +160,27 @@ def as_background(value: object, shape: Shape) -> Bools | None:
         marked = disc(shape, as_points(value, shape, "background"))
     if not marked.any():
         raise InvalidInput(
-            "background: marks nothing; give points (row, column) that lie between the elements, "
-            "or leave it out and it is proposed"
+            "background: must not be empty; give points (row, column) between the elements, "
+            "or omit it to have it proposed"
         )
     return marked
 
 
 def choose_usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
-    """Return the box of the most usual piece of a mask that no border cuts."""
+    """Return the box of the most typical mask component that no border cuts."""
     regions = rank_pieces(label_components(mask, wrap)[0], LEAST**2)
     if not regions or layout == Layout.CONNECTED:
-        raise InvalidInput("box: is needed with this mask, no piece of which lies wholly inside the image")
+        raise InvalidInput("box: must be given, because no component of the mask is entirely inside the image")
     top, left, bottom, right = regions[0].bbox
     shape = (mask.shape[0], mask.shape[1])
     return as_box(((top + bottom - 1) / 2, (left + right - 1) / 2, bottom - top, right - left), shape)
 
 
 def split_mask(mask: Bools, box: Box, wrap: Wrap) -> tuple[Bools, Bools | None]:
-    """Return the foreground in the box of the chosen element, and the mask where it is of the whole image, else None."""
+    """Return the foreground in the chosen element's box, and the mask if it covers the whole image.
+
+    The second is None otherwise.
+    """
     inside = np.zeros(mask.shape, bool)
     stamp(inside, np.array([box.centre]), np.ones(tuple(n + 2 for n in box.size), bool), wrap)
     count = label_components(mask, wrap)[1]
@@ -186,17 +191,17 @@ def split_mask(mask: Bools, box: Box, wrap: Wrap) -> tuple[Bools, Bools | None]:
         np.ix_(*(w % n if c else np.clip(w, 0, n - 1) for w, n, c in zip(window, mask.shape, wrap, strict=True)))
     ]
     if not own.any():
-        raise InvalidInput("mask: has no foreground in the box")
+        raise InvalidInput("mask: must contain foreground in the box")
     return own, None if alone else mask
 
 
 def check_consistency(mask: Bools | None, background: Bools | None, box: Box, layout: Layout | None) -> None:
-    """Check that what was said does not contradict itself."""
+    """Check that the arguments do not contradict each other."""
     if background is None:
         return
     if mask is not None and (mask & background).any():
         row, column = np.argwhere(mask & background)[0].tolist()
-        raise InvalidInput(f"background: contradicts the mask, which calls ({row}, {column}) foreground")
+        raise InvalidInput(f"background: contradicts the mask, where ({row}, {column}) is foreground")
     if mask is None and layout in (Layout.DISJOINT, Layout.JOINTED):
         middle = ellipse(box.size, CENTRE)
         rows, columns = np.nonzero(middle)
@@ -206,13 +211,13 @@ def check_consistency(mask: Bools | None, background: Bools | None, box: Box, la
         if hit.any():
             row, column = places[:, inside][:, hit][:, 0].tolist()
             raise InvalidInput(
-                f"background: contradicts the box, in whose middle ({row}, {column}) lies; with the layout {layout} "
+                f"background: contradicts the box, because ({row}, {column}) is in its middle; with the layout {layout} "
                 "the middle of an element is foreground"
             )
 
 
 def find_contradiction(mask: Bools, layout: Layout, wrap: Wrap) -> str:
-    """Return how a mask contradicts a layout; empty if it does not."""
+    """Return how a mask contradicts a layout. Empty if it does not."""
     if mask.all() or not mask.any():
         return f"the mask is {'all' if mask.any() else 'no'} foreground"
     pieces, ground = (label_components(m, wrap)[0] for m in (mask, ~mask))

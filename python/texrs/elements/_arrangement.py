@@ -1,4 +1,4 @@
-"""How the elements of a texture are arranged: their spacing, and the lattice or the courses that they lie in."""
+"""Describe the arrangement of elements: their spacing, and their lattice or courses."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ __all__ = ["Arrangement", "describe_arrangement"]
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """How elements are arranged.
+    """The arrangement of elements.
 
     Attributes
     ----------
     spacing : float
-        How far they lie apart, in pixels.
+        Distance between neighbours, in pixels.
     lattice : ((float, float), (float, float)) or None
-        The two steps, (rows, columns) in pixels, of the lattice that they lie on; None where on none.
+        The two steps, (rows, columns) in pixels, of the lattice of the elements. None without a lattice.
     courses : tuple of float or None
-        The rows, in pixels, of the courses that they lie in; None where in none.
+        The rows, in pixels, of the courses of the elements. None without courses.
     darker : bool
-        Whether what is not foreground, the ground, the joints or what is seen through a net, is darker than what is.
+        True if the rest (background, joints, or the openings of a net) is darker than the foreground.
 
     Examples
     --------
@@ -46,12 +46,12 @@ class Arrangement:
     darker: bool
 
     def describe(self, layout: Layout) -> str:
-        """Return it in words.
+        """Return a description in words.
 
         Parameters
         ----------
         layout : Layout
-            How the elements hang together, which names what lies between them.
+            Layout of the elements, which determines the word for the space between them.
 
         Returns
         -------
@@ -60,7 +60,7 @@ class Arrangement:
         Raises
         ------
         KeyError
-            No such layout.
+            The layout does not exist.
 
         Examples
         --------
@@ -81,7 +81,10 @@ class Arrangement:
 
 
 def describe_arrangement(image: Array, points: NDArray[np.float64], mask: Bools) -> Arrangement:
-    """Return how elements are arranged, of a texture's picture, their centres (n, 2), n >= 2, and its foreground (H, W)."""
+    """Return the arrangement of elements.
+
+    The arguments are the image, the centres (n, 2) with n >= 2, and the foreground (H, W).
+    """
     unit = spacing(points)
     found = find_lattice(points, unit) if len(points) > 3 else None
     rows = find_courses(points, unit)

@@ -1,4 +1,4 @@
-"""Boxes that may hold an element: round things of every size, pieces of a segmentation, cells of a lattice."""
+"""Propose boxes for an element: blobs of every size, areas of a segmentation, cells of a lattice."""
 
 from __future__ import annotations
 
@@ -13,17 +13,20 @@ from texrs.exemplar.regularity import find_lattice
 from texrs.exemplar.segmentation import ElementOptions, segment
 
 SIGMAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
-"""Standard deviations under which blobs are looked for there, in pixels."""
+"""Standard deviations of the Gaussians for detecting blobs, in pixels."""
 A_KIND, PIECES = 3, 6
-"""Boxes tried for each size of blobs, and of pieces."""
+"""Number of boxes for each size of blobs, and for segmented areas."""
 BLOB = 2.6
-"""Side of the box around a blob over the standard deviation of its Gaussian; a disc's diameter is 2.83 of it."""
+"""Ratio of the side of the box around a blob to the standard deviation of its Gaussian.
+
+For a disc, the diameter has the ratio 2.83.
+"""
 LARGEST = 0.34
-"""Longest side of a box as a share of the image's: three must fit."""
+"""Maximum side of a box, as a share of the side of the image: three boxes must fit."""
 
 
 def propose_boxes(small: Floats) -> list[Box]:
-    """List boxes worth trying, none twice."""
+    """List candidate boxes without duplicates."""
     size = (small.shape[0], small.shape[1])
     found: list[tuple[float, float, float, float]] = [*_find_blobs(small), *_find_pieces(small), *_find_periods(small)]
     kept: dict[tuple[int, ...], Box] = {}
@@ -38,7 +41,7 @@ def propose_boxes(small: Floats) -> list[Box]:
 
 
 def _find_blobs(small: Floats) -> list[tuple[float, float, float, float]]:
-    """Find round things: tops of the normalised Laplacian in scale and space (Lindeberg 1998)."""
+    """Find blobs: maxima of the normalised Laplacian in scale and space (Lindeberg 1998)."""
     from scipy.ndimage import gaussian_laplace, maximum_filter
 
     light = to_lab(small)[..., 0]
@@ -56,14 +59,14 @@ def _find_blobs(small: Floats) -> list[tuple[float, float, float, float]]:
             if len(places) < 3:
                 continue
             values = signed[k][tuple(places.T)]
-            # Those of usual strength: the strongest are often something else.
+            # Prefer blobs of usual strength: the strongest are often not elements.
             order = np.lexsort((places[:, 1], places[:, 0], np.abs(values - np.quantile(values, 0.7))))
             found += [(float(r), float(c), BLOB * sigma, BLOB * sigma) for r, c in places[order[:A_KIND]]]
     return found
 
 
 def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
-    """Take pieces of a segmentation by colour, of the usual size."""
+    """Return boxes of segmented areas of usual size."""
     inner = rank_pieces(segment(small, ElementOptions(segmentation="components")).elements)
     if len(inner) < 3:
         return []
@@ -77,7 +80,7 @@ def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
 
 
 def _find_periods(small: Floats) -> list[tuple[float, float, float, float]]:
-    """Take the cell of the lattice that the image repeats on, at its evenest places."""
+    """Return boxes of one lattice cell, at the most even places of the image."""
     from scipy.ndimage import gaussian_gradient_magnitude, uniform_filter
 
     regular = find_lattice(small)
@@ -100,7 +103,7 @@ def _find_periods(small: Floats) -> list[tuple[float, float, float, float]]:
 
 
 def resize_box(box: Box, size: tuple[int, ...]) -> list[Box]:
-    """List the boxes with one side a third longer or shorter, or both, that fit."""
+    """List boxes with one or both sides longer or shorter by 1/3, if they fit."""
     found = []
     for tall, wide in ((1.35, 1), (1, 1.35), (0.74, 1), (1, 0.74), (1.35, 1.35), (0.74, 0.74)):
         sides = (round_to_odd(box.size[0] * tall + 0.5), round_to_odd(box.size[1] * wide + 0.5))

@@ -1,10 +1,10 @@
-"""A start from cells: where joints part all of a picture, each cell is an element, whatever it looks like.
+"""Start an analysis from cells: if joints divide the whole image, each cell is an element.
 
-A wall, a comb or a floor is searched in vain for places that look like one of its stones: these are of many sizes, and what all
-have in common are their joints (`texrs.exemplar.cells`). Cells are taken
+A search for similar places fails on a wall, a honeycomb or a floor. The cells have many sizes, and only their joints
+are similar (`texrs.exemplar.cells`). Cells are used in two cases:
 
-- without a hint, where the picture falls into cells for sure, unless these look like things on a ground, dark between them;
-- with a box, where they are as large as that, and the layout is not of separate elements.
+- Without hints, if the image certainly consists of cells that do not look like objects.
+- With a box, if the cells are about as large as the box. The layout must not be "disjoint".
 """
 
 from __future__ import annotations
@@ -27,42 +27,51 @@ from texrs.exemplar.shapes import mark_outlines
 __all__ = ["CellStart", "start_from_cells"]
 
 SURE = 0.8
-"""Confidence in cells from which on they are elements: of 40 photographs those with joints lie above it, those without below
-.7, but for heaps of stones, beans and peppers."""
+"""Minimum confidence in cells.
+
+It was measured on 40 photographs. All with joints have more. Those without joints have less than 0.7, except heaps of
+stones, beans and peppers.
+"""
 HEAPED, DARK = 0.95, 0.2
-"""Confidence, and contrast of joints, a lightness of 0 to 1, from which on even what looks like things on a ground leaves
-nothing of it: between heaped fruit it is dark, between pebbles on sand it is not."""
+"""Minimum confidence, and minimum contrast of joints in lightness from 0 to 1, for cells that look like objects on a
+background.
+
+Gaps between heaped fruit are dark enough for this, sand between pebbles is not.
+"""
 FEWEST = 4
-"""Cells that there must be."""
+"""Minimum number of cells."""
 NARROW = 0.75
-"""Width at which cells are looked for, over that of a box around one: joints must not be too fine for it."""
+"""Ratio of the search width of cells to the width of a box around one. The search then finds even fine joints.
+"""
 ALIKE = 1.35
-"""Factor by which the sides of a box may differ from those of the usual cell."""
+"""Maximum factor between the sides of a box and those of the usual cell."""
 NET = {-1: 0.125, 1: 0.075}
-"""Contrast of joints, a lightness of 0 to 1, times their share of the picture, from which on they are a figure of their own,
-as a net, cracks or wax; of dark joints more, for between stones it is dark anyway."""
+"""Minimum contrast of joints (lightness from 0 to 1) times their share of the image for a net, cracks or wax.
+
+The value for dark joints is higher, because gaps between stones are dark anyway.
+"""
 FAINT = 0.02
-"""Contrast of joints below which there are none."""
+"""Minimum contrast of joints."""
 REACH = 0.15
-"""Sizes of a cell that half of a joint is wide, at the most."""
+"""Maximum half width of a joint, in sizes of a cell."""
 BETWEEN = 0.5
-"""Share of what is said to be background that must look like joints."""
+"""Minimum share of the given background that must look like joints."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellStart:
-    """What an analysis starts from where it has cells.
+    """Starting point of an analysis of cells.
 
     Attributes
     ----------
     start : Start
-        Box of the most usual cell, layout and confidence.
+        Box of the most typical cell, layout and confidence.
     found : Detections
-        The cells, the surest first.
+        The cells, the most certain first.
     parted : Separation
-        The same, with the foreground: the cells where they are jointed, else the joints.
+        The cells with the foreground: the cells themselves for jointed elements, else the joints.
     labels : (H, W) int32
-        The cell of each pixel, numbered as they are found, from 1; 0 in joints.
+        Cell of each pixel, from 1 in the order of the detections; 0 in joints.
 
     """
 
@@ -73,7 +82,10 @@ class CellStart:
 
 
 def start_from_cells(guide: Floats, given: Arguments, progress: Progress) -> CellStart | None:
-    """Take the cells of a picture for elements; None where it has none that are sure, or something else was said."""
+    """Return the cells of an image as elements.
+
+    None if the cells are uncertain or contradict the arguments.
+    """
     if given.layout == Layout.DISJOINT or given.mask is not None or given.points is not None:
         return None
     said = None if given.box is None else float(min(given.box.size))
@@ -98,13 +110,16 @@ def start_from_cells(guide: Floats, given: Arguments, progress: Progress) -> Cel
 
 
 def _measure_sides(cells: Cells) -> NDArray[np.float64]:
-    """Return the usual height and width of cells that no border cuts, if there are some."""
+    """Return the median height and width of whole cells, or of all cells if none is whole."""
     whole = cells.whole if cells.whole.any() else np.ones(cells.count, bool)
     return np.asarray(np.median(np.ptp(cells.outlines[whole], axis=1), axis=0), np.float64)
 
 
 def _are_things(small: Floats, cells: Cells) -> bool:
-    """Return whether cells look like things on a ground; not where that is lighter, or so dark that there is none."""
+    """Return whether cells look like objects on a background.
+
+    False if the background is lighter than the cells, or so dark that it must be gaps.
+    """
     heaped = cells.confidence >= HEAPED and _measure_contrast(small, cells) >= DARK
     if cells.polarity > 0 or heaped or cells.confidence >= CELLS:
         return False
@@ -115,7 +130,7 @@ def _are_things(small: Floats, cells: Cells) -> bool:
 
 
 def _measure_contrast(guide: Floats, cells: Cells) -> float:
-    """Return how the lightness of joints differs from that of cells, as seen without single pixels."""
+    """Return the difference in lightness between joints and cells, after smoothing by 1 pixel."""
     from scipy.ndimage import gaussian_filter
 
     light, joint = gaussian_filter(to_lab(guide)[..., 0], 1.0), cells.joints > 0.5
@@ -125,9 +140,9 @@ def _measure_contrast(guide: Floats, cells: Cells) -> float:
 
 
 def _make_start(guide: Floats, given: Arguments, cells: Cells) -> CellStart:
-    """Make of cells what an analysis goes on from."""
+    """Return the starting point of an analysis from its cells."""
     shape = (guide.shape[0], guide.shape[1])
-    # Joints that are a figure of their own, or only part cells.
+    # Decide whether the joints are a figure, such as a net, or only separate cells.
     net = _measure_contrast(guide, cells) * float((cells.joints > 0.5).mean()) >= NET[cells.polarity]
     layout = given.layout or (Layout.CONNECTED if net else Layout.JOINTED)
     box = given.box or _choose_box(cells, shape)
@@ -150,7 +165,10 @@ def _make_start(guide: Floats, given: Arguments, cells: Cells) -> CellStart:
 
 
 def _mark_inside(cells: Cells) -> Bools:
-    """Mark the pixels of cells that are no joint: what looks like one farther in is the cell's own."""
+    """Mark the pixels of cells outside joints.
+
+    Pixels that look like joints but are far inside a cell belong to the cell.
+    """
     from scipy.ndimage import distance_transform_edt
 
     depth = distance_transform_edt(~mark_outlines(cells.labels))
@@ -158,7 +176,10 @@ def _mark_inside(cells: Cells) -> Bools:
 
 
 def _choose_box(cells: Cells, shape: tuple[int, int]) -> Box:
-    """Return the box of the whole cell that is most usual, and nearest to the middle of those that are."""
+    """Return the box of the whole cell with the most usual sides.
+
+    Among equally usual cells, the nearest to the middle of the image is used.
+    """
     sides = _measure_sides(cells)
     size = np.clip(sides, LEAST, np.array(shape) - 1)
     own = np.ptp(cells.outlines, axis=1)

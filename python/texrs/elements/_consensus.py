@@ -1,7 +1,7 @@
-"""How far separate elements reach, by what all of them have around them.
+"""Extend separate elements by the surroundings that all of them share.
 
-A cut between colours stops at a rim that the ground's colours claim too, and at the dark side of what is lit; but where every
-element has the same around it, and that is not the ground, it is part of the element.
+A cut by colours stops at a rim whose colours also occur in the background, and at the dark side of a lit element. If
+all elements have the same surroundings, and these differ from the background, the surroundings belong to the element.
 """
 
 from __future__ import annotations
@@ -17,27 +17,33 @@ from texrs.elements._mask import Wrap, round_to_odd, stamp
 __all__ = ["Extent", "extend_mask"]
 
 WIDE = 2.0
-"""Sides of what is compared around elements, over those of the box."""
+"""Sides of the compared window, as a multiple of the box."""
 FAR, LEAST = 1.3, 100
-"""Of the box: from where on the picture is ground; and the pixels of it that tell what ground looks like."""
+"""Distance from elements, in boxes, beyond which pixels are background; and minimum number of such pixels for an
+estimate of its colours.
+"""
 FEWEST = 4
-"""Elements that must show a place around them, so that it is known what they have there."""
+"""Minimum number of elements that must show a place in their window before its common colour is estimated."""
 CLEAR = 1.5
-"""Difference of what elements have from the ground, over how much both vary, from which on it belongs to them."""
+"""Minimum ratio of the difference between elements and background to the variation of both.
+
+Pixels above it belong to elements.
+"""
 GROWN, GUESSED = 1.2, 0.4
-"""Area that elements have together, over the usual one, from which on the mask is at fault; and over one that is a guess."""
+"""Minimum ratio of the common area to the usual area for replacing the mask, if it is certain and if it is guessed.
+"""
 PASSES, MOST = 2, 64
-"""How often elements are compared and moved to where they agree, and how many are compared at most."""
+"""Number of passes that compare and move elements, and maximum number of elements that are compared."""
 NUDGE = 2
-"""Pixels that a whole element is moved by at most, to lie as all of them do; what the border cuts goes farther."""
+"""Maximum shift of a whole element to match the others, in pixels. Elements that the border cuts may move farther."""
 SEEN = 0.25
-"""Share of an element that must be seen to tell where it lies."""
+"""Minimum visible share of an element for finding its position."""
 SOLID = 0.8
-"""Share of its convex hull that an element fills at least."""
+"""Minimum share of its convex hull that an element fills."""
 
 
 class Extent(NamedTuple):
-    """The foreground (H, W), the middles of elements (n, 2) in pixels, and the rows and columns of one."""
+    """Foreground (H, W), centres of elements (n, 2) in pixels, and rows and columns of one element."""
 
     mask: Bools
     points: NDArray[np.float64]
@@ -47,24 +53,25 @@ class Extent(NamedTuple):
 def extend_mask(
     colours: Floats, mask: Bools, points: NDArray[np.float64], box: tuple[int, int], wrap: Wrap, *, sure: bool
 ) -> Extent | None:
-    """Return how far elements reach by what they have in common.
+    """Return the extent of elements, from their common surroundings.
 
-    None where they have no more in common than the mask holds.
+    None if they share no more than the mask contains.
 
     Parameters
     ----------
     colours : (H, W, 3) float32
-        Lab / 100.
+        Colours in Lab / 100.
     mask : (H, W) bool
-        The foreground.
+        Foreground.
     points : (n, 2) float64
-        The elements.
+        Centres of the elements.
     box : (int, int)
-        Rows and columns of one.
+        Rows and columns of an element.
     wrap : (bool, bool)
-        Along which axes the picture goes around.
+        Axes along which the image is periodic.
     sure : bool
-        Whether what is in the mask is known to be foreground; else it tells how large elements may be.
+        If True, the pixels of the mask certainly are foreground. If False, the mask only indicates the size of
+        elements.
 
     """
     half = np.array([round(WIDE * n / 2) for n in box])
@@ -78,7 +85,7 @@ def extend_mask(
     noise = 1.5 * float(np.median(np.sqrt(((ground - usual_ground) ** 2).sum(axis=1))))
     places, usual = np.rint(points), 0.0
     for turn in range(PASSES):
-        # Of many, some tell what all have.
+        # If there are many elements, a part of them is enough to find the common colours.
         window, shown = _look_around(colours, places[:MOST], away, wrap)
         known = _look_around(mask[..., np.newaxis], places[:MOST], away, wrap)[0][..., 0]
         typical = np.nanmedian(window, axis=0)
@@ -107,7 +114,10 @@ def extend_mask(
 def _look_around(
     picture: Array, places: NDArray[np.float64], away: NDArray[np.intp], wrap: Wrap
 ) -> tuple[NDArray[np.float64], Bools]:
-    """Return what a picture (H, W, c) shows around places, NaN beyond its border, and where it shows something."""
+    """Return windows of an image (H, W, c) around places, and masks of their visible pixels.
+
+    Pixels beyond the border are NaN.
+    """
     size = np.array(picture.shape[:2])
     at = places.astype(np.intp)[:, np.newaxis, np.newaxis] + away
     at = np.where(wrap, at % size, at)
@@ -117,9 +127,12 @@ def _look_around(
 
 
 def _find_piece(common: Bools, away: NDArray[np.intp], box: tuple[int, int], *, notched: bool) -> Bools | None:
-    """Return the piece in the middle that hangs together, without holes; None where none is compact and ends in the window.
+    """Return the connected area in the middle, without holes.
 
-    With ``notched`` its hull: what varies from one element to the next leaves notches, which no mask is there to fill.
+    None if no area is compact and ends inside the window.
+
+    If ``notched``, return its convex hull: parts that vary between elements leave notches, and no mask is available to
+    fill them.
     """
     from scipy import ndimage
     from skimage.morphology import convex_hull_image
@@ -138,7 +151,7 @@ def _find_piece(common: Bools, away: NDArray[np.intp], box: tuple[int, int], *, 
 
 
 def _mark_cut(unlike: Bools, box: tuple[int, int], wrap: Wrap) -> Bools:
-    """Mark the pieces of what is unlike the ground that the border cuts off elements that were not found."""
+    """Mark areas unlike the background that are parts of undetected elements cut by the border."""
     from scipy import ndimage
 
     pieces, count = ndimage.label(unlike)
@@ -159,7 +172,10 @@ def _align(
     far: NDArray[np.intp],
     wrap: Wrap,
 ) -> NDArray[np.float64]:
-    """Move elements to where what is seen of them looks most like all: whole ones a little, others so far at most."""
+    """Move elements to where their visible part best matches the common colours.
+
+    Whole elements move a little, others up to a limit.
+    """
     size = np.array(colours.shape[:2])
     moves = np.stack(np.meshgrid(*(np.arange(-f, f + 1) for f in far), indexing="ij"), axis=-1).reshape(-1, 2)
     moves = moves[np.argsort((moves**2).sum(axis=1), kind="stable")]

@@ -1,4 +1,4 @@
-"""Corrections of an analysis: a list of steps that can be done again."""
+"""Correct an analysis by a list of steps that can be repeated."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from texrs.point_sets import directions, spacing
 __all__ = ["correct"]
 
 FEWEST = 3
-"""Elements that must be left."""
+"""Minimum number of elements that must remain."""
 STEPS = {
     "drop": ("elements",),
     "add": ("points",),
@@ -32,38 +32,40 @@ STEPS = {
     "foreground": ("points", "radius"),
     "background": ("points", "radius"),
 }
-"""What a step may do, and what it needs."""
+"""Operations of a step, with the fields that each needs."""
 RADIUS = 4.0
-"""Of a dab of foreground or background, in pixels, if none is given."""
+"""Default radius of a dab of foreground or background, in pixels."""
 
 
 def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
-    """Return an entry with what an analysis got wrong put right.
+    """Return an analysis with corrections.
 
     Parameters
     ----------
     entry : ElementAnalysis
-        As it was found.
+        Analysis to correct.
     steps : sequence of dict
-        Done one after the other; elements have the numbers of `pictures`, from 0, as they are before the step:
+        Corrections in order. Elements have the numbers shown by `draw`, from 0, as they are before the step:
 
-        - ``{"op": "drop", "elements": [3, 7]}``: these are no elements. Separate ones are no foreground then either;
-        - ``{"op": "add", "points": [[row, column], ...]}``: elements that were not found;
-        - ``{"op": "move", "element": 4, "to": [row, column]}``: the middle of one;
-        - ``{"op": "layout", "layout": "connected"}``: how they hang together;
-        - ``{"op": "foreground", "points": [[row, column], ...], "radius": 4}``, and ``"background"``: dabs on the mask.
+        - ``{"op": "drop", "elements": [3, 7]}``: removes elements, and their foreground if elements are separate;
+        - ``{"op": "add", "points": [[row, column], ...]}``: adds missed elements;
+        - ``{"op": "move", "element": 4, "to": [row, column]}``: moves the centre of an element;
+        - ``{"op": "layout", "layout": "connected"}``: changes the layout;
+        - ``{"op": "foreground", "points": [[row, column], ...], "radius": 4}``, and ``"background"``: paints dabs on
+          the mask.
 
     Returns
     -------
     ElementAnalysis
-        Its report holds all steps under ``"corrections"``, those of earlier corrections first. Labels that were given
-        (`ElementAnalysis.of_labels`) hold until a step: then elements are told by the mask and the points.
+        The corrected analysis. Its report contains all steps under ``"corrections"``, those of earlier corrections
+        first. Given labels (`ElementAnalysis.of_labels`) are dropped by the first step. From then on, mask and points
+        define the elements.
 
     Raises
     ------
     InvalidInput
-        A step that is none, names no element or a place outside of the image, or leaves fewer than three elements or no
-        foreground.
+        A step is invalid, or refers to a missing element or to a place outside the image. Fewer than three elements
+        remain, or the foreground becomes empty.
 
     Examples
     --------
@@ -83,7 +85,7 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
         except InvalidInput as error:
             raise InvalidInput(f"corrections: step {number}, {step['op']}: {error}") from None
     if len(entry.points) < FEWEST:
-        raise InvalidInput(f"corrections: leave {len(entry.points)} elements, at least {FEWEST} are needed")
+        raise InvalidInput(f"corrections: must leave at least {FEWEST} elements, left {len(entry.points)}")
     trouble = find_contradiction(entry.mask, entry.layout, entry.wrap) if known else ""
     report = {
         **entry.report,
@@ -96,14 +98,14 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
 
 
 def read_steps(steps: object) -> list[dict[str, Any]]:
-    """Check a list of corrections, and return it as text, numbers and lists."""
+    """Check a list of corrections, and return it as plain text, numbers and lists."""
     several = [steps] if isinstance(steps, Mapping) else steps
     if not isinstance(several, Sequence) or isinstance(several, str):
-        raise InvalidInput(f"corrections: needs a list of steps, got {type(steps).__name__}")
+        raise InvalidInput(f"corrections: must be a list of steps, got {type(steps).__name__}")
     found = []
     for number, step in enumerate(several):
         if not isinstance(step, Mapping) or step.get("op") not in STEPS:
-            raise InvalidInput(f"corrections: step {number} needs an 'op' among {', '.join(STEPS)}; got {step!r}")
+            raise InvalidInput(f"corrections: step {number}: 'op' must be one of {', '.join(STEPS)}; got {step!r}")
         allowed = STEPS[step["op"]]
         unknown = sorted(map(str, set(step) - {"op", *allowed}))
         missing = [name for name in allowed if name not in step and name != "radius"]
@@ -115,11 +117,13 @@ def read_steps(steps: object) -> list[dict[str, Any]]:
 
 
 def _to_plain(value: object, number: int) -> Any:
-    """Return words, numbers and lists of them as they are kept."""
+    """Return words, numbers and lists in their stored form."""
     try:
         return json.loads(json.dumps(value, allow_nan=False, default=lambda array: np.asarray(array).tolist()))
     except (TypeError, ValueError, RecursionError):
-        raise InvalidInput(f"corrections: step {number} holds {value!r}; text, numbers and lists are allowed") from None
+        raise InvalidInput(
+            f"corrections: step {number}: must contain only text, numbers and lists, got {value!r}"
+        ) from None
 
 
 def _drop(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
@@ -130,7 +134,7 @@ def _drop(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     if entry.layout == Layout.DISJOINT:
         pieces = label_components(mask, entry.wrap)[0]
         owner = pieces[find_nearest_pixels(entry.points, mask.shape)]
-        # A piece that holds another element too stays.
+        # A component that also contains another element stays.
         alone = np.setdiff1d(owner[gone], owner[kept])
         mask = mask & ~np.isin(pieces, alone[alone > 0])
     return _take(entry, kept, mask)
@@ -144,7 +148,7 @@ def _add(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     if entry.layout == Layout.DISJOINT:
         bare = new[~mask[find_nearest_pixels(new, mask.shape)]]
         stamp(mask, bare, ellipse(entry.box), entry.wrap)
-    # What a user says is an element is one.
+    # An element that the user adds gets full similarity, without rotation and in normal size.
     ones = np.ones(len(new))
     angles = None if entry.angles is None else np.concatenate([entry.angles, 0 * ones])
     scales = None if entry.scales is None else np.concatenate([entry.scales, ones])
@@ -157,7 +161,7 @@ def _move(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     size = (entry.image.shape[0], entry.image.shape[1])
     place, points = as_points(step["to"], size, "to"), entry.points.copy()
     if len(place) != 1:
-        raise InvalidInput(f"to: needs one place (row, column), got {step['to']!r}")
+        raise InvalidInput(f"to: must be one place (row, column), got {step['to']!r}")
     points[number] = place[0]
     return replace(entry, points=as_points(points, size, "to"))
 
@@ -174,12 +178,12 @@ def _dab(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     stamp(marked, as_points(step["points"], size, "points"), ellipse((side, side)), entry.wrap)
     mask = entry.mask | marked if step["op"] == "foreground" else entry.mask & ~marked
     if mask.all() or not mask.any():
-        raise InvalidInput(f"leaves {'nothing but' if mask.all() else 'no'} foreground")
+        raise InvalidInput(f"leaves {'only' if mask.all() else 'no'} foreground")
     return replace(entry, mask=mask)
 
 
 def _take(entry: ElementAnalysis, kept: NDArray[np.intp], mask: Bools) -> ElementAnalysis:
-    """Return an entry with some of its elements."""
+    """Return an entry with only some of its elements."""
     angles, scales = (None if a is None else a[kept] for a in (entry.angles, entry.scales))
     return replace(entry, points=entry.points[kept], mask=mask, scores=entry.scores[kept], angles=angles, scales=scales)
 

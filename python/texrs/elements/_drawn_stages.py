@@ -1,4 +1,4 @@
-"""Pictures of an analysis, for people."""
+"""Draw images of an analysis."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from texrs.elements._drawing import Picture, draw_dot, draw_plain, mark_points
 from texrs.elements._elements import ElementAnalysis
 
 BOX, GROUND, NUMBER = (0, 230, 255), np.array((30, 30, 190), np.float64), (255, 235, 90)
-"""Colours of the chosen box, of what is not foreground, and of numbers."""
+"""Colours of the chosen box, of the background, and of numbers."""
 DIM = 0.65
-"""How much of the ground's colour is that."""
+"""Share of this colour in the drawn background."""
 
 
 def draw(entry: ElementAnalysis) -> dict[str, Picture]:
-    """Draw an entry: its points on the texture, and its mask.
+    """Draw an entry: its points on the texture, its mask, and its numbers.
 
     Parameters
     ----------
     entry : ElementAnalysis
-        As it was found.
+        Analysis to draw.
 
     Returns
     -------
     dict of (H, W, 3) uint8
-        "points": a cross on each element, and the box of the chosen one. "mask": what is not foreground under blue.
-        "numbers": twice as large, the number of each element, from 0, as `correct` names it.
+        Images by name. "points": a cross on each element, and the box of the chosen one. "mask": the texture with the
+        background in blue. "numbers": twice as large, with the number of each element, from 0, as `correct` uses it.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What is known of a texture's elements: the entry that splicing works with."""
+"""Store the analysis of a texture's elements, which splicing uses."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from texrs.io import Header, atomic, read_arrays
 from texrs.samples import Sample
 
 FORMAT = 2
-"""Of the file, and of what the analysis finds: an entry of another version is refused, and remade by a database."""
+"""Version of the file and of the analysis. Other versions are refused, and a database analyses their textures again."""
 MARK = "texrs_elements"
 WORDS = (MARK, "hash", "box", "layout", "directions", "wrap", "report", "numbers")
-"""What a file says beside arrays as large as the image."""
+"""Names of the arrays in a file that are much smaller than the image."""
 LONGEST, CHANNELS, SIMILAR = 2**26, 64, 16
-"""Bytes of one of them, channels of an image, and members of a similarity set, at most."""
+"""Maximum size of such an array in bytes, number of channels of an image, and size of a similarity set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,32 +44,32 @@ class ElementAnalysis:
     Attributes
     ----------
     image : ndarray of shape (height, width, channels)
-        The texture itself, in its own dtype.
+        The texture, in its own dtype.
     points : ndarray of shape (n, 2), float64
-        The centres of the elements, (row, column), in pixels.
+        Centres of the elements, (row, column), in pixels.
     mask : ndarray of shape (height, width), bool
-        The foreground: True on elements (where they are jointed too: the mortar is where it is False).
+        Foreground: True on elements. For jointed elements, False is the mortar.
     box : tuple of int
-        Height and width of an element's box, odd, in pixels.
+        Height and width of the box of an element, odd, in pixels.
     layout : Layout
-        How the elements hang together: disjoint, connected or jointed. What a `Layout` can be made from becomes one.
+        Layout of the elements: disjoint, connected or jointed. Values that `Layout` accepts are converted.
     scores : ndarray of shape (n,), float64
-        How alike each element is to the chosen one, -1 to 1.
+        Similarity of each element to the chosen one, -1 to 1.
     directions : tuple of float
-        The directions in which the points line up, degrees in [0, 180), strongest first; empty where they do not.
+        Directions of the rows of points, in degrees in [0, 180), strongest first. Empty if they form no rows.
     wrap : tuple of bool
-        Whether the texture repeats without a seam along rows and columns.
+        True if the texture is tileable along rows, and along columns.
     report : dict
-        What the analysis found and decided; text, numbers and lists alone.
+        Results and decisions of the analysis, as text, numbers and lists.
     angles : ndarray of shape (n,), float64, optional
-        Degrees by which each element is turned against the chosen one, as far as was looked for.
+        Rotation of each element relative to the chosen one, in degrees, among the directions that were searched.
     scales : ndarray of shape (n,), float64, optional
-        How many times larger each element is, as far as was looked for.
+        Size of each element relative to the chosen one, among the sizes that were searched.
     sets : Similarity, optional
-        What `similarity` returns, where it was made to be kept.
+        Result of `similarity`, if it was computed for storage.
     known : ndarray of shape (height, width), int32, optional
-        The element of each pixel, from 1 in the order of the points, where that is known at once: given, as to `of_labels`, or
-        of cells beyond doubt. Numbers after those of all points are of elements that only enter the picture.
+        Element of each pixel, from 1 in the order of the points, if it was given to `of_labels` or comes from certain
+        cells. Numbers after those of all points belong to elements that the border cuts.
 
     Examples
     --------
@@ -103,7 +103,7 @@ class ElementAnalysis:
         return f"Elements({len(self.points)} of box {self.box} in {rows} x {columns}, {self.layout})"
 
     def _repr_png_(self) -> bytes:
-        """Show in a notebook the picture, with a cross on each element."""
+        """Show the image in a notebook, with a cross on each element."""
         return as_png(mark_points(draw_plain(self.image), self.points, self.box))
 
     @classmethod
@@ -113,19 +113,19 @@ class ElementAnalysis:
         Parameters
         ----------
         sample : Sample
-            One of `texrs.samples` with centres and a mask.
+            A texture of `texrs.samples` with centres and a mask.
         wrap : (bool, bool)
-            Whether it was generated to repeat without a seam along rows and columns.
+            True if it was generated tileable along rows, and along columns.
 
         Returns
         -------
         ElementAnalysis
-            With the sample's centres and mask, each element as alike to the chosen one as can be.
+            The entry with the sample's centres and mask. Each element has the similarity 1.
 
         Raises
         ------
         InvalidInput
-            Nothing is known of its elements.
+            The elements of the sample are not known.
 
         Examples
         --------
@@ -137,10 +137,10 @@ class ElementAnalysis:
         """
         as_instance(sample, "sample", Sample)
         if sample.centres is None or sample.labels is None or sample.image.ndim > 3 or len(sample.centres) < 3:
-            raise InvalidInput(f"sample: needs a picture with three known elements or more, got {sample!r}")
+            raise InvalidInput(f"sample: must be an image with at least three known elements, got {sample!r}")
         mask = sample.labels > 0 if sample.mask is None else sample.mask
         layout, scores = Layout(sample.layout or "disjoint"), np.ones(len(sample.centres))
-        # The cells of a wall are what it is put together from; how separate elements part is read off their mask.
+        # In a wall, cells are known from its construction. Separate elements are derived from their mask.
         known = sample.labels if layout == Layout.JOINTED else None
         box = measure_box(sample.labels)
         return cls(sample.image, sample.centres, mask, box, layout, scores, wrap=wrap, known=known)
@@ -154,29 +154,31 @@ class ElementAnalysis:
         layout: Layout | LayoutName = Layout.DISJOINT,
         wrap: Sequence[bool] | bool = False,
     ) -> ElementAnalysis:
-        """Return the entry of a texture whose elements are known pixel by pixel: drawn by hand, or found by another program.
+        """Return the entry of a texture from a label image of its elements.
+
+        The labels may be drawn by hand or come from another program.
 
         Parameters
         ----------
         image : (H, W) or (H, W, C) array
             The texture.
         labels : (H, W) array of int or bool
-            The element of each pixel, any positive numbers; 0 is ground, mortar or joint. Of bools each connected piece is
-            an element.
+            Element of each pixel, as any positive number; 0 is background, mortar or joint. Each connected component
+            of a bool mask is an element.
         layout : {"disjoint", "jointed", "connected"}
-            How the elements hang together; cells, as bricks and stones, are jointed, and need no joint between them.
+            Layout of the elements. Cells, such as bricks and stones, are jointed, and do not need joints between them.
         wrap : bool or (bool, bool)
-            Whether the texture repeats without a seam along rows and columns.
+            Axes along which the texture is tileable. A single bool applies to both.
 
         Returns
         -------
         ElementAnalysis
-            One point a label, at its centroid.
+            The entry, with one point per label at its centroid.
 
         Raises
         ------
         InvalidInput
-            Labels of another shape, with fewer than three elements, or separate elements without ground.
+            The labels have another shape or fewer than three elements, or separate elements have no background.
 
         Examples
         --------
@@ -191,9 +193,11 @@ class ElementAnalysis:
         known = as_element_labels(labels, (pixels.shape[0], pixels.shape[1]), around)
         mask, count = known > 0, int(known.max())
         if count < 3:
-            raise InvalidInput(f"labels: three elements or more are needed, got {count}")
+            raise InvalidInput(f"labels: must contain at least three elements, got {count}")
         if mask.all() and kind == Layout.DISJOINT:
-            raise InvalidInput('labels: separate elements need ground (0) around them; cells are layout="jointed"')
+            raise InvalidInput(
+                'labels: must contain background (0) around separate elements; for cells use layout="jointed"'
+            )
         if mask.all():
             mask = ~mark_outlines(known)
         points = measure_centres(known, around)
@@ -203,7 +207,7 @@ class ElementAnalysis:
 
     @cached_property
     def arrangement(self) -> Arrangement:
-        """How the elements are arranged: their spacing, the lattice or the courses that they lie in, what is darker.
+        """Arrangement of the elements: spacing, lattice or courses, and whether the rest is darker.
 
         Examples
         --------
@@ -219,12 +223,15 @@ class ElementAnalysis:
 
     @cached_property
     def labels(self) -> Labels:
-        """The element of each pixel, (H, W) int32, counted from 1; 0 is the ground. Made when first asked for, read-only.
+        """Element of each pixel, (H, W) int32, from 1; 0 is the background.
 
-        Element ``k + 1`` belongs to point ``k``. After those of the points come pieces of the foreground, and cells, that no
-        point lies in. Separate elements are the pieces of the mask, parted where several points lie in one; elements of a
-        connected texture its cells without their joints, where it has any that are sure, else what lies nearest to each.
-        Specks of the foreground without a point are ground.
+        Computed on first use, read-only.
+
+        Element ``k + 1`` belongs to point ``k``. The numbers after those of the points are components of the
+        foreground, and cells, without a point. Separate elements are the components of the mask, divided if they
+        contain several points. For a connected texture, the elements are its cells without their joints, if the cells
+        are certain; otherwise each pixel belongs to the nearest element. Specks of foreground without a point are
+        background.
 
         Examples
         --------
@@ -239,7 +246,7 @@ class ElementAnalysis:
 
     @cached_property
     def instances(self) -> tuple[Instance, ...]:
-        """Each element with a mask of its own, in the order of `labels`; made when first asked for.
+        """The elements with a mask each, in the order of `labels`. Computed on first use.
 
         Examples
         --------
@@ -264,26 +271,28 @@ class ElementAnalysis:
         return found
 
     def similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Similarity:
-        """Return what each pixel of the texture may be replaced by: itself and the ``k - 1`` that look most like it.
+        """Return similar samples for each pixel of the texture: itself and the ``k - 1`` most similar ones.
 
-        The nearest by appearance vectors of 5 x 5 windows, more than 3 pixels apart; made when first asked for, and kept.
+        The samples are nearest by appearance vectors of 5 x 5 windows, and more than 3 pixels apart. They are computed
+        on first use and cached.
 
         Parameters
         ----------
         k : int
-            How many samples each pixel has, itself among them, 1 to 16.
+            Number of samples per pixel, including itself, 1 to 16.
         progress : callable, optional
-            Called as ``progress(share)`` with the share that is done; raising stops the work.
+            Function that is called as ``progress(share)`` with the share of the work that is done. An exception from
+            it stops the work.
 
         Returns
         -------
         Similarity
-            Its ``sets`` are (H W, k): the flat indices of samples, the pixel's own first.
+            Similar samples. ``sets`` is (H W, k): the flat indices of samples, starting with the pixel itself.
 
         Raises
         ------
         InvalidInput
-            No such number.
+            ``k`` is out of range.
 
         Examples
         --------
@@ -298,24 +307,25 @@ class ElementAnalysis:
         return Exemplar(self.image, repeat=self.wrap).similarity(-1, k=k, progress=progress)
 
     def with_similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> ElementAnalysis:
-        """Return the entry with its similarity sets, so that they are saved with it.
+        """Return the entry with its similarity sets, so that `save` stores them.
 
         Parameters
         ----------
         k : int
-            How many samples each pixel has, itself among them, 1 to 16.
+            Number of samples per pixel, including itself, 1 to 16.
         progress : callable, optional
-            Called as ``progress(share)`` with the share that is done; raising stops the work.
+            Function that is called as ``progress(share)`` with the share of the work that is done. An exception from
+            it stops the work.
 
         Returns
         -------
         ElementAnalysis
-            The same but for `sets`.
+            The same entry, with another value of `sets`.
 
         Raises
         ------
         InvalidInput
-            No such number.
+            ``k`` is out of range.
 
         Examples
         --------
@@ -329,17 +339,17 @@ class ElementAnalysis:
         return replace(self, sets=self.similarity(k=k, progress=progress))
 
     def save(self, path: Path) -> None:
-        """Write the entry to an ``.npz`` file, whole or not at all; `texrs.elements.load` reads it.
+        """Write the entry to an ``.npz`` file, completely or not at all. `texrs.elements.load` reads it.
 
         Parameters
         ----------
         path : path_like
-            With the suffix .npz; a former file is replaced when all is written.
+            Path with the suffix .npz. An existing file is replaced after everything is written.
 
         Raises
         ------
         FileError
-            It cannot be written.
+            The file cannot be written.
 
         Examples
         --------
@@ -362,7 +372,7 @@ class ElementAnalysis:
             "box": np.array(self.box, np.int64),
             "layout": _encode_text(self.layout),
             "scores": self.scores,
-            # An array of no length cannot be told from a damaged one.
+            # Start with NaN: a reader could not distinguish an empty array from a damaged one.
             "directions": np.array([np.nan, *self.directions]),
             "wrap": np.array(self.wrap, bool),
             "report": _encode_text(json.dumps(self.report, allow_nan=False)),
@@ -384,17 +394,17 @@ def hash_image(image: Array) -> str:
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        In any dtype that a picture may have.
+        Image of any supported dtype.
 
     Returns
     -------
     str
-        32 hexadecimal digits.
+        The hash as 32 hexadecimal digits.
 
     Raises
     ------
     InvalidInput
-        Not an image.
+        The argument is not an image.
 
     Examples
     --------
@@ -417,7 +427,7 @@ def load(path: Path) -> ElementAnalysis:
     Parameters
     ----------
     path : path_like
-        The .npz file.
+        Path of the .npz file.
 
     Returns
     -------
@@ -426,7 +436,7 @@ def load(path: Path) -> ElementAnalysis:
     Raises
     ------
     FileError
-        Not there, no entry, of another version, or damaged.
+        The file is missing, damaged, has another version, or does not contain an entry.
 
     Examples
     --------
@@ -442,20 +452,20 @@ def load(path: Path) -> ElementAnalysis:
 
     def choose(headers: Mapping[str, Header]) -> list[str]:
         if MARK not in headers:
-            raise FileError(f"{path}: is no entry of a texture's elements")
+            raise FileError(f"{path}: not an analysis of a texture's elements")
         return choose_parts(headers, path)
 
     parts = read_arrays(path, choose=choose)
     version = parts[MARK].ravel().tolist()
     if version != [FORMAT]:
         raise FileError(
-            f"{path}: is an entry of version {', '.join(map(str, version))}, this texrs reads version {FORMAT}; "
+            f"{path}: has version {', '.join(map(str, version))}, but this texrs reads version {FORMAT}; "
             "analyse the texture again"
         )
     try:
         image = as_image(parts["image"])
         if _decode_text(parts["hash"]) != hash_image(image):
-            raise InvalidInput("its image is not the one that was analysed")
+            raise InvalidInput("its image differs from the analysed image")
         layout, report = Layout(_decode_text(parts["layout"])), json.loads(_decode_text(parts["report"]))
         if not isinstance(report, dict):
             raise InvalidInput("report")
@@ -499,12 +509,15 @@ def load(path: Path) -> ElementAnalysis:
 
 
 def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
-    """Return which arrays of a file make an entry, none of which is larger than the image says, before any is read."""
+    """Return which arrays of a file form an entry, after checking their sizes.
+
+    None may be larger than the image permits, and none is read before.
+    """
     shape = headers["image"].shape if "image" in headers else ()
     pixels = prod(shape[:2])
     if len(shape) not in (2, 3) or not 0 < pixels <= MAX_PIXELS or prod(shape[2:]) > CHANNELS:
         raise FileError(f"{path}: is damaged (an image of shape {shape})")
-    # No more elements than pixels; and what is said in words.
+    # Allow at most as many elements as pixels, and text up to a limit.
     one = {"mask": 1, "points": 16, "scores": 8, "angles": 8, "scales": 8, "known": 8, "sets": 8 * SIMILAR}
     most = {name: size * pixels for name, size in one.items()} | {"image": headers["image"].size}
     chosen = [name for name in headers if name in most or name in WORDS]

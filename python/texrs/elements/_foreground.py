@@ -1,6 +1,7 @@
-"""A foreground divided among elements: by the pieces that it falls into, and within one of several elements by the nearest.
+"""Divide a foreground among elements: by connected components, and within one by the nearest element.
 
-What DESIGN moves and what SPLICE lays is divided here, so that both mean the same elements.
+`design` (which moves elements) and `splice` (which places them) both use this division, so that they mean the same
+elements.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ Points = NDArray[np.float64]
 Wrap = tuple[bool, bool]
 
 SMALLEST = 0.25
-"""Foreground without an element of its own is one if it has so much of the median element's area."""
+"""Minimum area of a component that becomes an element of its own, as a share of the median area of elements."""
 
 
 class Division(NamedTuple):
-    """A foreground, element by element.
+    """A foreground divided into elements.
 
     Attributes
     ----------
     points : (n, 2) float64
-        Centres, as they were given; after them, those of foreground that no element claims.
+        Centres as given, followed by those of components that were not assigned to any element.
     labels : (H, W) int32
-        The element of each foreground pixel, counted from 1; 0 elsewhere.
+        Element of each foreground pixel, from 1; 0 elsewhere.
 
     """
 
@@ -39,11 +40,16 @@ class Division(NamedTuple):
 
 
 def divide_foreground(mask: Bools, points: Points, wrap: Wrap = (False, False)) -> Division:
-    """Divide a foreground: a piece belongs to the element in it, and one that holds several is parted between these."""
+    """Divide a foreground.
+
+    A component belongs to the element in it.
+
+    A component that contains several elements is divided among them.
+    """
     component, count = label_components(mask, wrap)
     points, at, owner, joined = _claim(component, count, points, mask, wrap)
     claims = np.bincount(owner, minlength=count + 1)
-    # One element, one component: nothing to divide.
+    # A component with exactly one element needs no division.
     number = np.zeros(count + 1, np.int32)
     number[owner[claims[owner] == 1]] = np.flatnonzero(claims[owner] == 1) + 1
     for c, element in joined.items():
@@ -60,7 +66,7 @@ def divide_foreground(mask: Bools, points: Points, wrap: Wrap = (False, False)) 
 
 
 def _part(mask: Bools, shared: Bools, markers: Labels, wrap: Wrap) -> Labels:
-    """Part pieces between markers in them where they are narrow; around cyclic axes as seen from the middle."""
+    """Divide components between their markers where they are narrow, across periodic borders."""
     from scipy.ndimage import distance_transform_edt
     from skimage.segmentation import watershed
 
@@ -74,18 +80,18 @@ def _part(mask: Bools, shared: Bools, markers: Labels, wrap: Wrap) -> Labels:
 def _claim(
     component: Labels, count: int, points: Points, mask: Bools, wrap: Wrap
 ) -> tuple[Points, NDArray[np.intp], Labels, dict[int, int]]:
-    """Make every large component that of an element.
+    """Assign every large component to an element.
 
     Returns
     -------
     points : (n, 2) float64
-        The elements, and the middles of components that become one.
+        Centres of elements, followed by those of components that become elements.
     at : (n, 2) intp
-        The pixel of each element of the entry.
+        Pixel of each element of the entry.
     owner : (n) int32
-        The component of each element, 0 for none.
+        Component of each element, 0 for none.
     joined : dict
-        Components that belong to an element of another one.
+        Components that belong to the element of another component.
 
     """
     from scipy.ndimage import center_of_mass
@@ -107,7 +113,7 @@ def _claim(
     for c, middle in zip(left, middles, strict=True):
         away = np.hypot(*(points - middle).T)
         if len(away) and away.min() < 1:
-            # A ring around a dot is of one element with it, not a second one in the same place.
+            # A ring around a dot belongs to the dot's element. It must not become a second element at the same place.
             joined[c] = int(away.argmin())
         else:
             points, owner = np.concatenate([points, middle[None]]), np.append(owner, c)
@@ -115,9 +121,9 @@ def _claim(
 
 
 def _snap_centres(component: Labels, orphans: list[int], at: NDArray[np.intp], owner: Labels) -> NDArray[np.intp]:
-    """Bring centres that lie outside of their elements, as that of a ring does, to the nearest pixel of them.
+    """Move centres outside their elements, such as those of rings, to the nearest pixel of the element.
 
-    That is foreground without a centre, around which the box is that holds the centre.
+    The element is a component without a centre, whose bounding box contains the centre.
     """
     from scipy.ndimage import distance_transform_edt, find_objects
 

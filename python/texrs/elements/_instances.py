@@ -1,4 +1,4 @@
-"""Elements as instances: each with its own mask, place, direction and size, and how sure it is."""
+"""Provide elements as instances, each with a mask, place, direction, size and confidence."""
 
 from __future__ import annotations
 
@@ -23,16 +23,21 @@ __all__ = ["Instance", "Labelled", "cut_instances", "find_sure_cells", "label_el
 Points = NDArray[np.float64]
 
 SURE = 0.5
-"""Confidence from which on cells are believed."""
+"""Minimum confidence for using cells."""
 LEAST = 3.0
-"""Width of a cell, in pixels, below which none is looked for."""
+"""Minimum width of a cell that is searched for, in pixels."""
 MISSED, JOINT = 0.4, 0.5
-"""Share of a cell that the mask leaves of it, below which it is not believed, and joint strength from which on a pixel is
-joint there."""
+"""Minimum share of a cell inside the mask.
+
+Below it the mask is ignored for this cell, and its pixels above the given joint strength count as joint.
+"""
 
 EVEN, SPREAD = 0.67, 0.057
-"""Likeness at which an element is as likely one as not, and what it differs by at odds of 2.7 to 1; measured on fifteen
-annotated textures (`benches/elements_table.py`)."""
+"""Similarity of an element that is equally likely to be right or wrong, and difference in similarity for odds of 2.7
+to 1.
+
+Measured on fifteen annotated textures (`benches/elements_table.py`).
+"""
 
 _CELLS: Cache[bytes, Cells] = Cache(16)
 
@@ -46,18 +51,19 @@ class Instance:
     centre : (float, float)
         Row and column, in pixels.
     angle : float
-        Degrees by which it is turned against the chosen one, as far as was looked for; 0 otherwise.
+        Rotation relative to the chosen element, in degrees, if several directions were searched. Otherwise 0.
     scale : float
-        How many times larger than the chosen one it is, if several sizes were looked for; otherwise than the median of all,
-        by the root of its area.
+        Size relative to the chosen element, if several sizes were searched. Otherwise the square root of its area
+        relative to the median area.
     confidence : float
-        How sure it is to be an element, 0 to 1, as often as that was so in annotated textures: by how alike it is to the
-        chosen one, or how well its joints close around it; or, of foreground that nothing was found in, how near its area is
-        to the median. 0 where nothing belongs to it.
+        Probability of being an element, 0 to 1, calibrated on annotated textures. It is derived from the similarity to
+        the chosen element, or from how well the joints around it close. For foreground without a detection, it is
+        derived from the ratio of its area to the median. 0 if the element has no pixels.
     origin : (int, int)
-        Row and column of the mask's first pixel in the texture.
+        Row and column of the first pixel of the mask in the texture.
     mask : (h, w) array of bool
-        Its pixels, within the box that they fill. Of a cyclic texture the box may go on beyond the last row or column.
+        Pixels of the element, within their bounding box. If the texture is tileable, the box may extend beyond the
+        last row or column.
 
     Examples
     --------
@@ -77,7 +83,7 @@ class Instance:
 
 
 class Labelled(NamedTuple):
-    """The elements of a texture, pixel by pixel: (H, W) int32 from 1, and centre (n, 2) and confidence (n,) of each."""
+    """The elements of a texture per pixel: (H, W) int32 from 1, with centre (n, 2) and confidence (n,) of each."""
 
     labels: Labels
     centres: Points
@@ -85,16 +91,16 @@ class Labelled(NamedTuple):
 
 
 def rate_likeness(scores: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how sure elements are that look so much like the chosen one: as often as such were some in annotated textures.
+    """Return the confidence of elements from their similarity, as in annotated textures.
 
-    Below .5 none were, at .74 three in four, above .85 all.
+    No detection with a similarity below 0.5 was an element there, 75 % at 0.74, and all above 0.85.
     """
     odds = (1 + np.exp((EVEN - 1) / SPREAD)) / (1 + np.exp((EVEN - np.clip(scores, 0, 1)) / SPREAD))
     return np.asarray(np.round(odds, 9), np.float64)
 
 
 def rate_closure(certain: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how sure cells are around which joints close so well: as often as such were some in annotated textures."""
+    """Return the confidence of cells from the closedness of their joints, as in annotated textures."""
     return np.asarray(1 - (1 - np.clip(certain, 0, 1)) ** 2, np.float64)
 
 
@@ -107,13 +113,16 @@ def find_sure_cells(
     *,
     known: Labels | None = None,
 ) -> Cells | None:
-    """Return the cells of a connected texture, those that are known if there are any; none where none are sure, as in nets."""
+    """Return the known or the certain cells of a connected texture.
+
+    None if the cells are uncertain, as in nets.
+    """
     if layout == Layout.DISJOINT:
         return None
     if known is not None:
         return _CELLS.get_or_make(content_hash(np.asarray(image), known), lambda: take_cells(known, image))
     joints = ~mask if layout == Layout.JOINTED else mask
-    # An entry that was not analysed here may say anything.
+    # An entry from elsewhere may have a box of any size.
     size = float(np.clip(min(box), LEAST, min(mask.shape)))
     key = content_hash(np.asarray(image), np.packbits(mask), size, layout)
     found = _CELLS.get_or_make(key, lambda: find_cells(image, size=size, joints=joints, progress=progress))
@@ -129,19 +138,21 @@ def label_elements(
     layout: Layout,
     wrap: tuple[bool, bool],
 ) -> Labelled:
-    """Return which element each pixel belongs to: the one of each point first, then foreground and cells without any.
+    """Return the element of each pixel.
 
-    Separate elements are the pieces of the mask, those of several points parted between these. Elements of a connected
-    texture are its cells without their joints, where these are sure and points lie in them; else pieces and parts of what
-    most points lie on, the mask or what it leaves open.
+    The elements of points come first, then components and cells without a point.
+
+    Separate elements are the components of the mask, divided among points if there are several. For a connected
+    texture, the elements are its cells without their joints, if the cells are certain and contain points. Otherwise,
+    the elements are divided components of the mask or of its complement, whichever contains most points.
     """
     pixels = as_image(image, "image")
     if mask.shape != pixels.shape[:2] or mask.dtype != np.bool_:
-        raise InvalidInput(f"mask: needs bool of shape {pixels.shape[:2]}, got {mask.dtype} {mask.shape}")
+        raise InvalidInput(f"mask: must be bool of shape {pixels.shape[:2]}, got {mask.dtype} {mask.shape}")
     at = find_nearest_pixels(points, mask.shape)
     inside = mask
     if layout == Layout.CONNECTED and len(points) and mask[at].mean() < 0.5:
-        # Points of a net in its meshes.
+        # The points of a net are in its meshes.
         inside = ~mask
     if layout == Layout.JOINTED or inside is not mask:
         cells = find_sure_cells(pixels, mask, box, layout)
@@ -157,15 +168,18 @@ def label_elements(
 
 
 def _take_cells(cells: Cells, inside: Bools, points: Points, at: tuple[NDArray[np.intp], ...]) -> Labelled:
-    """Take cells for elements, without joints: that of each point under its number, the rest after all points."""
+    """Use cells without joints as elements.
+
+    The cell of each point has the point's number. The others follow.
+    """
     number = np.zeros(cells.count + 1, np.int32)
     for k, cell in enumerate(cells.labels[at].tolist()):
-        # Of two points in one cell the first, which is more alike, is its element.
+        # If a cell contains two points, the first is its element, because it is more similar.
         number[cell] = number[cell] or k + 1
     rest = np.flatnonzero(number[1:] == 0) + 1
     number[rest] = len(points) + 1 + np.arange(len(rest))
     area, seen = (np.bincount(c, minlength=cells.count + 1) for c in (cells.labels.ravel(), cells.labels[inside]))
-    # Where the mask missed a cell, the joints say what belongs to it.
+    # If the mask misses a cell, use the joint strength to find the cell's pixels.
     missed = (seen < MISSED * area)[cells.labels]
     inside = np.where(missed, cells.joints <= JOINT, inside)
     labels = np.where(inside, number[cells.labels], 0).astype(np.int32)
@@ -178,7 +192,7 @@ def _take_cells(cells: Cells, inside: Bools, points: Points, at: tuple[NDArray[n
 def cut_instances(
     found: Labelled, angles: Array | None, scales: Array | None, wrap: Sequence[bool]
 ) -> tuple[Instance, ...]:
-    """Return each element by itself."""
+    """Return the elements as separate instances."""
     shape, count = found.labels.shape, len(found.centres)
     flat = found.labels.ravel()
     order = np.argsort(flat, kind="stable")
@@ -202,7 +216,7 @@ def cut_instances(
 def _cut_mask(
     pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Sequence[bool], centre: NDArray[np.float64]
 ) -> tuple[tuple[int, int], Bools]:
-    """Return the corner of the box around pixels, and the pixels in it."""
+    """Return the corner of the bounding box of pixels, and the mask within the box."""
     if not len(pixels):
         row, column = (int(n[0]) for n in find_nearest_pixels(centre[np.newaxis], shape))
         return (row, column), np.zeros((0, 0), bool)
@@ -210,7 +224,7 @@ def _cut_mask(
     for axis, side in enumerate(shape):
         places = np.unique(pixels[:, axis])
         if wrap[axis] and places[0] == 0 and places[-1] == side - 1 and len(places) < side:
-            # The box begins after the widest gap, and goes on around the border.
+            # The box begins after the widest gap, and continues across the border.
             corner[axis] = places[1 + int(np.argmax(np.diff(places)))]
     inside = (pixels - corner) % shape
     mask = np.zeros(tuple(inside.max(axis=0) + 1), bool)

@@ -1,4 +1,4 @@
-"""Elements that are known pixel by pixel: labels given by whoever drew or generated them."""
+"""Handle elements that are known per pixel: labels from their author or generator."""
 
 from __future__ import annotations
 
@@ -18,10 +18,15 @@ Points = NDArray[np.float64]
 
 
 def as_element_labels(value: object, shape: tuple[int, int], wrap: tuple[bool, ...]) -> Labels:
-    """Check labels of elements, and number them from 1 without gaps, in their order; of a mask the pieces are numbered."""
+    """Check labels of elements, and number them consecutively from 1.
+
+    The order of the labels stays.
+
+    The components of a mask are numbered.
+    """
     labels: NDArray[Any] = try_array(value)
     if labels.shape != shape or labels.dtype.kind not in "biu":
-        raise InvalidInput(f"labels: needs whole numbers or bool of shape {shape}, got {labels.dtype} {labels.shape}")
+        raise InvalidInput(f"labels: must be integers or bool of shape {shape}, got {labels.dtype} {labels.shape}")
     if labels.dtype == np.bool_:
         return label_components(labels, (wrap[0], wrap[1]))[0]
     if labels.dtype.kind == "i" and labels.min() < 0:
@@ -31,7 +36,7 @@ def as_element_labels(value: object, shape: tuple[int, int], wrap: tuple[bool, .
 
 
 def measure_box(labels: Labels) -> tuple[int, int]:
-    """Return the usual height and width of elements, odd."""
+    """Return the usual height and width of elements, as odd numbers."""
     from scipy.ndimage import find_objects
 
     found = [box for box in find_objects(labels) if box is not None]
@@ -40,29 +45,29 @@ def measure_box(labels: Labels) -> tuple[int, int]:
 
 
 def extend_points(points: Points, labels: Labels, wrap: tuple[bool, ...]) -> Points:
-    """Return the points, and after them the centroids of the elements that are numbered beyond them."""
+    """Return the points, followed by the centroids of elements with higher numbers."""
     return np.concatenate([points, measure_centres(labels, wrap)[len(points) :]])
 
 
 def measure_centres(labels: Labels, wrap: tuple[bool, ...]) -> Points:
-    """Return the centroid of each element, (n, 2); along cyclic axes of what goes on around the border."""
+    """Return the centroid of each element, (n, 2), across the borders of periodic axes."""
     count, flat = int(labels.max()), labels.ravel()
     area = np.bincount(flat, minlength=count + 1)[1:]
     centres = np.empty((count, 2))
     for axis, side in enumerate(labels.shape):
         at: NDArray[np.int64] = np.indices(labels.shape)[axis]
-        # Along a cyclic axis from about the middle of each, so that none falls apart at the border.
+        # Along a periodic axis, measure from about the middle of each element, so that the border does not divide it.
         middle = _find_middles(labels, at, side) if wrap[axis] else np.zeros(count, np.int64)
         away = at - np.concatenate([[0], middle])[labels]
         away = (away + side // 2) % side - side // 2 if wrap[axis] else away
         mean = middle + np.bincount(flat, away.ravel(), count + 1)[1:] / area
-        # The last pixel ends half a pixel behind its middle.
+        # The last pixel extends half a pixel beyond its centre.
         centres[:, axis] = (mean + 0.5) % side - 0.5 if wrap[axis] else mean
     return centres
 
 
 def _find_middles(labels: Labels, at: NDArray[np.int64], side: int) -> NDArray[np.int64]:
-    """Return about the middle of each element on a circle of so many pixels."""
+    """Return the approximate middle of each element on a periodic axis of a given length."""
     turn = 2 * np.pi * at.ravel() / side
     up, along = (np.bincount(labels.ravel(), f(turn), int(labels.max()) + 1)[1:] for f in (np.sin, np.cos))
     return np.rint(np.arctan2(up, along) * side / (2 * np.pi)).astype(np.int64)

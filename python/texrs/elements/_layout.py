@@ -1,4 +1,4 @@
-"""How the elements of a texture hang together."""
+"""Define the layouts: how the elements of a texture are connected."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Literal, TypeAlias
 from texrs.errors import InvalidInput
 
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed", "F=d", "F=c", "B=c"]
-"""What a `Layout` can be made from: its values, and the paper's tags."""
+"""Values that `Layout` accepts: its own, and the tags of the paper."""
 
 
 class Layout(StrEnum):
-    """How the elements of a texture hang together, which decides what may move against what.
+    """How the elements of a texture are connected. Determines which parts can move.
 
-    The tags of Liu et al. (2009), F=d, F=c and B=c, are accepted in the place of values.
+    The tags F=d, F=c and B=c of Liu et al. (2009) are accepted as well.
 
     Examples
     --------
@@ -25,11 +25,11 @@ class Layout(StrEnum):
     """
 
     DISJOINT = "disjoint"
-    """Separate elements on a ground, as buttons on paper: a disjoint foreground, F=d."""
+    """Separate elements on a background, such as buttons on paper: a disjoint foreground, F=d."""
     CONNECTED = "connected"
-    """One figure whose repeated parts are the elements, as the meshes of a net: a connected foreground, F=c."""
+    """One figure whose repeated parts are the elements, such as the meshes of a net: a connected foreground, F=c."""
     JOINTED = "jointed"
-    """Elements parted by joints, as bricks by mortar: a rigid connected background, B=c."""
+    """Elements separated by joints, such as bricks by mortar: a rigid connected background, B=c."""
 
     @classmethod
     def _missing_(cls, value: object) -> Layout:
@@ -42,5 +42,8 @@ class Layout(StrEnum):
 
 
 def as_layout(value: object) -> Layout:
-    """Check a layout; what is no word is not looked up, for it may be an array."""
+    """Check a layout.
+
+    Only strings are looked up, because other values may be arrays.
+    """
     return Layout(value if isinstance(value, str) else repr(value))

@@ -1,4 +1,4 @@
-"""What belongs to the elements (section 3.3): a graph cut between the colours of foreground and background."""
+"""Find the pixels of elements (section 3.3) by a graph cut between foreground and background colours."""
 
 from __future__ import annotations
 
@@ -19,39 +19,47 @@ from texrs.kernels.seam import binary_labels
 Wrap: TypeAlias = tuple[bool, bool]
 
 SMOOTH = 2.0
-"""Cost of parting neighbours of the same colour."""
+"""Cost of separating neighbours of the same colour."""
 NATS, PRIOR = 12.0, 6.0
-"""Most that a pixel's colour may speak for one side, and what lying in the middle of an element does."""
+"""Maximum cost from the colour of a pixel, and cost from its position in the middle of an element, in nats."""
 RADIUS = 4
-"""Of what a point of the background stands for, in pixels."""
+"""Radius around a point of the background that counts as background, in pixels."""
 SAMPLES = 4000
-"""Colours of each side that a model is made from."""
+"""Maximum number of colours per side for a colour model."""
 HOLE, SPECK = 0.1, 0.25
-"""Largest hole that is filled, as a share of its component, and smallest component that is kept, of the chosen element."""
+"""Maximum size of a filled hole, as a share of its component.
+
+Minimum size of a component, as a share of the chosen element.
+"""
 CORE, MESH, OUTER, FAR = 0.8, 0.6, 0.9, 1.3
-"""Of the box: the middle, that of a mesh, what lies around it, and from where on separate elements' picture is ground."""
+"""Shares of the box for its middle, the middle of a mesh, the outer limit of a mesh, and the start of the background.
+The last is for separate elements.
+"""
 WHOLE = 0.35
-"""Distance from the border, as a share of the box, from which on what was found is taken as an example."""
+"""Minimum distance of a detection from the border, as a share of the box, for learning colours from it."""
 ALIKE = 0.3
-"""Share of what may be a net, those colours least like the background, that it is learnt from."""
+"""Share of the possible net for learning its colours: the pixels least like the background."""
 
 
 def ellipse(box: tuple[int, int], share: float = 1.0) -> Bools:
-    """Return the ellipse inscribed in a box, or one that much smaller."""
+    """Return the ellipse inscribed in a box, scaled by ``share``."""
     rows, columns = (np.arange(n) - (n - 1) / 2 for n in box)
     inside: Bools = np.add.outer((2 * rows / box[0]) ** 2, (2 * columns / box[1]) ** 2) <= share**2
     return inside
 
 
 def disc(shape: tuple[int, int], points: NDArray[np.float64], radius: int = RADIUS) -> Bools:
-    """Mark what lies within a radius of points."""
+    """Mark pixels within a radius of points."""
     marked = np.zeros(shape, bool)
     stamp(marked, points, ellipse((2 * radius + 1, 2 * radius + 1)), (False, False))
     return marked
 
 
 def pose(shape: Bools, angle: float, scale: float) -> Bools:
-    """Return a shape turned by an angle in degrees and scaled about its middle, as a search turns and scales the element."""
+    """Return a shape rotated by an angle in degrees and scaled about its middle.
+
+    The convention is that of the element search.
+    """
     from scipy.ndimage import affine_transform
 
     turn = np.deg2rad(angle)
@@ -64,7 +72,7 @@ def pose(shape: Bools, angle: float, scale: float) -> Bools:
 
 
 def stamp_posed(mask: Bools, points: NDArray[Any], poses: NDArray[np.float64], shape: Bools, wrap: Wrap) -> None:
-    """Mark copies of a shape around points, each turned by its angle and scaled, the two columns of ``poses``."""
+    """Mark copies of a shape around points, rotated and scaled by the two columns of ``poses``."""
     for angle, scale in np.unique(poses, axis=0).tolist():
         here = ((poses == (angle, scale)).all(axis=1)).nonzero()[0]
         plain = angle == 0.0 and scale == 1.0
@@ -72,7 +80,7 @@ def stamp_posed(mask: Bools, points: NDArray[Any], poses: NDArray[np.float64], s
 
 
 def stamp(mask: Bools, points: NDArray[Any], shape: Bools, wrap: Wrap) -> None:
-    """Mark copies of a shape around points, as far as they lie inside."""
+    """Mark copies of a shape around points, clipped to the image."""
     rows, columns = np.nonzero(shape)
     offsets = np.stack([rows - shape.shape[0] // 2, columns - shape.shape[1] // 2], axis=-1)
     places = (np.rint(points).astype(np.intp)[:, np.newaxis] + offsets).reshape(-1, 2)
@@ -99,25 +107,25 @@ def cut_foreground(
     seed: int = 0,
     model: Model = "mixture",
 ) -> Bools:
-    """Part foreground from background.
+    """Separate foreground from background.
 
     Parameters
     ----------
     colours : (H, W, 3) float32
-        Lab / 100.
+        Colours in Lab / 100.
     centres : (n, 2)
-        The elements, the chosen one first.
+        Centres of the elements, the chosen one first.
     box : tuple of int
-        Of an element.
+        Height and width of the box of an element.
     background : (H, W) bool
         Known background.
     layout : Layout
-        Elements that are no net fill the middles of their boxes.
+        Layout of the elements. Elements other than nets fill the middles of their boxes.
     poses : (n, 2), optional
-        How far each is turned, in degrees, and how many times larger it is: what is taken for its middle is as large as
-        it was found. By default all are as the chosen one.
+        Rotation in degrees and relative size of each element. They determine the middle of each element. Default: all
+        like the chosen one.
     shape : bool, optional
-        What of the chosen one's box is foreground, where it is certain.
+        Foreground of the chosen element within its box, if it is known.
     """
     size = background.shape
     if layout == Layout.JOINTED and model == "mixture":
@@ -140,7 +148,7 @@ def cut_foreground(
     half = WHOLE * turned[:, 1:] * np.array(box)
     whole = ((centres >= half) & (centres <= np.array(size) - 1 - half)) | np.array(wrap)
     whole[0] = True
-    # Where the border cuts an element, it may as well be none.
+    # Do not learn from elements that the border cuts: they may be false detections.
     centres, turned = centres[whole.all(axis=1)], turned[whole.all(axis=1)]
     known = flat[background.ravel()]
     core = shape if shape is not None else ellipse(box, CORE)
@@ -152,7 +160,7 @@ def cut_foreground(
         outer = mark(~ellipse(box, OUTER)) & ~background
         mesh = bool(np.median(unlikeness[fore.ravel()]) < np.median(unlikeness[outer.ravel()]))
         if mesh:
-            # The box holds a mesh of the net, whose middle is background.
+            # The box contains a mesh of the net, and the middle of a mesh is background.
             fore, back = outer & ~fore, mark(ellipse(box, MESH)) & ~outer
         unlike = unlikeness[fore.ravel()]
         fore.ravel()[np.flatnonzero(fore.ravel())[unlike < np.quantile(unlike, 1 - ALIKE)]] = False
@@ -169,7 +177,7 @@ def cut_foreground(
 
 
 def flatten_shading(colours: Floats, reach: float, wrap: Wrap) -> Floats:
-    """Remove what changes slowly: the light, where elements lie everywhere alike."""
+    """Remove slow changes, which are lighting if elements are spread evenly."""
     from scipy.ndimage import gaussian_filter
 
     mode = ["wrap" if w else "nearest" for w in wrap]
@@ -183,7 +191,7 @@ def round_to_odd(length: float) -> int:
 
 
 def _subsample(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np.float64]:
-    """Take at most so many, at even steps from a hashed start."""
+    """Return evenly spaced samples up to a maximum number, from a hashed start."""
     if len(samples) <= most:
         return samples
     at = (np.arange(most) + uniform(seed, 1 << 20)) * (len(samples) / most)
@@ -191,7 +199,7 @@ def _subsample(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np
 
 
 def _measure_nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Equation 2, its sign made right: the squared distance to the nearest sample, of colours from 0 to 255."""
+    """Return the squared distance to the nearest sample (equation 2, sign corrected), for colours 0 to 255."""
     from scipy.spatial import cKDTree
 
     found: NDArray[np.float64] = (255 * cKDTree(samples).query(colours)[0]) ** 2
@@ -199,7 +207,10 @@ def _measure_nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.flo
 
 
 def _measure_smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
-    """Equation 3, for pairs along each axis; its sigma is that of the picture, or 1 as printed."""
+    """Return the smoothness costs (equation 3) of pairs along each axis.
+
+    Its sigma is that of the image, or 1 as printed.
+    """
     squares = [((colours - np.roll(colours, -1, axis)) ** 2).sum(axis=-1) for axis in range(2)]
     inner = [s if wrap[axis] else np.delete(s, -1, axis) for axis, s in enumerate(squares)]
     mean = float(np.concatenate([s.ravel() for s in inner]).mean(dtype=np.float64))
@@ -209,16 +220,18 @@ def _measure_smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequ
 
 
 def tidy_mask(mask: Bools, area: float, *, net: bool = False) -> Bools:
-    """Fill small holes, smooth the outline by a pixel, and drop specks; ``area`` is the chosen element's.
+    """Fill small holes, smooth the outline by a pixel, and remove specks.
 
-    Of a net small specks alone are dropped: thin lines are what it is made of.
+    ``area`` is the area of the chosen element.
+
+    Only small specks of a net are removed, because nets consist of thin lines.
     """
     from scipy import ndimage
 
     pieces, count = ndimage.label(mask)
     holes, _ = ndimage.label(~mask)
     size = np.bincount(holes.ravel())
-    # The component around a hole is the one above its first pixel.
+    # The component around a hole is the component of the pixel above the hole's first pixel.
     first = np.unique(holes, return_index=True)[1]
     above = np.where(first >= mask.shape[1], pieces.ravel()[first - mask.shape[1]], 0)
     areas = np.bincount(pieces.ravel(), minlength=count + 1)

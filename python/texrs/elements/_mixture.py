@@ -1,4 +1,4 @@
-"""Gaussian mixtures of colours: small, in NumPy, from a hashed start, so that the same colours give the same model."""
+"""Fit Gaussian mixtures of colours in NumPy, from a hashed start, with reproducible results."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from texrs._progress import ask
 Doubles = NDArray[np.float64]
 
 COMPONENTS, ROUNDS = 5, 25
-"""Gaussians of a mixture, and rounds of expectation and maximisation."""
+"""Number of Gaussians of a mixture, and number of rounds of expectation and maximisation."""
 FLOOR = 1e-3
-"""Least variance along any direction, as a share of the mean variance of the samples."""
+"""Minimum variance along any direction, as a share of the mean variance of the samples."""
 LEAST = 1e-5
-"""Least variance, in squared units of Lab / 100: a tenth of a step of 8 bits."""
+"""Minimum variance, in squared units of Lab / 100: 10 % of a step of 8 bits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mixture:
-    """Weighted Gaussians of full covariance.
+    """Weighted Gaussians with full covariance.
 
     Attributes
     ----------
     weights : (k,) float64
     means : (k, d) float64
     whiten : (k, d, d) float64
-        Lower triangular W with W cov W^T = 1.
+        Lower triangular matrices W with W cov W^T = 1.
     """
 
     weights: Doubles
@@ -56,7 +56,7 @@ class Mixture:
 
     @classmethod
     def _estimate(cls, samples: Doubles, share: Doubles, floor: float) -> Mixture:
-        # No product of matrices here: a library may add in another order with another number of threads.
+        # Avoid matrix products: a library may sum in another order if the number of threads changes.
         mass = share.sum(axis=0) + 1e-12
         means = np.einsum("nk,nd->kd", share, samples) / mass[:, np.newaxis]
         off = samples[:, np.newaxis] - means
@@ -88,7 +88,7 @@ class Mixture:
 
 
 def _start(samples: Doubles, count: int, seed: int) -> Doubles:
-    """Choose centres far from each other (k-means++: Arthur and Vassilvitskii 2007)."""
+    """Choose centres that are far apart (k-means++: Arthur and Vassilvitskii 2007)."""
     chosen = [int(uniform(seed, 0) * len(samples))]
     apart = ((samples - samples[chosen[0]]) ** 2).sum(axis=1)
     for i in range(1, count):

@@ -1,4 +1,4 @@
-"""How elements are looked for: what belongs together of the options of `texrs.elements.analyse`."""
+"""Define the options for searching elements in `texrs.elements.analyse`."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ Model: TypeAlias = Literal["mixture", "nearest"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ElementSearch:
-    """How the elements of a texture are looked for, and how their colours are told from those of the background.
+    """Options for the search of elements, and for the colour models of elements and background.
 
     Parameters
     ----------
     rotations : int
-        Directions in which the element is looked for, 1 to 72, evenly spread over the circle; 1 looks for it upright alone.
+        Number of search directions, 1 to 72, evenly spread over the circle. 1 searches only for upright elements.
     scales : sequence of float
-        Sizes in which it is looked for, over that of its box: 1 to 16 numbers of 0.25 to 4.
+        Sizes to search for, relative to the box: 1 to 16 numbers from 0.25 to 4.
     threshold : float, optional
-        Least similarity, -1 to 1. By default what best parts the candidates in two classes (Otsu).
+        Minimum similarity, -1 to 1. Default: the value that best separates two classes of candidates (Otsu).
     channel : {"weighted", "min-entropy"}, optional
-        The similarity of all channels of the appearance vectors, weighted by their variance, or that of the one whose map
-        has the least entropy. By default the first, and the second with ``method="paper"``.
+        Channels of the appearance vectors for the similarity. "weighted" uses all, weighted by their variance.
+        "min-entropy" uses the channel whose map has the lowest entropy. Default: "weighted", or "min-entropy" with
+        ``method="paper"``.
     model : {"mixture", "nearest"}, optional
-        Colours of foreground and background as mixtures of Gaussians, or by the nearest sample. By default the first, and
-        the second with ``method="paper"``.
+        Model of the colours of foreground and background: mixtures of Gaussians, or the nearest sample. Default:
+        "mixture", or "nearest" with ``method="paper"``.
 
     Raises
     ------
     InvalidInput
-        A field of another type or range.
+        A field has another type or range.
 
     Examples
     --------
@@ -60,7 +61,7 @@ class ElementSearch:
             or not isinstance(self.scales, Sequence | np.ndarray)
             or not 1 <= len(self.scales) <= 16
         ):
-            raise InvalidInput(f"scales: needs 1 to 16 numbers, got {self.scales!r}")
+            raise InvalidInput(f"scales: must be 1 to 16 numbers, got {self.scales!r}")
         sizes = tuple(as_float(s, f"scales[{i}]", 0.25, 4.0) for i, s in enumerate(self.scales))
         object.__setattr__(self, "rotations", as_int(self.rotations, "rotations", 1, 72))
         object.__setattr__(self, "scales", sizes)
@@ -74,21 +75,21 @@ class ElementSearch:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The checked options of an analysis that hold for all of its stages."""
+    """Checked options that apply to all stages of an analysis."""
 
     search: ElementSearch
     model: Model
     literal: bool
-    """Whether the published algorithm is wanted as printed."""
+    """True if the algorithm is used as published."""
     wrap: tuple[bool, bool]
     seed: int
 
     @classmethod
     def of(cls, search: object, method: object, wrap: object, seed: object) -> Settings:
-        """Check the options, and choose what the method leaves open."""
+        """Check the options, and set the defaults that depend on the method."""
         as_method(method, None, "paper")
         if not isinstance(search, ElementSearch):
-            raise InvalidInput(f"search: needs a texrs.elements.ElementSearch, got {type(search).__name__}")
+            raise InvalidInput(f"search: must be a texrs.elements.ElementSearch, got {type(search).__name__}")
         literal = method == "paper"
         channel: Channel = search.channel or ("min-entropy" if literal else "weighted")
         model: Model = search.model or ("nearest" if literal else "mixture")

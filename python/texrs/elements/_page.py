@@ -1,4 +1,4 @@
-"""A page that shows an analysis, and on which it can be corrected."""
+"""Write an HTML page that shows an analysis and helps to correct it."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ __all__ = ["to_html"]
 
 
 def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
-    """Return a page of HTML that shows what was found, and on which corrections can be made by clicking.
+    """Return an HTML page that shows an analysis, with corrections by clicking.
 
     Parameters
     ----------
     entry : ElementAnalysis
-        As it was found.
+        Analysis to show.
     title : str
-        What it is called.
+        Title of the page.
 
     Returns
     -------
     str
-        One page that needs no other file. It ends with the list of corrections that `correct` takes.
+        One page that does not need other files. Its last part is the list of corrections for `correct`.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
         "earlier": report.get("corrections", []),
     }
     options = "".join(f"<option{' selected' if one == entry.layout else ''}>{one}" for one in Layout)
-    # No name may end the script that it stands in.
+    # A name in the data must not end the script element.
     data = json.dumps(known).replace("<", "\\u003c")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">

@@ -1,10 +1,10 @@
-"""A start without a user: which element, which background, which layout, and how sure that is.
+"""Propose the element, the background and the layout, with their confidence.
 
-1. sizes: blobs of every scale, pieces of a colour segmentation, and the periods of the autocorrelation propose boxes;
-2. the element: each box is searched for in a small picture, and the one that the texture repeats best is taken;
-3. the background: what lies farthest from all that was found, of the colours that most of it has;
-4. the layout: elements that are busier and more varied than what lies between them are things on a ground, unless the whole
-   picture falls into cells beyond doubt; else what lies between is a net where it stands out, and joints where it does not.
+1. Sizes: blobs of every scale, areas of a colour segmentation, and periods of the autocorrelation propose boxes.
+2. Element: each box is searched for in a small image. The box that the texture repeats best is used.
+3. Background: the places farthest from all detections, among those with the most common colours.
+4. Layout: elements that are busier and more varied than the rest are objects on a background, unless the whole image
+   certainly consists of cells. Otherwise the rest is a net if it has a high contrast, and joints if not.
 """
 
 from __future__ import annotations
@@ -30,59 +30,65 @@ from texrs.exemplar.cells import find_cells
 from texrs.point_sets import spacing
 
 SMALL = 224
-"""Longest side of the picture in which boxes are compared."""
+"""Maximum side of the image for comparing boxes, in pixels."""
 GROWN, STEPS = 3, 5
-"""Boxes whose sides are changed as long as that makes them better, and how often."""
+"""Number of boxes whose sides are changed while this improves them, and maximum number of changes."""
 AGAIN = 6
-"""Boxes that are moved to where they hold one thing, and tried again."""
+"""Number of boxes that are moved until they contain one object, and tried again."""
 WIDE = 1.3
-"""Sides of what is looked at for that, over those of the box."""
+"""Sides of the window for this, as a multiple of the box."""
 OUT = 1.1
-"""Distance from an element, in halves of its box, from which on a pixel is taken for background."""
+"""Minimum distance from an element for a background pixel, in half boxes."""
 PLACES = 12
-"""Places of the background that are proposed."""
+"""Number of proposed places of the background."""
 THING = 0.68
-"""How much busier and more varied elements are than what lies between them from where on they are things on a ground."""
+"""Minimum ratio of activity and variation in elements to the rest, for objects on a background."""
 LEAST_EDGE = 0.002
-"""Differences of colour that are none, of a range of 1."""
+"""Negligible colour difference. The range of colours is 1."""
 NET = 0.2
-"""Contrast from which on what lies between evenly spread openings is a net; half of it where they are unevenly spread."""
+"""Minimum contrast of a net with evenly spaced openings. Half of it is enough for uneven spacing."""
 EVEN = 0.15
-"""Spread of the distances to the nearest element, over their mean, up to which they are evenly spread."""
+"""Maximum ratio of the standard deviation of nearest distances to their mean, for even spacing."""
 CELLS, LARGE = 0.99, 256
-"""Confidence in the cells of a picture from which on they outweigh what single elements look like, and the longest side of the
-picture in which they are looked for. Chosen on photographs: walls and tiles lie above it, heaps of fruit or stones below."""
+"""Minimum confidence in cells that overrides the look of single elements, and maximum side of the image for finding
+cells.
+
+Chosen on photographs: walls and tiles have more confidence, heaps of fruit or stones less.
+"""
 SMALLEST = 16
-"""Shorter side of that picture, at least."""
+"""Minimum shorter side of that image, in pixels."""
 DOUBTFUL = 0.65
-"""Below this a proposal is doubtful: of layouts proposed for 23 photographs, their parts and four generated textures of each of
-eight kinds, 28 % were right that were less than 50 % sure, 49 % of those up to 65 %, 78 % up to 80 %, and all above."""
+"""Confidence below which a proposal is doubtful.
+
+Measured on layouts of 23 photographs, their parts, and four generated textures of each of eight kinds. Right were 28 %
+of the layouts with confidence below 0.5, 49 % up to 0.65, 78 % up to 0.8, and all above.
+"""
 ADVICE = {
     "box": "draw a box around one element",
-    "background": "name a few places between the elements",
-    "layout": "say how the elements hang together",
+    "background": "give a few places between the elements",
+    "layout": "give the layout of the elements",
 }
-"""What to give in the place of a proposal."""
+"""Advice on what to give instead of a doubtful proposal."""
 OPEN = 0.3
-"""Share of a given mask's ground from which on its pieces are taken to be separate."""
+"""Minimum background share of a given mask for separate components."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """What an analysis starts from: what is said of a texture, and proposals for the rest.
+    """Starting point of an analysis: the arguments, and proposals for the rest.
 
     Attributes
     ----------
     box : Box
-        Of one element.
+        Box of one element.
     layout : Layout
-        How the elements hang together.
+        Layout of the elements.
     background : (H, W) bool, optional
-        What is no element for sure; where the foreground is known it may be unknown.
+        Pixels that certainly are not in an element. May be unknown if the foreground is known.
     proposed : list of str
-        Which of them were proposed.
+        Names of the proposed arguments.
     confidence : dict
-        How sure each proposal is, 0 to 1.
+        Confidence of each proposal, 0 to 1.
 
     """
 
@@ -94,7 +100,7 @@ class Start:
 
 
 def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> Start:
-    """Propose what is not given."""
+    """Propose the arguments that are not given."""
     size = (guide.shape[0], guide.shape[1])
     box, layout, background, points = given.box, given.layout, given.background, given.points
     blind = background is None and given.whole is None
@@ -117,7 +123,7 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
             layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
         progress(0.95)
     if blind and "layout" in sure and layout == Layout.CONNECTED:
-        # What repeats are the openings of the net: ground lies in the middle of each but the chosen one.
+        # The openings of a net are what repeats. The middle of each, except the chosen one, is background.
         middle = np.array(box.centre)
         others = points[np.abs(points - middle).max(axis=1) > max(box.size) / 2][:PLACES]
         if len(others):
@@ -139,13 +145,13 @@ def _report_part(progress: Callable[[float], object], low: float, high: float, s
 
 
 def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
-    """Try boxes in a small picture and take the one that explains most of it."""
+    """Try boxes in a small image, and return the box that explains most of the image."""
     step = max(1, -(-max(guide.shape[:2]) // SMALL))
     small = downscale(guide, step)
     with answering(progress, 0.0):
         boxes = propose_boxes(small)
     if not boxes:
-        raise InvalidInput("box: none could be proposed for this image; give one, or the points")
+        raise InvalidInput("box: no box could be proposed for this image; give a box or the points")
     light, features = to_lab(small)[..., 0], describe_appearance(small, wrap)[0]
     best: tuple[float, Box] | None = None
     reached = 0.0
@@ -191,7 +197,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
 
 
 def shrink(guide: Floats) -> tuple[Floats, int]:
-    """Return the picture in which cells are looked for, and by how much it is smaller."""
+    """Return the reduced image for finding cells, and its reduction factor."""
     sides = guide.shape[:2]
     step = max(1, min(-(-max(sides) // LARGE), min(sides) // SMALLEST))
     return downscale(guide, step), step
@@ -207,10 +213,10 @@ def downscale(guide: Floats, step: int) -> Floats:
 
 
 def _score(light: Floats, found: Detections, box: Box) -> float:
-    """Return how well copies of a box explain a picture.
+    """Return how well copies of a box explain an image.
 
-    They do so by how alike they are, how clearly they stand out, how much they cover, and how much what they have in
-    common is one thing in the middle of the box.
+    The score depends on the similarity of the copies, their contrast to other places, and their coverage. It also
+    depends on whether the mean copy shows one object in the middle of the box.
     """
     if len(found.scores) < 4:
         return 0.0
@@ -221,7 +227,7 @@ def _score(light: Floats, found: Detections, box: Box) -> float:
     window = _average_window(light, found, box, WIDE)
     if window is None:
         return 0.0
-    # What is alike by chance is so less often the more there is of it (Fisher's z grows with the root of the area).
+    # Large boxes are less often similar by chance (Fisher's z grows with the square root of the area).
     large = float(np.sqrt(box.size[0] * box.size[1] / light.size))
     return (
         large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _measure_closure(window, np.zeros(2), box.size) ** 2
@@ -229,7 +235,7 @@ def _score(light: Floats, found: Detections, box: Box) -> float:
 
 
 def _measure_confidence(light: Floats, box: Box, found: Detections) -> float:
-    """Return how sure a box is: how alike its copies are, and how much it holds one thing."""
+    """Return the confidence of a box, from the similarity of its copies and whether it contains one object."""
     window = _average_window(light, found, box, WIDE)
     if window is None or len(found.scores) < 4:
         return 0.1
@@ -237,7 +243,7 @@ def _measure_confidence(light: Floats, box: Box, found: Detections) -> float:
 
 
 def _average_window(light: Floats, found: Detections, box: Box, wide: float) -> Floats | None:
-    """Average what lies around the places that were found, where it is inside the picture."""
+    """Return the mean window around detections, among those inside the image."""
     half = [round_to_odd(wide * s) // 2 for s in box.size]
     sides = light.shape
     whole = [p for p in found.pixels.tolist() if all(half[a] <= p[a] < sides[a] - half[a] for a in range(2))]
@@ -248,13 +254,16 @@ def _average_window(light: Floats, found: Detections, box: Box, wide: float) -> 
 
 
 def _measure_closure(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
-    """Return how much of what changes in a window does so outwards from a centre, 0 to 1: the outline of one thing does."""
+    """Return the share of changes in a window that point outwards from a centre, 0 to 1.
+
+    The outline of one object does so.
+    """
     rows, columns = np.gradient(window)
     middle = (np.array(window.shape) - 1) / 2 + centre
     out = [np.arange(n) - m for n, m in zip(window.shape, middle, strict=True)]
     y, x = (o / (s / 2) for o, s in zip(out, size, strict=True))
     away = np.maximum(np.hypot(y[:, np.newaxis], x), 1e-6)
-    # In units of the box, in which an oblong thing is round.
+    # Measure in units of the box, so that an oblong object counts as round.
     slope = rows * size[0], columns * size[1]
     total = hypot_single(*slope) * (away < WIDE)
     outward = (slope[0] * y[:, np.newaxis] + slope[1] * x) / away * (away < WIDE)
@@ -265,7 +274,7 @@ def _measure_closure(window: Floats, centre: NDArray[np.float64], size: tuple[in
 
 
 def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
-    """Move a box, within half of it, to where what it has in common with its copies is one thing in its middle."""
+    """Move a box by up to half of it, so that the mean of its copies shows one object in its middle."""
     window = _average_window(light, found, box, 2.2)
     if window is None:
         return None
@@ -289,7 +298,7 @@ def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
 
 
 def _place_box(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
-    """Return a box of three quarters of the spacing around the point that lies farthest inside."""
+    """Return a box of 0.75 of the spacing, around the point farthest from the border."""
     side = max(float(LEAST), 0.75 * spacing(points))
     side = min(side, min(size) - 1.0)
     depth = np.minimum(points, np.array(size) - 1 - points).min(axis=1)
@@ -303,7 +312,7 @@ def _place_box(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
 def measure_distance(
     size: tuple[int, int], points: NDArray[np.float64], box: tuple[int, int], wrap: tuple[bool, bool]
 ) -> Floats:
-    """Return the distance of each pixel to the nearest element, in halves of its box."""
+    """Return the distance of each pixel to the nearest element, in half boxes."""
     from scipy.spatial import cKDTree
 
     if not len(points):
@@ -323,7 +332,7 @@ def measure_distance(
 def _choose_layout(
     guide: Floats, away: Floats, points: NDArray[np.float64], mask: Bools | None
 ) -> tuple[Layout, float]:
-    """Choose a layout, and say how far the choice is from the other ones."""
+    """Choose a layout, and return it with its confidence."""
     from scipy.spatial import cKDTree
 
     if mask is not None:
@@ -343,21 +352,24 @@ def _choose_layout(
         sure = cells
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
-    # A net stands out from what is seen through it, and joints less; the less if all between them is of one size.
+    # A net has more contrast to its openings than joints have to cells. Evenly spaced openings need more contrast.
     net = contrast / (NET if spread < EVEN else NET / 2)
     return (Layout.CONNECTED if net >= 1 else Layout.JOINTED), sure * _measure_odds(net)
 
 
 def _measure_odds(ratio: float) -> float:
-    """Return how sure a choice is that falls where a measure is 1: a coin's toss there, and surer on either side."""
+    """Return the confidence of a choice with a threshold at ratio 1.
+
+    It is 0.5 at the threshold and rises on both sides.
+    """
     return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
 
 def compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
-    """Return how much elements are things rather than openings, and how their lightness differs from what lies between.
+    """Return how much elements are objects, not openings, and their lightness difference to the rest.
 
-    Openings of a net and bricks between joints are even and alike; lines, edges and colours lie between them. Of things on
-    a ground the reverse is true.
+    Openings of a net, and bricks between joints, are even and similar. Lines, edges and colours are between them. For
+    objects on a background the reverse holds.
     """
     from scipy.ndimage import gaussian_filter, gaussian_gradient_magnitude
 
@@ -378,7 +390,7 @@ def compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) -
 
 
 def _choose_background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, float]:
-    """Take the places farthest from all elements, of the colour that most of them have."""
+    """Return the places farthest from all elements, among those of the most common colour."""
     from scipy.ndimage import gaussian_filter, maximum_filter
 
     colours = to_lab(guide)

@@ -1,4 +1,4 @@
-"""Where a texture looks like its chosen element (section 3.2): similarity map, suppression, cut, sub-pixel places."""
+"""Find where a texture looks like its chosen element (section 3.2), to a fraction of a pixel."""
 
 from __future__ import annotations
 
@@ -18,53 +18,58 @@ from texrs.kernels.ncc import Correlation
 Wrap: TypeAlias = tuple[bool, bool]
 
 CHANNELS = 8
-"""Channels of the appearance vectors that are compared (section 3.2)."""
+"""Number of compared channels of the appearance vectors (section 3.2)."""
 RADIUS = 2
-"""Of the windows that an appearance vector sums up: 5 x 5."""
+"""Radius of the windows that an appearance vector describes: 5 x 5 pixels."""
 COVERED = 0.95
-"""Share of the map from which on no more candidates are taken (section 3.2)."""
+"""Covered share of the map that ends the search for candidates (section 3.2)."""
 CONTEXT = 1.3
-"""Sides of what is compared over those of the box: what an element stands out from belongs to its looks, and inside a tile or a
-coin there may be nothing but noise."""
+"""Sides of the compared window, as a multiple of the box.
+
+The surroundings are part of the look of an element, and the inside of a tile or a coin may only contain noise.
+"""
 APART = 1.3
-"""Sides of what is removed around an element over those of its box: boxes of neighbours overlap, but seldom that much."""
+"""Sides of the area removed around a candidate, as a multiple of the box.
+
+Boxes of neighbours overlap, but seldom by more.
+"""
 RANGE = 0.25
-"""Least spread of the candidates' scores for a cut to mean anything."""
+"""Minimum range of the candidates' scores for a meaningful cut."""
 BINS = 64
-"""Of the histogram over [-1, 1] whose entropy chooses a channel."""
+"""Number of bins of the histogram over [-1, 1] whose entropy chooses a channel."""
 
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """One of the bank: the element's box with what lies around it, turned and scaled."""
+    """A template of the bank: the box of the element with its surroundings, rotated and scaled."""
 
     box: tuple[int, int]
     inner: tuple[int, int]
-    """The box alone."""
+    """The box without its surroundings."""
     angle: float = 0.0
     scale: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections:
-    """The places that look like the element, best first.
+    """Places that look like the element, best first.
 
     Attributes
     ----------
     pixels : (n, 2) intp
-        The local maxima of the map.
+        Local maxima of the map.
     points : (n, 2) float64
-        The same, between the pixels.
+        The maxima to a fraction of a pixel.
     scores : (n,) float64
         Values of the map.
     template : (n,) intp
-        Which template of the bank fits best.
+        Index of the best template in the bank.
     similarity : (H, W) float32
         Similarity to the element.
     threshold : float
-        Least score; -1 where nothing was cut.
+        Minimum score. -1 if no candidates were cut.
     channel : int or None
-        The channel that was used; None for all by weight.
+        Channel that was used. None for all channels, weighted.
     templates : list of Template
         The bank, the element itself first.
     """
@@ -80,13 +85,13 @@ class Detections:
 
     @property
     def poses(self) -> NDArray[np.float64]:
-        """Degrees by which each is turned against the element, and how many times larger it is: (n, 2)."""
+        """Rotation in degrees and size of each detection relative to the element, (n, 2)."""
         found = [(t.angle, t.scale) for t in (self.templates[k] for k in self.template)]
         return np.array(found, np.float64).reshape(-1, 2)
 
 
 def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any]:
-    """Continue an image beyond its border: around where it repeats, mirrored elsewhere."""
+    """Extend an image beyond its border, periodically along axes that wrap, and mirrored along others."""
     for axis in range(2):
         widths = [(margin[axis], margin[axis]) if a == axis else (0, 0) for a in range(array.ndim)]
         array = np.pad(array, widths, mode="wrap" if wrap[axis] else "symmetric" if len(array) < 2 else "reflect")
@@ -94,9 +99,11 @@ def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any
 
 
 def describe_appearance(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
-    """Return the appearance vectors of an image, (H, W, 8), and of patches whose margins are `RADIUS` wide.
+    """Return the appearance vectors (H, W, 8) of an image, and those of patches.
 
-    All lie in one atlas, so that the same components describe them.
+    The margins of patches are `RADIUS` wide.
+
+    All are in one atlas, so that the same components describe them.
     """
     image = pad(colours, (RADIUS, RADIUS), wrap)
     height, width = image.shape[:2]
@@ -136,13 +143,13 @@ def make_bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> 
 
 
 def extract_template(colours: Floats, centre: tuple[int, int], template: Template, wrap: Wrap) -> Floats:
-    """Look at the image around an element through a turned and scaled window, with a margin of `RADIUS`."""
+    """Return the image around an element in a rotated and scaled window, with a margin of `RADIUS`."""
     from scipy.ndimage import map_coordinates
 
     half = [n // 2 + RADIUS for n in template.box]
     rows, columns = np.mgrid[-half[0] : half[0] + 1, -half[1] : half[1] + 1].astype(np.float64)
     angle = np.deg2rad(template.angle)
-    # What the template shows at an offset is what the element shows at the offset turned back and made smaller.
+    # Rotate back and scale down each offset in the template to get the offset in the element.
     back = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / template.scale
     places = [back[i, 0] * rows + back[i, 1] * columns + centre[i] for i in range(2)]
     modes = ["grid-wrap" if w else "mirror" for w in wrap]
@@ -170,19 +177,19 @@ def search_similar(
     Parameters
     ----------
     colours : (H, W, 1 or 3) float32
-        The image, within [0, 1].
+        Image in [0, 1].
     centre, box : (int, int)
-        Centre and sides of the element's box, pixels.
+        Centre and sides of the box of the element, in pixels.
     wrap : (bool, bool)
-        Axes along which the image repeats.
+        Axes along which the image is periodic.
     options : ElementSearch
-        Directions, sizes, least similarity and channel.
+        Directions, sizes, minimum similarity and channels.
     cut : bool
-        Whether candidates are cut by their scores, and such as overlap better ones dropped.
+        If True, candidates are cut by their scores, and those that overlap better ones are dropped.
     features : (H, W, 8) float32, optional
-        What `appearance_vectors` makes of the image alone, where many boxes are looked for.
+        Result of `describe_appearance` for the image. Saves time if many boxes are searched for.
     progress : callable, optional
-        Called with the share that is done.
+        Function that is called with the share of the work that is done.
     """
     templates = make_bank(box, options.rotations, options.scales)
     turned = [t for t in templates if t.angle or t.scale != 1.0]
@@ -213,7 +220,7 @@ def search_similar(
             chosen = choose_channel(maps) if chosen is None else chosen
             here = np.ascontiguousarray(maps[..., chosen])
         else:
-            # Added in order, so that no library decides about the last bits.
+            # Add in a fixed order, so that the last bits do not depend on a library.
             here = np.zeros(colours.shape[:2], np.float32)
             for c in range(CHANNELS):
                 here += weights[c] * maps[..., c]
@@ -233,7 +240,7 @@ def search_similar(
     elif cut and len(scores) and scores[1:].max(initial=-1) - scores[-1] > RANGE:
         least = threshold_otsu(scores[1:])
     if cut:
-        # The cut needs to see what lies between elements; afterwards nothing is one that overlaps a better one.
+        # The threshold needs candidates between elements. After the cut, drop those that overlap a better one.
         apart = suppress_non_maxima(best, [t.inner for t in templates], which, wrap, share=APART)
         pixels, scores = apart, best[tuple(apart.T)].astype(np.float64)
     pixels, scores = pixels[scores >= least], scores[scores >= least]
@@ -242,7 +249,7 @@ def search_similar(
 
 
 def choose_channel(maps: Floats) -> int:
-    """Return the channel whose map has the least entropy (section 3.2, as printed)."""
+    """Return the channel whose map has the lowest entropy (section 3.2, as printed)."""
     entropies = []
     for c in range(maps.shape[-1]):
         share = np.histogram(maps[..., c], BINS, (-1, 1))[0] / maps[..., c].size
@@ -254,7 +261,10 @@ def choose_channel(maps: Floats) -> int:
 def suppress_non_maxima(
     map: Floats, boxes: Sequence[tuple[int, int]], which: NDArray[np.intp], wrap: Wrap, share: float = 1.0
 ) -> NDArray[np.intp]:
-    """Take local maxima, best first, and with each remove the box around it; (n, 2), in the order taken."""
+    """Return local maxima, best first, each with the box around it removed.
+
+    The result is (n, 2), in the order of choice.
+    """
     from scipy.ndimage import maximum_filter
 
     top = maximum_filter(map, 3, mode=["wrap" if w else "nearest" for w in wrap]) == map
@@ -281,7 +291,7 @@ def suppress_non_maxima(
 
 
 def threshold_otsu(values: NDArray[np.float64]) -> float:
-    """Return the value that parts two classes of numbers with the largest variance between them."""
+    """Return the value that separates numbers into two classes with the largest variance between them."""
     ordered = np.sort(values)
     count = np.arange(1, len(ordered))
     below = np.cumsum(ordered)[:-1] / count
@@ -292,7 +302,7 @@ def threshold_otsu(values: NDArray[np.float64]) -> float:
 
 
 def offset_maxima(map: Floats, pixels: NDArray[np.intp], wrap: Wrap) -> NDArray[np.float64]:
-    """Return the tops of the parabolas through a maximum and its neighbours, along each axis, within half a pixel."""
+    """Return the offsets of parabola peaks through maxima, along each axis, within half a pixel."""
     offsets = np.zeros((len(pixels), 2))
     for axis in range(2):
         near = []

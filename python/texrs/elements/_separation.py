@@ -1,4 +1,4 @@
-"""Detections and mask made to agree, for separate elements (section 3.3, and what it leaves open)."""
+"""Reconcile detections and mask for separate elements (section 3.3 and details that it leaves open)."""
 
 from __future__ import annotations
 
@@ -13,37 +13,42 @@ from texrs.elements._mask import Wrap, ellipse, stamp_posed
 from texrs.elements._search import Detections
 
 ADDED = 0.25
-"""Least area of a component that is taken for an element that was not found, as a share of the usual one's."""
+"""Minimum area of a component that becomes an undetected element, as a share of the usual area."""
 SOLID, ROUND = 0.8, 0.9
-"""Share of its convex hull that an element fills at least, and from which on several detections are of one element."""
+"""Minimum share of its convex hull that an element fills, and minimum share for merging several detections into one
+element.
+"""
 SWOLLEN, ONE = 2.5, 3.5
-"""How many times the usual area a component has at most for each detection in it, and for several to be of one element."""
+"""Maximum area of a component in usual areas: per detection in it, and for several detections of one element."""
 LONG, THIN = 2.2, 0.6
-"""Length and mean thickness of a component, over the sides of the box, beyond which it is no element."""
+"""Length and mean thickness of a component, in sides of the box, for recognising a strip that is not an element."""
 HEAP = 0.3
-"""Largest share of the detections that may lie in one component."""
+"""Maximum share of the detections in one component."""
 JOINED, MESHED = 0.5, 0.25
-"""Least share of the usual area of a piece that is taken for an element between joints, and for a mesh of a net."""
+"""Minimum area, in usual areas, of a component that becomes an element between joints, and of one that becomes a mesh
+of a net.
+"""
 TRUSTED = 0.7
-"""Share of the detections that must lie in such components, else the mask is at fault."""
+"""Minimum share of detections in such components. With fewer, the mask is wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Separation:
-    """The elements of a texture, and what belongs to them.
+    """The elements of a texture, and their pixels.
 
     Attributes
     ----------
     points : (n, 2) float64
         Centres of the elements.
     scores : (n,) float64
-        How alike each is to the chosen one.
+        Similarity of each element to the chosen one.
     detection : (n,) intp
-        Which detection each was, -1 for none.
+        Index of the detection of each element, -1 for none.
     mask : (H, W) bool
         The foreground.
     made_by : str
-        What made the mask: "cut", "elements", copies of the chosen one, "consensus" of all elements, or "cells".
+        Origin of the mask: "cut", "elements" (copies of the chosen one), "consensus" (common to all elements) or
+        "cells".
     """
 
     points: NDArray[np.float64]
@@ -54,7 +59,10 @@ class Separation:
 
 
 def label_components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
-    """Return the number of the piece that each pixel of a mask belongs to, around cyclic axes too, and how many there are."""
+    """Return the component of each pixel of a mask, and the number of components.
+
+    Components continue across periodic borders.
+    """
     from scipy.ndimage import label
 
     pieces, count = label(mask)
@@ -71,7 +79,7 @@ def label_components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
 
 
 def rank_pieces(labels: Labels, least: float = 0) -> list[Any]:
-    """Return the pieces of labels that no border cuts, of so many pixels at least: those of the most usual area first."""
+    """Return the components that no border cuts, of a minimum size, those of the most usual area first."""
     from skimage.measure import regionprops
 
     rows, columns = labels.shape
@@ -82,7 +90,7 @@ def rank_pieces(labels: Labels, least: float = 0) -> list[Any]:
 
 
 def find_nearest_pixels(points: NDArray[np.float64], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], ...]:
-    """Return the rows and columns of the pixels that points lie on, or nearest to."""
+    """Return the rows and columns of the pixels at or nearest to points."""
     rows, columns = np.clip(np.rint(points).astype(np.intp), 0, np.array(shape) - 1).T
     return rows, columns
 
@@ -95,9 +103,9 @@ def reconcile(
     *,
     certain: bool = False,
 ) -> Separation:
-    """Move detections into the middle of their components, add and drop some, or make the mask of copies.
+    """Move detections to the middle of their components, add and drop some, or replace the mask by copies.
 
-    ``shape`` is the chosen element's foreground within its box. A mask that is ``certain`` is never replaced.
+    ``shape`` is the foreground of the chosen element within its box. If the mask is ``certain``, it is never replaced.
     """
     from skimage.measure import regionprops
 
@@ -115,7 +123,7 @@ def reconcile(
     good = (area >= ADDED * usual) & (area <= SWOLLEN * usual * np.maximum(inside, 1)) & (solid >= SOLID)
     good[0] = False
     several = (inside > 1) & (area <= SWOLLEN * usual * inside) & (area >= ADDED * usual)
-    # A piece that holds much of the texture is no heap of elements.
+    # A component with a large part of all detections is not a heap of elements.
     several &= inside <= max(4, HEAP * len(points))
     good &= inside <= max(4, HEAP * len(points))
     share = float((good | several)[owner].mean()) if len(points) else 0.0
@@ -135,7 +143,7 @@ def reconcile(
             kept.extend((*points[i], scores[i], int(i)) for i in mine)
         elif len(mine):
             best = int(mine[np.argmax(scores[mine])])
-            # What is much larger than an element, or ragged, has no middle to speak of.
+            # The middle of a ragged or too large component is meaningless, so keep the detection.
             place = centre if good[number] or whole else points[best]
             kept.append((*place, scores[best], best))
         elif good[number] or certain:
@@ -144,7 +152,7 @@ def reconcile(
     table = np.array(kept, np.float64).reshape(-1, 4)
     names = np.unique(pieces[find_nearest_pixels(table[:, :2], mask.shape)])
     used = np.isin(pieces, names[names > 0])
-    # What the border cuts may be no element, but is no ground either.
+    # A component cut by the border may not be an element, but is not background either, so keep it in the mask.
     ends = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
     cut = np.unique(np.concatenate(ends)) if ends else np.zeros(0, np.intp)
     cut = cut[(cut > 0) & (area[cut] >= ADDED * usual) & (area[cut] <= SWOLLEN * usual)]
@@ -153,16 +161,19 @@ def reconcile(
 
 
 def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> bool:
-    """Return whether a component is much longer than an element and much thinner: a strip along the border, mostly."""
+    """Return whether a component is a strip: much longer and thinner than an element.
+
+    Most are along the border.
+    """
     side = max(bounds[axis + 2] - bounds[axis] for axis in range(2))
     return side > LONG * max(box) and area / side < THIN * min(box)
 
 
 def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bool) -> Separation:
-    """Add the elements between joints, or the meshes of a net, that look like those that were found.
+    """Add undetected elements between joints, or meshes of a net, that resemble the detected ones.
 
-    A piece counts that is whole, as solid as an element, and of about the usual area. Of detections between joints those
-    are dropped that lie on what is far too small.
+    A component counts if it is whole, as solid as an element, and of about the usual area. Detections between joints
+    are dropped if their component is far too small.
     """
     from skimage.measure import regionprops
 
@@ -202,7 +213,10 @@ def _drop_fragments(found: Separation, pieces: Labels, areas: NDArray[np.intp], 
 
 
 def find_middle(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:
-    """Return the centroid of pixels, around cyclic axes that of their angles."""
+    """Return the centroid of pixels.
+
+    Along periodic axes it is the mean of their angles.
+    """
     centre = pixels.mean(axis=0)
     for axis in range(2):
         side = shape[axis]
