@@ -41,11 +41,9 @@ def read_spacing(path: Path) -> Sequence[float] | None:
 def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
     """Read the points or cells of one piece of image data."""
     check_length(path, limit)
-    with (
-        translate_errors(path, "reading"),
-        path.open("rb") as file,
-        mmap(file.fileno(), 0, access=ACCESS_READ) as content,
-    ):
+    with translate_errors(path, "reading"), path.open("rb") as file:
+        # The samples are decoded from this file without a copy of their text.
+        content = mmap(file.fileno(), 0, access=ACCESS_READ)
         start = content.find(b"<AppendedData")
         root = ElementTree.fromstring(content[:] if start < 0 else content[:start] + b"</VTKFile>")
         pieces = root.findall("ImageData/Piece")
@@ -68,14 +66,14 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
             raise FileError(f"{path}: holds no voxels, or more than {_MOST_CHANNELS} channels")
         size = dtype.itemsize * channels * check_size(path, tuple(sides), channels, dtype.itemsize, limit)
         header = np.dtype(end + ("u8" if root.get("header_type") == "UInt64" else "u4"))
-        data = (chosen.text or "").strip().encode()
+        data = memoryview((chosen.text or "").strip().encode())
         form, encoded = chosen.get("format", "ascii"), True
         if form == "appended":
             mark = content.find(b"_", content.find(b">", start)) + 1
             encoded = b'encoding="raw"' not in content[start:mark]
-            data = content[mark + int(chosen.get("offset") or 0) : content.rfind(b"</AppendedData")]
+            data = memoryview(content)[mark + int(chosen.get("offset") or 0) : content.rfind(b"</AppendedData")]
         if form == "ascii":
-            values = np.array(data.split(), np.float64 if dtype.kind == "f" else dtype.newbyteorder("="))
+            values = np.array(bytes(data).split(), np.float64 if dtype.kind == "f" else dtype.newbyteorder("="))
             samples: bytes | memoryview = values.astype(dtype).tobytes()
         else:
             samples = _unpack(path, data, header, encoded, root.get("compressor"), size)
@@ -97,15 +95,15 @@ def _choose(path: Path, names: Mapping[str, object], active: list[str | None]) -
     return next(iter(names))
 
 
-def _decode(data: bytes, length: int) -> bytes:
+def _decode(data: bytes | memoryview, length: int) -> bytes:
     """Return the first ``length`` bytes of a text of base64, or up to two more."""
     need = -(-length // 3) * 4
-    text = b"".join(data.split())[:need] if re.search(rb"\s", data[:need]) else data[:need]
+    text = b"".join(bytes(data).split())[:need] if re.search(rb"\n", data[:need]) else data[:need]
     return base64.b64decode(text[: len(text) // 4 * 4])
 
 
 def _unpack(
-    path: Path, data: bytes, header: np.dtype[np.generic], encoded: bool, packer: str | None, size: int
+    path: Path, data: memoryview, header: np.dtype[np.generic], encoded: bool, packer: str | None, size: int
 ) -> bytes | memoryview:
     """Return samples after their length, or from blocks that are compressed one by one after the lengths of all."""
     one = header.itemsize
@@ -121,7 +119,7 @@ def _unpack(
     whole = (3 + blocks) * one
     lengths = np.frombuffer(_decode(data, whole) if encoded else data, header, count=3 + blocks)[3:].tolist()
     # The lengths are a separate text.
-    body = _decode(b"".join(data.split())[-(-whole // 3) * 4 :], sum(lengths)) if encoded else data[whole:]
+    body = _decode(b"".join(bytes(data).split())[-(-whole // 3) * 4 :], sum(lengths)) if encoded else data[whole:]
     out, place = bytearray(), 0
     for length in lengths:
         part, left = body[place : place + length], size - len(out)
