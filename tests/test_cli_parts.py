@@ -219,8 +219,8 @@ def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["design"], "40000 x 40000 has 1600000000 pixels, .*; texrs tiles makes an endless design"),
-        (["tile"], "; texrs tiles makes an endless design, and writes windows of any size$"),
+        (["design"], "40000 x 40000 has 1600000000 pixels, .*; texrs tiles creates an unbounded design"),
+        (["tile"], "; texrs tiles creates an unbounded design, and writes windows of any size$"),
         (["tiles"], "--size: .* more than the limit of 268435456; to OUT.zarr, or with --chunks, it is made in parts$"),
         (["synthesize"], "more than the limit of 268435456; to OUT.zarr, or with --chunks, it is made in parts$"),
         (["perspective"], "more than the limit of 268435456$"),

@@ -63,8 +63,8 @@ class Quality:
     Attributes
     ----------
     torn : float
-        Length of seams that cross elements, divided by the expected total outline length. Invisible seams count a
-        quarter.
+        Length of seams that cross elements, divided by the expected total outline length: 0 or more. Invisible
+        seams count a quarter.
     broken : float
         Length of lines that break off at seams, divided by the length of such lines, minus the usual share in the
         exemplar.

@@ -59,7 +59,7 @@ NAMES = (
     "synthesize",
     "tile",
 )
-TILES = "texrs tiles makes an endless design, and writes windows of any size"
+TILES = "texrs tiles creates an unbounded design, and writes windows of any size"
 TWICE = {"size": "twice the exemplar", "spacing": "as the file states"}
 GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemplar"}
 
