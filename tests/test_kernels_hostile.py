@@ -154,7 +154,7 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
         reconstruct,
         {"seed": NOISE[..., 0] - 0.2, "mask": NOISE[..., 0], "wrap": (True, False)},
     ),
-    "regions.merge": (
+    "regions.felzenszwalb": (
         felzenszwalb,
         {"image": NOISE, "scale": 0.5, "blur": 0.4, "least": 5, "wrap": (False, True), "progress": None},
     ),
