@@ -131,7 +131,10 @@ def test_assumptions_are_shown(here: Path, capsys: Capture, command: str, name: 
 def test_masks_that_mark_nothing_are_refused(here: Path, capsys: Capture, command: str, name: str) -> None:
     io.write("empty.png", np.zeros((64, 96), np.uint8))
     place = next(p for p in GROUP.get_command(None, command).params if p.name == name)
-    words = ["out.tif" if word == "made" else word for word in make_words(command, name, "empty.png")]
+    io.write_volume("empty.tif", np.zeros((32, 36, 40), np.uint8))
+    io.write_volume("volume.tif", samples.stripes((32, 36, 40)).image)
+    empty = "empty.tif" if command == "solid" else "empty.png"
+    words = ["out.tif" if word == "made" else word for word in make_words(command, name, empty)]
     if place.param_type_name == "option":
         words = ["in.png" if word == "empty.png" else word for word in words]
     if command == "database":
@@ -139,7 +142,7 @@ def test_masks_that_mark_nothing_are_refused(here: Path, capsys: Capture, comman
     elif command == "scale-map":
         words = [word for word in words if word not in ("--slant", "20")]
     assert main(words) == 2, capsys.readouterr().err
-    assert "empty.png" in capsys.readouterr().err
+    assert empty in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("command", "name"), POINTS)

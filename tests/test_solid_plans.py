@@ -46,7 +46,7 @@ def test_what_is_judged_clearly_best_is_taken(monkeypatch):
     for exemplar, best, score in ((exemplars[0], "unmasked", 0.8), (exemplars[1], "default", 0.86)):
         given = scores | {"unmasked": score}
         names = {plan: name for name, plan in plans.PLANS.items()}
-        monkeypatch.setattr(plans, "judge", lambda exemplar, name, given=given: given[name])
+        monkeypatch.setattr(plans, "evaluate", lambda exemplar, name, given=given: given[name])
         monkeypatch.setattr(plans, "average", lambda figures: {"score": figures[0]})
         monkeypatch.setattr("texrs.papers.solid.try_plan", lambda asked, progress, plan, seed, names=names: names[plan])
         found = texrs.synthesize(exemplar, 64, patches="auto").report
