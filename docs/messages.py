@@ -48,6 +48,12 @@ KINDS = (
         "Write to another name, or use `--force`.",
     ),
     kind(
+        r"is (?:only )?for|not for use|needs? (?:method|quality|a volume|a picture|an image)"
+        r"|only (?:with|for|where)|without|for use with|does not (?:take|apply)",
+        "The argument does not apply to this call.",
+        "Leave it out, or change the other argument in the message.",
+    ),
+    kind(
         r"no such|not found|cannot be (?:read|opened|written)|does not exist|is not there|missing|lacks?\b|has no ",
         "Something that is needed is not there.",
         "Check the name and the path.",
@@ -66,12 +72,6 @@ KINDS = (
         r"\bone of\b|allowed (?:is|are)|unknown|knows? (?:no|only)|known (?:is|are)|choose from",
         "The value is not one of the allowed words.",
         "Use one of the words in the message.",
-    ),
-    kind(
-        r"is (?:only )?for|not for use|needs? (?:method|quality|a volume|a picture|an image)"
-        r"|only (?:with|for|where)|without|for use with|does not (?:take|apply)",
-        "The argument does not apply to this call.",
-        "Leave it out, or change the other argument in the message.",
     ),
     kind(
         r"at least|at most|between|from .* to|out of|beyond|outside|within|too (?:small|large|many|few)"
