@@ -287,7 +287,7 @@ def test_layouts_go_by_two_names(paper: str, layout: str) -> None:
 
 
 def test_options_are_checked_where_they_are_made() -> None:
-    with pytest.raises(InvalidInput, match="search: needs a texrs.elements.ElementSearch, got dict"):
+    with pytest.raises(InvalidInput, match="search: must be a texrs.elements.ElementSearch, got dict"):
         analyse(IMAGE, search={"rotations": 4})
     with pytest.raises(TypeError):
         ElementSearch(4)
@@ -352,10 +352,10 @@ def test_entries_that_cannot_be_read(tmp_path: Path, entry: ElementAnalysis) -> 
 
     for version in (1, 99):
         with pytest.raises(
-            FileError, match=f"version {version}, this texrs reads version 2; analyse the texture again"
+            FileError, match=f"version {version}, but this texrs reads version 2; analyse the texture again"
         ):
             elements.load(written(texrs_elements=np.array(version)))
-    with pytest.raises(FileError, match="damaged .*not the one that was analysed"):
+    with pytest.raises(FileError, match="damaged .*differs from the analysed image"):
         elements.load(written(image=255 - parts["image"]))
     with pytest.raises(FileError, match="damaged .*points"):
         elements.load(written(points=parts["points"][:, :1]))
@@ -365,7 +365,7 @@ def test_entries_that_cannot_be_read(tmp_path: Path, entry: ElementAnalysis) -> 
         with pytest.raises(FileError, match="damaged .*known elements"):
             elements.load(written(known=labels.astype(np.int32)))
     np.savez(path, other=np.zeros(3))
-    with pytest.raises(FileError, match="is no entry"):
+    with pytest.raises(FileError, match="not an analysis"):
         elements.load(path)
     for length in (0, 10, len(whole) // 2, len(whole) - 30):
         path.write_bytes(whole[:length])
