@@ -44,7 +44,7 @@ PICTURES = {
 @pytest.mark.parametrize("name", PICTURES)
 @pytest.mark.parametrize("smooth", [False, True])
 def test_regions_are_those_of_scikit_image(name, smooth):
-    from skimage.segmentation import felzenszwalb
+    from skimage.segmentation import felzenszwalb as reference_felzenszwalb
 
     image = PICTURES[name]()
     unit = image / np.float32(255) if image.dtype.kind == "u" else image.astype(np.float32)
@@ -53,7 +53,7 @@ def test_regions_are_those_of_scikit_image(name, smooth):
     if smooth:
         unit = mean_shift(unit, 6, 0.05)
     for scale, blur, least in [(60, 0.4, 24), (300, 0.8, 5), (1, 0.0, 0)]:
-        theirs = felzenszwalb(unit.astype(np.float64), scale, blur, least)
+        theirs = reference_felzenszwalb(unit.astype(np.float64), scale, blur, least)
         assert (felzenszwalb(unit, scale / 255, blur=blur, least=least) == theirs).all()
 
 
