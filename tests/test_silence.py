@@ -30,7 +30,7 @@ def takes_folder(command: str, parameter: Any) -> bool:
     if parameter.name in cli._outputs.OUTPUTS or command in OWN or (command == "batch" and parameter.name != "inputs"):
         return False
     words = f"{parameter.metavar} {parameter.help}"
-    return bool(re.search(r"FOLDER|[Ff]olders? of (the )?(maps|volumes)|folders, with", words))
+    return bool(re.search(r"FOLDER|[Ff]olders? of (the )?(maps|volumes)|folders,? with", words))
 
 
 FOLDERS = [(command, p.name) for command, p in PARAMETERS if takes_folder(command, p)]
@@ -142,7 +142,7 @@ def test_masks_that_mark_nothing_are_refused(here: Path, capsys: Capture, comman
     elif command == "scale-map":
         words = [word for word in words if word not in ("--slant", "20")]
     assert main(words) == 2, capsys.readouterr().err
-    assert empty in capsys.readouterr().err
+    assert f"{empty}: marks nothing" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("command", "name"), POINTS)

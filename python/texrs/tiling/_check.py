@@ -143,6 +143,8 @@ def measure_tiling(
 
     ``regular``: whether it can be on a lattice. ``enough``: figure of a border that need not be measured further.
     """
+    if source is not None and not isinstance(source, SourceMap):
+        raise InvalidInput(f"source_map: must be a source map, got {type(source).__name__}")
     if source is not None and source.shape != guide.shape[:2]:
         raise InvalidInput(f"source_map: must have the size of the image, {guide.shape[:2]}, got {source.shape}")
     borders = [measure_border(guide, axis, enough=enough) if cyclic else None for axis, cyclic in enumerate(wrap)]
