@@ -268,7 +268,7 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
         (np.zeros((4, 4)), 3, "field: needs a field of 3 axes, got ndarray"),
         (np.zeros((4, 4, 4, 4)), 3, r"field: needs directions \(R, C, 2\) or \(P, R, C, 3\), or frames"),
         (np.ones((4, 4, 2)), 3, r"field: holds \(4, 4, 2\), a field of 2 axes; 3 are needed"),
-        (np.zeros((4, 4, 4, 3)), 3, "directions: all have no length"),
+        (np.zeros((4, 4, 4, 3)), 3, "directions: all have length 0"),
         (7, 3, "field: needs a field of 3 axes, got int"),
         ("nowhere.npy", 3, "there is no such file"),
         ("flow.npy:around=z", 3, "knows along=, order=, up=, signed= after a file"),

@@ -9,12 +9,13 @@ from __future__ import annotations
 import hashlib
 import math
 from base64 import b64encode
+from pathlib import Path
 
 import numpy as np
 
 from texrs._show import as_png, preview
 from texrs._typing import Array
-from texrs.io._image_io import encode
+from texrs.io._pillow import encode
 
 MOST = 2**20
 """Approximate maximum number of characters of the page."""
@@ -129,7 +130,8 @@ def _pack(seen: Array) -> tuple[bytes, int]:
     grid = np.zeros((tall * wide, rows, columns, channels), np.uint8)
     grid[:planes] = seen
     sheet = grid.reshape(tall, wide, rows, columns, channels).transpose(0, 2, 1, 3, 4)
-    return encode("volume", np.ascontiguousarray(sheet.reshape(tall * rows, wide * columns, channels)), "webp"), wide
+    image = np.ascontiguousarray(sheet.reshape(tall * rows, wide * columns, channels))
+    return encode(Path("volume.webp"), image, ".webp"), wide
 
 
 def _show_still(seen: Array) -> Array:

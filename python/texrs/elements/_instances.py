@@ -53,8 +53,8 @@ class Instance:
     angle : float
         Rotation relative to the chosen element, in degrees, if several directions were searched. Otherwise 0.
     scale : float
-        Size relative to the chosen element, if several sizes were searched; 1 is its size. Otherwise the square root of
-        its area relative to the median area.
+        Size relative to the chosen element, above 0, if several sizes were searched; 1 is its size. Otherwise the
+        square root of its area relative to the median area.
     confidence : float
         Probability of being an element, 0 to 1, calibrated on annotated textures. It is derived from the similarity to
         the chosen element, or from how well the joints around it close. For foreground without a detection, it is
