@@ -80,7 +80,7 @@ def felzenszwalb(
     >>> image = np.full((16, 16), 50.0)
     >>> image[:, 8:] = 200
     >>> noisy = image + np.random.default_rng(0).normal(0, 5, image.shape)
-    >>> merge(noisy, 300)[3]
+    >>> felzenszwalb(noisy, 300)[3]
     array([0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1], dtype=int32)
 
     """
