@@ -13,7 +13,7 @@ from texrs import samples
 from texrs._arrays import as_image, guidance
 from texrs.errors import Cancelled, InvalidInput
 from texrs.kernels import seam
-from texrs.tiling import _closed
+from texrs.tiling import REFUSED, _closed
 from texrs.tiling._joints import Choice, find_joint, make_levels
 from texrs.tiling._maps import lay_out
 from texrs.tiling._whole_elements import find_things
@@ -101,7 +101,8 @@ def test_few_cuts_are_made_at_the_full_size(monkeypatch):
         lambda strips, **more: full.extend(s for s in strips if np.shape(s.a)[1] >= 512) or real(strips, **more),
     )
     texrs.tile(np.tile(picture("grit"), (2, 2, 1)))
-    assert 1 <= len(full) <= 4
+    # Each attempt cuts at most twice along each axis.
+    assert 1 <= len(full) <= 4 * (1 + len(REFUSED))
 
 
 @pytest.mark.parametrize("name", ["beans", "pebbles"])
