@@ -151,7 +151,7 @@ def test_elements_stay_whole(kind):
 def test_elements_keep_their_share_and_number(kind):
     """Cuts around elements are shorter than cuts between them, and would leave fewer than there are."""
     exemplar = texrs.Exemplar(PARTICLES.image, axes=3)
-    depth = exemplar.separate_elements.depth
+    depth = exemplar.instances.depth
     shares, numbers = [], []
     for seed in (1, 2, 3):
         source = make_volume(kind, seed).source_map
