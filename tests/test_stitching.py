@@ -213,7 +213,7 @@ def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
     """Things in a heap, which no background parts, are not found for sure."""
     picture = texrs.samples.beans((160, 160)).image
     exemplar = texrs.Exemplar(picture, repeat=False)
-    assert exemplar.separate_elements is None
+    assert exemplar.instances is None
     assert exemplar.stitcher.guessed
     assert not exemplar.stitcher.separate
     torn = [evaluate(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source_map).torn for seed in range(3)]
