@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import scale_checks as checks
-from texrs import scale_maps
-from texrs.errors import InvalidInput
+from texrs import limits, scale_maps
+from texrs.errors import InvalidInput, LimitExceeded
 
 FLOOR = scale_maps.from_angles((60, 80), 50, 70)
 
@@ -260,6 +260,14 @@ def test_128_is_the_normal_size_and_the_ends_hold() -> None:
 def test_decode_refuses(image: np.ndarray, encoding: str, message: str) -> None:
     with pytest.raises(InvalidInput, match=message):
         scale_maps.decode(image, encoding)
+
+
+def test_decode_checks_memory_before_it_begins() -> None:
+    image = np.zeros((1024, 1024), np.uint8)
+    with limits.context(memory=4 << 20), pytest.raises(LimitExceeded, match="image: needs 8.4 MB of memory"):
+        scale_maps.decode(image)
+    with limits.context(memory=16 << 20):
+        assert scale_maps.decode(image).shape == (1024, 1024)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (7, 300), (64, 64), (700, 40)])

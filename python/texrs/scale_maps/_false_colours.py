@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_choice, as_float, as_image
+from texrs._checks import check_memory
 from texrs._digits import write_number
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
@@ -81,6 +82,8 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
     ------
     InvalidInput
         Colours, another dtype, or an unknown encoding.
+    LimitExceeded
+        If decoding needs more memory than is available, or than `texrs.limits` allows.
 
     Examples
     --------
@@ -91,6 +94,7 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
 
     """
     given = as_image(image)
+    check_memory(8 * given.size, "image")
     if given.dtype not in (np.uint8, np.uint16):
         raise InvalidInput(f"image: needs grey levels in uint8 or uint16, got {given.dtype}; floats are scales already")
     grey = given[..., : 3 if given.shape[2] >= 3 else 1]
