@@ -12,10 +12,10 @@
 //! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
 //! | [`hash`] | counter-based noise: a random value depends on its position, not on a stream |
 //! | [`fixed`] | coordinates and frames in fixed point |
-//! | `functions` | exponentials, sines and roots with the same value on every machine |
+//! | `libm` | exponentials, sines and roots with the same value on every machine |
 //! | `fft` | Fourier transforms of lines, images and volumes |
 //! | [`pca`] | principal components |
-//! | `wide` | SIMD code, chosen at run time |
+//! | `simd` | SIMD code, chosen at run time |
 //!
 //! | kernels | |
 //! |---|---|
