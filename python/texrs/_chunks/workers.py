@@ -304,11 +304,16 @@ def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
         raise InvalidInput(
             f"scheduler: needs None, a number of processes, an address or a distributed.Client, got {scheduler!r}"
         )
+    # A client that fails in its constructor is closed here. Otherwise the garbage collector closes it, and blocks
+    # forever if it runs while the next client holds the lock of the event loop.
+    client = Client.__new__(Client)
     try:
-        return Client(scheduler, timeout="10s", set_as_default=False), True
+        client.__init__(scheduler, timeout="10s", set_as_default=False)  # type: ignore[misc]
     except (OSError, ValueError, TimeoutError, AssertionError) as error:
-        # Seen where other clients before this one found nobody: then distributed asserts, and says nothing.
+        # After several failures, distributed raises an AssertionError without a message.
+        client.__del__()
         raise InvalidInput(f"scheduler: none answers at {scheduler!r} ({str(error) or type(error).__name__})") from None
+    return client, True
 
 
 def _run_cluster(
