@@ -314,9 +314,9 @@ def test_bad_sizes_are_refused(name: str, size: object) -> None:
 def test_bad_names_seeds_and_solids_are_refused() -> None:
     with pytest.raises(ValueError, match=r"pebbles.*coins.*'marble'"):
         samples.load("marble")
-    with pytest.raises(ValueError, match="name must be one of brick"):
+    with pytest.raises(ValueError, match="name: must be one of brick"):
         samples.photograph("pebbles")
-    with pytest.raises(ValueError, match="takes no options"):
+    with pytest.raises(ValueError, match="a photograph takes none"):
         samples.load("coins", seed=1)
     with pytest.raises(ValueError, match="seed: needs an integer"):
         samples.dots((64, 64), seed=-1)

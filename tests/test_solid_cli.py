@@ -157,7 +157,7 @@ WRONG = [
     ("solid w.npy -o out.tif", "w.npy: there is no such file"),
     ("solid in.png -o out.tif", "in.png: is an image of 64 x 64, but a volume is needed"),
     ("solid sample:dots -o out.tif", "sample:dots: is an image; volumes are particles"),
-    ("solid sample:dotz -o out.tif", "name must be a generated sample"),
+    ("solid sample:dotz -o out.tif", "name: must be a generated sample"),
     ("solid v.npy", "Missing option"),
     ("synthesize v.npy -o out.png", "v.npy"),
     ("synthesize in.png -o out.png --size 9x9x9", "--size: needs WIDTHxHEIGHT"),

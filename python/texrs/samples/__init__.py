@@ -1,10 +1,9 @@
-"""Pictures and volumes whose contents are known exactly.
+"""Generated images and volumes whose elements, masks, scale and deformation are known exactly.
 
-Each generator draws a texture as a small photograph would show it (a relief under a sun and a sky,
-with colours that vary within and between its elements, and the grain of a sensor) and returns it
-with what it drew: where every element is, which pixels are its own, how large the texture is
-on screen and how its frame is turned. They are what texrs is tested on and shown with, and they are
-CC0: use them as you like.
+Each generator draws a texture as a small photograph would show it: a relief under a sun and a sky, with sensor noise
+and with colours that vary within and between elements. It returns the image with the positions and pixels of all
+elements, the scale map and the Jacobians. The tests and pages of texrs use these samples. They are CC0, so use them as
+you like.
 
 ====================  =======================================  =========  ==============================
 name                  what it shows                            layout     known
@@ -18,8 +17,8 @@ name                  what it shows                            layout     known
 `net`                 a rope net over dark water               connected  elements: the cells; the net
 `pebbles`             rounded stones on sand                   disjoint   elements
 `scales`              overlapping scales of a fish                        elements
-`tilted_bricks`       a wall seen aslant                       jointed    elements, scale, jacobians
-`tilted_discs`        round tiles of a floor seen aslant       disjoint   elements, scale, jacobians
+`tilted_bricks`       a wall in oblique view                   jointed    elements, scale, jacobians
+`tilted_discs`        a floor of round tiles in oblique view   disjoint   elements, scale, jacobians
 `weave`               a plain weave                                       elements
 `particles`           a volume: ellipsoids of three colours    disjoint   elements
 `stripes`             a volume: folded layers, 9 voxels apart             mask, jacobians
@@ -27,8 +26,8 @@ name                  what it shows                            layout     known
 `wood_solid`          a volume: growth rings and fibres                   mask
 ====================  =======================================  =========  ==============================
 
-The same size and seed give the same bytes. `load` calls a generator by name, and knows the
-photographs that come with scikit-image besides.
+The same size and seed give the same bytes. `load` calls a generator by name, and also loads the photographs that come
+with scikit-image.
 
 Examples
 --------
@@ -108,7 +107,7 @@ def names() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        The pictures before the volumes.
+        Names of images first, then names of volumes.
 
     Examples
     --------
@@ -126,7 +125,7 @@ def photographs() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        None of them is the name of a generated sample.
+        Names that `load` accepts. Generated samples have other names.
 
     Examples
     --------
@@ -139,28 +138,26 @@ def photographs() -> tuple[str, ...]:
 
 
 def load(name: str, **options: Any) -> Sample:
-    """Return the sample of that name.
+    """Return the generated sample or the photograph of a given name.
 
     Parameters
     ----------
     name : str
         One of `names` or `photographs`.
     **options
-        What the generator takes: `size`, `seed`, and `wrap` where it has it. A photograph takes
-        none.
+        Arguments of the generator: `size`, `seed`, and `wrap` if the generator has it. A photograph does not take any.
 
     Returns
     -------
     Sample
-        Of a photograph, the image alone.
+        For a photograph, only the image is known.
 
     Raises
     ------
     InvalidInput
-        If nothing has that name, if a photograph is given options, or if the generator
-        refuses them.
+        The name is unknown, a photograph is given options, or the generator rejects a value.
     TypeError
-        If the generator has no such option.
+        The generator does not have such an option.
 
     Examples
     --------
@@ -172,9 +169,9 @@ def load(name: str, **options: Any) -> Sample:
         return _GENERATORS[name](**options)
     if isinstance(name, str) and name in PHOTOGRAPHS:
         if options:
-            raise InvalidInput(f"a photograph takes no options, {name!r} got {', '.join(options)}")
+            raise InvalidInput(f"options: a photograph takes none, got {', '.join(options)}")
         return photograph(name)
     raise InvalidInput(
-        f"name must be a generated sample ({', '.join(names())}) "
+        f"name: must be a generated sample ({', '.join(names())}) "
         f"or a photograph ({', '.join(PHOTOGRAPHS)}), got {name!r}"
     )

@@ -1,14 +1,12 @@
-"""Planes seen aslant: a known scale and a known Jacobian at every pixel.
+"""Oblique views of planes, with the known scale and Jacobian at every pixel.
 
-The eye looks at a plane through a pinhole of focal length f, along the picture's axis. With p the
-pixel's offset from the middle of the picture and ``a`` the slope of the plane's depth (so that
-|a| = tan(tilt)), the ray through p meets the plane at X = p / w, w = 1 - a.p / f. Lengths on the
-plane along a are 1 / cos(tilt) times those of X:
+A pinhole camera of focal length f looks at a plane. Let p be the offset of a pixel from the middle of the image, and
+``a`` the slope of the plane's depth, with ``|a| = tan(tilt)``. The ray through p meets the plane at X = p / w, where
+w = 1 - a.p / f. Lengths on the plane along a are 1 / cos(tilt) times those of X:
 
     S = g M X,   J = dS/dp = g M (I / w + p a' / (f w^2)),   det J = g^2 / (cos(tilt) w^3),
 
-and the scale is det(J)^(-1/2) = sqrt(cos(tilt)) w^(3/2) / g. The factor g makes its geometric mean
-over the picture 1.
+The scale is det(J)^(-1/2) = sqrt(cos(tilt)) w^(3/2) / g. The factor g makes its geometric mean over the image 1.
 """
 
 from __future__ import annotations
@@ -30,28 +28,28 @@ _PITCH, _RADIUS = 26.0, 10.5
 
 
 def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
-    """Return a floor of round glazed tiles that runs away upwards.
+    """Generate a floor of round glazed tiles that recedes towards the top.
 
-    On the plane the tiles are discs of radius 10.5 pixels on a hexagonal lattice of pitch 26. The
+    On the plane, the tiles are discs of radius 10.5 pixels on a hexagonal lattice with a distance of 26 pixels. The
     layout is "disjoint".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the tiles, not the plane.
+        Seed of the tiles. The plane is always the same. Default: 0.
 
     Returns
     -------
     Sample
-        With `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is where the middle of
-        the disc on the plane is seen, which is near, not at, the centroid of the disc's picture.
+        It has `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is the image of the disc's centre on
+        the plane, which is near the centroid of the visible disc, but not equal to it.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -71,27 +69,27 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
 
 
 def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
-    """Return a wall of bricks that runs away obliquely.
+    """Generate a wall of bricks that recedes obliquely.
 
-    On the plane it is the wall of `bricks`, at four fifths of its size. The layout is "jointed".
+    On the plane, it is the wall of `bricks` at 0.8 times its size. The layout is "jointed".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the bricks, not the plane.
+        Seed of the bricks. The plane is always the same. Default: 0.
 
     Returns
     -------
     Sample
-        With `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is where the centroid
-        of the brick on the plane is seen.
+        It has `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is the image of the brick's centroid
+        on the plane.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -112,22 +110,22 @@ def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
 
 @dataclass(frozen=True, slots=True)
 class _Plane:
-    """The map S from the picture to the plane.
+    """The map S from the image to the plane.
 
     Attributes
     ----------
     size : (int, int)
-        Rows and columns of the picture.
+        Rows and columns of the image.
     slope : float64 array, (2,)
-        a / f, of the depth.
+        a / f: the slope of the plane's depth, divided by the focal length.
     stretch : float64 array, (2, 2)
-        g M, without `zoom`.
+        The matrix g M of the equations above, without `zoom`.
     zoom : float
-        Units of the plane's own texture for one unit of S.
+        Units of the plane's texture in one unit of S.
     corner : float64 array, (2,)
-        What is added to put the picture's corner of the plane at (0, 0).
+        Offset that moves the visible part of the plane's texture to (0, 0).
     extent : float64 array, (2,)
-        Size of the part of the plane that is seen, in units of its texture.
+        Size of the visible part of the plane, in units of its texture.
     """
 
     size: tuple[int, int]
@@ -139,13 +137,13 @@ class _Plane:
 
     @classmethod
     def tilt(cls, size: tuple[int, ...], *, tilt: float, towards: float, zoom: float = 1.0) -> _Plane:
-        """Return the plane whose depth grows `towards` an angle from +row to +col, by `tilt`."""
+        """Return a plane tilted by `tilt` degrees, whose depth grows `towards` an angle in radians from +row to +col."""
         along = np.array([cos(towards), sin(towards)])
         lean = radians(tilt)
         slope = along * tan(lean) / (1.5 * max(size))
         stretch = np.eye(2) + (1 / cos(lean) - 1) * np.outer(along, along)
         plane = cls((size[0], size[1]), slope, stretch, zoom, np.zeros(2), np.zeros(2))
-        # The last bits of a mean hang on how the processor sums it.
+        # Round the mean, because its last bits depend on the order in which a processor sums.
         mean = float(np.float32(np.exp(np.log(plane.scale()).mean())))
         plane = replace(plane, stretch=stretch * mean)
         ends = [(r, c) for r in (-1, size[0]) for c in (-1, size[1])]
@@ -154,23 +152,23 @@ class _Plane:
         return replace(plane, corner=-low, extent=high - low)
 
     def pixels(self, pitch: float = 1.0) -> NDArray[np.float64]:
-        """Return the coordinates of the picture's samples every `pitch` pixels, (H, W, 2)."""
+        """Return the coordinates of samples of the image, every `pitch` pixels, (H, W, 2)."""
         axes = [np.arange(0, n - 1 + pitch / 2, pitch) for n in self.size]
         return np.stack(np.meshgrid(*axes, indexing="ij"), -1)
 
     def _offset(self, at: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return p and w."""
+        """Return p and w of the equations above, for pixels `at`."""
         p = at - (np.array(self.size) - 1) / 2
-        # Depth grows along a, and what is far is small: the ray meets the plane at p / w.
+        # The depth grows along a, so w falls there, and the ray meets the plane farther out: at p / w.
         return p, 1 - transform(p, self.slope[:, None])[..., 0]
 
     def source(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where on the plane's texture the pixels `at` (..., 2) look."""
+        """Return the coordinates on the plane's texture that the pixels `at` (..., 2) show."""
         p, w = self._offset(at)
         return transform(p / w[..., None], self.zoom * self.stretch.T) + self.corner
 
     def picture(self, on_plane: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the pixels that look at `on_plane` (..., 2), the inverse of `source`."""
+        """Return the pixels that show the coordinates `on_plane` (..., 2). This is the inverse of `source`."""
         (a, b), (c, d) = self.zoom * self.stretch
         inverse = np.array([[d, -c], [-b, a]]) / (a * d - b * c)
         x = transform(on_plane - self.corner, inverse)
@@ -218,11 +216,11 @@ def _lay_tiles(scene: Scene, rows_of: int, cols_of: int) -> None:
 
 
 def _view(scene: Scene, plane: _Plane, name: str, *, layout: LayoutName) -> Sample:
-    """Return the photograph of the lit `scene` through the map `plane`."""
+    """Render the lit `scene` as seen through the map `plane`."""
     from scipy import ndimage
 
     lit = scene.picture(grain=0.0, reach=6.0, exposure=0.95)
-    # Three by three rays a pixel, averaged: the far texture is finer than the near one.
+    # Average 3 x 3 rays per pixel: far away, a pixel covers much more of the texture than nearby.
     rays = (np.arange(3) - 1) / 3
     at = plane.pixels()
     seen = np.zeros((*plane.size, 3), np.float32)
@@ -237,6 +235,7 @@ def _view(scene: Scene, plane: _Plane, name: str, *, layout: LayoutName) -> Samp
     seen /= 9
     grain = scene.rng.standard_normal(seen.shape, dtype=np.float32)
     seen += np.float32(0.009) * grain
+    # Labels cannot be averaged, so take the nearest sample of the scene.
     nearest = np.rint(2 * plane.source(at)).astype(np.intp)
     raw = scene.label[nearest[..., 0] % scene.shape[0], nearest[..., 1] % scene.shape[1]]
     centres, labels = relabel(raw, plane.picture(_unwrap(scene, plane)))
@@ -254,7 +253,7 @@ def _view(scene: Scene, plane: _Plane, name: str, *, layout: LayoutName) -> Samp
 
 
 def _unwrap(scene: Scene, plane: _Plane) -> NDArray[np.float64]:
-    """Return the centroids on the plane, each at that turn of the torus nearest the picture."""
+    """Return the centroids on the plane, each in the copy of the torus nearest to the middle of the image."""
     box = np.array(scene.period, np.float64)
     middle: Floats | NDArray[np.float64] = plane.extent / 2
     return np.asarray((scene.centroids() - middle + box / 2) % box - box / 2 + middle)

@@ -1,9 +1,8 @@
-"""The photographs that come with scikit-image, by their names there.
+"""The photographs that come with scikit-image, under their names there.
 
-All of them lie in the scikit-image package itself, so that nothing is downloaded. Their sources, as
-scikit-image states them: brick and gravel from CC0Textures and grass from DeviantArt (CC0), coffee
-by Rachel Michetti (CC0), rocket by SpaceX and hubble_deep_field by NASA (public domain), coins from
-the Brooklyn Museum (no known copyright restrictions).
+All of them are part of the scikit-image package, so nothing is downloaded. Scikit-image names these sources: brick and
+gravel from CC0Textures and grass from DeviantArt (CC0); coffee by Rachel Michetti (CC0); rocket by SpaceX and
+hubble_deep_field by NASA (public domain); coins from the Brooklyn Museum (no known copyright restrictions).
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ PHOTOGRAPHS = ("brick", "coffee", "coins", "grass", "gravel", "hubble_deep_field
 
 
 def photograph(name: str) -> Sample:
-    """Return one of the photographs; nothing is known of it but the picture.
+    """Return a photograph of scikit-image. Its result has only an image.
 
     Parameters
     ----------
@@ -28,12 +27,12 @@ def photograph(name: str) -> Sample:
     Returns
     -------
     Sample
-        Its image is uint8, (H, W, 3) or, where the photograph is grey, (H, W).
+        The image is uint8: (H, W, 3), or (H, W) if the photograph is grey.
 
     Raises
     ------
     InvalidInput
-        If there is no photograph of that name.
+        There is no photograph of that name.
 
     Examples
     --------
@@ -42,7 +41,7 @@ def photograph(name: str) -> Sample:
     (512, 512)
     """
     if not isinstance(name, str) or name not in PHOTOGRAPHS:
-        raise InvalidInput(f"name must be one of {', '.join(PHOTOGRAPHS)}, got {name!r}")
+        raise InvalidInput(f"name: must be one of {', '.join(PHOTOGRAPHS)}, got {name!r}")
     from skimage import data
 
     image: NDArray[np.uint8] = np.ascontiguousarray(getattr(data, name)())

@@ -1,4 +1,4 @@
-"""Things in rows and lattices: bricks, scales, a net, a weave."""
+"""Elements in rows and lattices: bricks, scales, a net, a weave."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ _COURSE, _BRICK, _JOINT = 34, 80, 5.0
 
 
 def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return a wall of bricks in running bond; the mortar is its rigid, connected background.
+    """Generate a wall of bricks in running bond, whose mortar is a rigid, connected background.
 
-    At the default size, for every seed, exactly 21 vertical joints are wholly inside the picture:
-    three in each of the seven courses that the border does not cut. The layout is "jointed".
+    Exactly 21 vertical joints are wholly inside the image for every seed. There are three in each
+    of the seven courses that the border does not cut. The layout is "jointed".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32. A course is 34 pixels high, a brick 80 long; with `wrap` they
-        are fitted to the picture, to an even number of courses.
+        Rows and columns, at least 32. A course is 34 pixels high and a brick 80 pixels long. With `wrap`, both are
+        adjusted to the size, and the number of courses is even. Default: (256, 256).
     seed : int
-        Chooses the picture, not the plan of the wall.
+        Seed of the texture. The positions of the bricks are always the same. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`; every brick is an element.
+        It has `centres`, `labels` and `mask`. Every brick is an element.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     else:
         courses = 2 * (rows // (2 * _COURSE) + 2)
         across = cols // _BRICK + 3
-        # The first whole course starts 9 pixels below the border, the first joints at 28 and 68.
+        # The first whole course starts 9 pixels below the border. The first joints are at columns 28 and 68.
         scene = Scene(
             (rows, cols), rng, period=(courses * _COURSE, across * _BRICK), origin=(2 * _COURSE - 9, 2 * _BRICK - 28)
         )
@@ -66,7 +66,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
 
 
 def lay_bricks(scene: Scene, courses: int, across: int) -> None:
-    """Fill the whole torus of `scene` with that many courses of that many bricks."""
+    """Fill the whole torus of `scene` with `courses` courses of `across` bricks each."""
     rng = scene.rng
     tall, long = scene.period[0] / courses, scene.period[1] / across
     sand, lumps = scene.noise(3, 1, gain=1.0), scene.noise(14, 3)
@@ -83,6 +83,7 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
     tones = palette(
         "7a4233", "8a5340", "6a382d", "965f45", "5a3a33", "a06c50", "744a3d", "94806b", "6f635b",
     )  # fmt: skip
+    # Half the height and width of a brick without its joints.
     half = (tall / 2 - _JOINT / 2, long / 2 - _JOINT / 2)
     for course in range(courses):
         for k in range(across):
@@ -92,13 +93,14 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
             dy = np.abs(window.y + bend[0][rows, cols] + rng.uniform(-0.3, 0.3))
             dx = np.abs(window.x + bend[1][rows, cols] + rng.uniform(-0.5, 0.5))
             ey, ex = (np.float32(half[0]) - dy), (np.float32(half[1]) - dx)
-            # A box with corners of 2.5 pixels.
+            # Distance to the outline of a box whose corners have a radius of 2.5 pixels.
             out = single(np.hypot, np.maximum(2.5 - ey, 0), np.maximum(2.5 - ex, 0))
             edge = np.where((ey < 2.5) | (ex < 2.5), 2.5 - out, np.minimum(ey, ex))
             edge = edge.astype(np.float32)
             lean = rng.uniform(-0.008, 0.008, 2)
             height = 2.3 * ramp(edge, -1.2, 2.6) + lean[0] * window.y + lean[1] * window.x
             height = height + rng.uniform(-0.2, 0.3) + np.float32(0.16) * fine[rows, cols]
+            # Dig pits into the brick. They are darkened below.
             hole = ramp(pits[rows, cols], 1.3, 2.4)
             height = height - 0.9 * hole
             tone = tones[rng.integers(len(tones))] * rng.uniform(0.75, 1.2)
@@ -111,29 +113,29 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
 
 
 def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return the overlapping scales of a fish, their tips down.
+    """Generate the overlapping scales of a fish, with their tips down.
 
     There is no background: every pixel belongs to a scale.
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32. Scales are 32 pixels wide in rows 16 apart, fitted to the
-        picture with `wrap`.
+        Rows and columns, at least 32. Scales are 32 pixels wide, in rows 16 pixels apart. With `wrap`, both are
+        adjusted to the size. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`; a label is the visible part of a scale.
+        It has `centres`, `labels` and `mask`. A label is the visible part of a scale.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -146,6 +148,7 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     rows_of = 2 * max(round(scene.period[0] / 32), 1)
     across = max(round(scene.period[1] / 32), 1)
     tall, wide = scene.period[0] / rows_of, scene.period[1] / across
+    # Lower the scene, because each scale must be higher than it.
     scene.height -= 100
     cloud, grain, drift = scene.noise(24, 3), scene.noise(4, 1, gain=0.8), scene.noise(90, 30)
     tones = palette("6f7f7c", "7d8a80", "5f7376", "8a8c78", "68777f")
@@ -159,6 +162,7 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
             x = window.x / np.float32(0.56 * wide)
             r = np.sqrt(x**2 + np.where(y > 0, y, 0.62 * y) ** 2)
             angle = single(np.arctan2, x, y + 1.3)
+            # Growth rings run along the rim, and ridges run from the root to the rim.
             rings = single(np.sin, r * 21 + 0.8 * cloud[rows, cols])
             ridges = single(np.sin, angle * 26)
             rim = ramp(r, 0.86, 1.0)
@@ -170,36 +174,37 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
             albedo = tone * shade[..., None]
             albedo = mix(albedo, palette("2c3a3d")[0], 0.75 * (1 - ramp(y, -0.25, 0.45)))
             albedo = mix(albedo, palette("b9b192")[0], 0.55 * ramp(r, 0.6, 0.85) * (1 - rim))
+            # Scales overlap: at each sample, the highest one is visible.
             label = scene.add((middle[0], middle[1]))
             scene.paint(window, r < 1.12, height.astype(np.float32), albedo, label=label, gloss=0.3)
     return scene.finish("scales", layout=None, elevation=48.0, azimuth=115.0, exposure=0.82)
 
 
 def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return a knotted rope net, connected, over dark water.
+    """Generate a connected, knotted rope net over dark water.
 
-    The net is the foreground (`mask`); the elements are the cells that are seen through it, so that
-    here ``mask`` is ``labels == 0``. The layout is "connected".
+    The net is the foreground (`mask`). The elements are the cells between the ropes, so ``mask`` is ``labels == 0``
+    here. The layout is "connected".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32. Cells are diamonds 40 pixels wide and high, fitted to the
-        picture with `wrap`.
+        Rows and columns, at least 32. Cells are diamonds 40 pixels wide and high. With `wrap`, they are adjusted to
+        the size. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres` and `labels` of the cells, and `mask` of the net.
+        It has `centres` and `labels` of the cells, and `mask` of the net.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -229,10 +234,12 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
             knot = knots[row, k]
             cells.append((knot[0] + tall, knot[1]))
             for side in (0, 1):
-                # The neighbours of an odd row's knot k are k and k + 1; of an even row's, k - 1, k.
+                # In the next row, the ropes of knot k lead to knots k and k + 1 if its row is odd, else to k - 1 and
+                # k.
                 other = knots[(row + 1) % rows_of, (k + side - 1 + row % 2) % across]
                 regular = np.array([tall, (side - 0.5) * wide])
                 turn = np.array(scene.period)
+                # Take the copy of the knot on the torus that is nearest to its regular position.
                 span = (other - knot - regular + turn / 2) % turn - turn / 2 + regular
                 _lay_strand(scene, knot, span, rope * rng.uniform(0.85, 1.12), fray, wear)
             window = scene.window((knot[0], knot[1]), 7)
@@ -242,6 +249,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
             height = 2.5 + 5.6 * np.sqrt(np.clip(1 - rho**2, 0, 1)) + 0.8 * turns
             albedo = rope * (1 + 0.12 * turns + 0.12 * wear[rows, cols])[..., None]
             scene.paint(window, rho < 1, height.astype(np.float32), albedo, label=-1)
+    # The cells are the holes that the finished net leaves.
     _label_cells(scene, cells)
     return scene.finish(
         "net", layout="connected", mask=lambda labels: labels == 0, reach=16.0, ambient=0.5, exposure=1.0
@@ -249,29 +257,30 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
 
 
 def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return a plain weave of two yarns, close to.
+    """Generate a close view of a plain weave of two yarns.
 
-    An element is the visible float of a yarn over the one below: weft where row and column of the
-    crossing add up to an even number, warp elsewhere. Background is what shows between yarns.
+    An element is a float: the visible part of a yarn that passes over the other yarn. It is the weft at crossings
+    whose row and column numbers add up to an even number, else the warp. The gaps between yarns are background.
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32. Yarns are 16 pixels apart, fitted to the picture with `wrap`.
+        Rows and columns, at least 32. Yarns are 16 pixels apart. With `wrap`, they are adjusted to the size. Default:
+        (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`.
+        It has `centres`, `labels` and `mask`.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -294,7 +303,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
         yarn = at[axis].astype(int) % counts[axis]
         thick = rng.uniform(0.92, 1.06, counts[axis])[yarn]
         off = (across - at[axis] - 0.5) / (0.46 * thick)
-        # The weft (axis 0) is up where the numbers of row and column add up to even.
+        # The weft (axis 0) is on top at crossings whose row and column numbers add up to an even number.
         up = single(np.cos, pi * (along - 0.5 + at[axis] + axis))
         long = np.float32(pitch[axis])
         twist = single(np.sin, 2 * pi * (along * 1.9 + off * 0.55 + rng.uniform(0, 1, counts[axis])[yarn]))
@@ -305,11 +314,13 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
         tone = tones[rng.integers(len(tones), size=counts[axis])] * rng.uniform(0.88, 1.12, (counts[axis], 1))
         shade = 1 + 0.10 * twist + 0.10 * fibre + 0.06 * scene.noise(40, 4)
         shade = shade * (0.75 + 0.25 * ramp(np.asarray(up, np.float32), -0.6, 0.6))
+        # This yarn is on top at every second crossing. Find the nearest of these.
         crossing = np.floor((along - (at[axis] + axis) % 2) / 2 + 0.5) * 2 + (at[axis] + axis) % 2
-        # A float reaches half a crossing beyond its own on either side.
+        # A float covers its own crossing and half of the crossing before and after it.
         crossing = np.where(np.abs(along - 0.5 - crossing) <= 1, crossing, crossing - 2)
         crossing = crossing.astype(int) % counts[1 - axis]
         label = yarn * counts[1] + crossing if axis == 0 else crossing * counts[1] + yarn
+        # Paint the yarn where it is higher than the other yarn.
         shown = (np.abs(off) < 1) & (height > scene.height)
         scene.height[shown] = height[shown]
         scene.albedo[shown] = (tone[yarn] * shade[..., None])[shown]
@@ -318,7 +329,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
 
 
 def _lay_strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Floats, wear: Floats) -> None:
-    """Lay a two-ply rope from `knot` along `span`, with the label of the net."""
+    """Lay a two-ply rope from `knot` along `span`, with the label -1 of the net."""
     length = float(np.hypot(*span))
     window = scene.window((knot[0] + span[0] / 2, knot[1] + span[1] / 2), length / 2 + 5)
     rows, cols = window.where
@@ -335,12 +346,12 @@ def _lay_strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Fl
 
 
 def _label_cells(scene: Scene, cells: Sequence[tuple[float, float]]) -> None:
-    """Label each hole in the net (label -1) with the number of the cell whose middle lies in it."""
+    """Label each hole in the net (label -1) with the number of the cell whose middle is in it."""
     from scipy import ndimage
 
     parts = np.zeros(scene.shape, np.int32)
     count = int(ndimage.label(scene.label == 0, output=parts))
-    # Join the parts that meet across the border of the torus.
+    # Join the parts that touch across the border of the torus.
     into = np.arange(count + 1)
     for a, b in ((parts[0], parts[-1]), (parts[:, 0], parts[:, -1])):
         for i, j in zip(a.tolist(), b.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""The result of every generator, and the checks that all of them share."""
+"""The result of all generators, and their random generator."""
 
 from __future__ import annotations
 
@@ -13,45 +13,44 @@ from texrs._show import as_png
 from texrs._viewer import as_page
 
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed"]
-"""How elements hang together: apart on a ground, in one net, or parted by joints."""
+"""How the elements are arranged: separate on a background, connected as a net, or separated by joints."""
 
 MIN_SIDE = 32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """A picture or a volume whose contents are known exactly.
+    """An image or a volume whose contents are known exactly.
 
-    Coordinates are (row, col) or (plane, row, col) in pixels; pixel centres are at the integers,
-    so that a picture of H rows covers -0.5 <= row < H - 0.5. H, W and D stand for the picture's
-    rows and columns and the volume's planes; N is the number of elements whose centre is inside.
+    Coordinates are (row, col) or (plane, row, col) in pixels. Pixel centres are at integers, so an image of H rows
+    covers -0.5 <= row < H - 0.5. H and W are the numbers of rows and columns, D is the number of planes of a volume. N
+    is the number of elements whose centre is inside.
 
     Attributes
     ----------
     name : str
-        What `texrs.samples.load` calls it.
+        Name for `texrs.samples.load`.
     image : uint8 array, (H, W, 3) or (D, H, W, 3); a grey photograph is (H, W)
-        The picture, sRGB.
+        The image, in sRGB.
     centres : float64 array, (N, 2) or (N, 3), or None
-        Centroids of the elements, in pixels. An element's centroid is that of its whole visible area,
-        before the border of the picture cuts it. The tilted samples give the point where the
-        centroid on the plane is seen instead.
+        Centroids of the elements, in pixels. The centroid is that of the whole visible element, before the border of
+        the image cuts it. The tilted samples give the image of the centroid on the plane instead.
     labels : int32 array, (H, W) or (D, H, W), or None
-        0 is background; ``i + 1`` is the element of ``centres[i]``. An element that shows in the picture
-        with its centre outside has a label above N, so that ``labels > N`` is what only enters
-        from beyond the border. With `wrap` there are none: an element that crosses the border
-        comes back on the other side under the same label.
+        Label of each pixel: 0 for background, ``i + 1`` for the element of ``centres[i]``. A visible element whose
+        centre is outside the image has a label above N, so ``labels > N`` selects the elements that only enter across
+        the border. With `wrap` there are none: an element that crosses the border continues on the opposite side with
+        the same label.
     mask : bool array, (H, W) or (D, H, W), or None
-        The foreground. It is ``labels > 0``, except where the generator says otherwise.
+        The foreground. It is ``labels > 0``, unless the generator documents another rule.
     layout : {"disjoint", "connected", "jointed"} or None
-        Separate elements on a ground, a connected foreground such as a net, or elements parted by joints;
-        None where the texture is none of these.
+        Separate elements on a background, a connected foreground such as a net, or elements separated by joints. None
+        if the texture is none of these.
     scale_map : float32 array, (H, W), or None
-        Local size of the texture: lengths are this many times the normal ones, as the square root
-        of the ratio of areas. Its geometric mean is 1.
+        Local size of the texture, as a factor on normal lengths: the square root of the ratio of areas. Its geometric
+        mean is 1.
     jacobians : float32 array, (H, W, 2, 2) or (D, H, W, 3, 3), or None
-        The Jacobian J = dS/dp of the map from the picture to the undistorted texture;
-        ``jacobians[..., i, j]`` is dS_i / dp_j.
+        The Jacobian J = dS/dp of the map from the image to the undistorted texture; ``jacobians[..., i, j]`` is dS_i /
+        dp_j.
 
     Examples
     --------
@@ -72,13 +71,13 @@ class Sample:
     jacobians: NDArray[np.float32] | None = None
 
     def __repr__(self) -> str:
-        """Return the name, the shape and which of the known answers are there."""
+        """Return the name, the shape and the names of the known attributes."""
         shape = "x".join(map(str, self.image.shape))
         known = [f.name for f in fields(self)[2:] if getattr(self, f.name) is not None]
         return f"Sample({self.name!r}, {shape}, known: {', '.join(known) or 'nothing'})"
 
     def _repr_png_(self) -> bytes:
-        """Show the picture, or the middle plane of a volume, in a notebook."""
+        """Show the image, or the middle plane of a volume, in a notebook."""
         return as_png(self.image[len(self.image) // 2] if self.image.ndim == 4 else self.image)
 
     def _repr_html_(self) -> str | None:
@@ -87,5 +86,5 @@ class Sample:
 
 
 def make_generator(name: str, seed: object) -> np.random.Generator:
-    """Return the generator of sample `name`: a seed gives unrelated numbers to each sample."""
+    """Return the random generator of sample `name`. The same seed gives unrelated numbers to different samples."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([as_seed(seed), *name.encode()])))

@@ -1,4 +1,4 @@
-"""Things strewn over a ground: pebbles, dots, flowers, beans."""
+"""Elements scattered over a background: pebbles, dots, flowers, beans."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from texrs.samples._scene import Scene, Window
 
 
 def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return rounded stones of many colours, none of which touch, on dark sand.
+    """Generate separate rounded stones of many colours on dark sand.
 
-    The stones are the cells of a Voronoi diagram with rounded corners, shrunk until sand shows
-    between them. The layout is "disjoint".
+    The stones are the cells of a Voronoi diagram, with rounded corners, and shrunk until sand shows between them. No
+    two touch. The layout is "disjoint".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`.
+        It has `centres`, `labels` and `mask`.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -61,12 +61,14 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
     for i, point in enumerate(points):
         window = scene.window((point[0], point[1]), 25)
         rows, cols = window.where
+        # Only the 12 nearest sites can border the cell of this site.
         away = (points - point + np.array(scene.period) / 2) % scene.period
         away -= np.array(scene.period) / 2
         near = np.argsort((away**2).sum(1))[1:13]
         edge = _measure_cell(
             window.y + bend[0][rows, cols], window.x + bend[1][rows, cols], away[near], weight[i] - weight[near]
         )
+        # Shrink the cell, so that sand shows between the stones.
         inner = edge - np.float32(1.5)
         core = max(float(inner.max()), 2.0)
         t = np.clip(inner / np.float32(0.85 * core), 0, 1)
@@ -78,13 +80,14 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
         grain = 1 + np.float32(rng.uniform(0.05, 0.2)) * speckle[rows, cols]
         grain = grain * (1 + np.float32(0.16) * cloud[rows, cols])
         albedo = tone * np.clip(grain, 0.2, 2)[..., None]
+        # Three stones in ten have a light vein.
         if rng.random() < 0.3:
             angle = rng.uniform(0, pi)
             bands = cos(angle) * window.y + sin(angle) * window.x + 0.9 * vein[rows, cols]
             bands = np.abs(bands - rng.uniform(-4, 4))
             light_vein = 1 - ramp(bands, 0.3, rng.uniform(0.7, 2.0))
             albedo = mix(albedo, palette("b5ab9b")[0], 0.45 * light_vein)
-        # Dust gathers low on the sides.
+        # Dust gathers on the lower parts of the sides.
         albedo = mix(albedo, palette("4f463a")[0], 0.75 * (1 - ramp(t, 0.0, 0.45)))
         label = scene.add((point[0], point[1]))
         scene.paint(window, inner > 0, height, albedo, label=label, gloss=0.04, over=True)
@@ -92,28 +95,29 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
 
 
 def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return sewing buttons of distinct colours, none of which touch, on paper.
+    """Generate separate sewing buttons of distinct colours on paper.
 
-    A button is a disc of 9 to 13 pixels radius; its holes are part of it. The layout is "disjoint".
+    A button is a disc with a radius of 9 to 13 pixels. Its holes belong to it. No two buttons touch. The layout is
+    "disjoint".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`.
+        It has `centres`, `labels` and `mask`.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -123,6 +127,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     """
     rng = make_generator("dots", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=24)
+    # The paper has fibres along both axes.
     fibre = scene.noise(12, 1, stretch=(1, 5)) + scene.noise(12, 1, stretch=(5, 1))
     scene.height += np.float32(0.07) * fibre + np.float32(0.05) * scene.noise(4, 1, gain=0.9)
     scene.albedo[:] = (
@@ -144,6 +149,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
         tone = tones[rng.integers(len(tones))] * rng.uniform(0.85, 1.15)
         shade = 1 + np.float32(0.07) * cloud[rows, cols] + np.float32(0.04) * scratch[rows, cols]
         albedo = tone * (shade * (1 - 0.12 * (1 - rim)))[..., None]
+        # Press two or four holes into the button.
         turn, count = rng.uniform(0, pi), int(rng.choice([2, 4, 4]))
         for k in range(count):
             angle = turn + 2 * pi * k / count
@@ -157,28 +163,28 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
 
 
 def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return flowers of five to eight petals, none of which touch, over a leafy ground.
+    """Generate separate flowers of 5 to 8 petals above leaves.
 
-    The flowers are the elements, the leaves are ground. The layout is "disjoint".
+    The flowers are the elements and do not touch. The leaves are the background. The layout is "disjoint".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`.
+        It has `centres`, `labels` and `mask`.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -210,28 +216,28 @@ def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap:
 
 
 def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return beans of one colour that lie against and a little over each other.
+    """Generate beans of one colour that touch and slightly overlap.
 
-    A segmentation by colour merges them, since only their shading tells them apart. The layout is "disjoint".
+    A segmentation by colour merges them, because only their shading separates them. The layout is "disjoint".
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`; a label is the visible part of a bean.
+        It has `centres`, `labels` and `mask`. A label is the visible part of a bean.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -244,7 +250,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     scene.albedo[:] = palette("2a1c15")[0]
     scene.height += np.float32(0.3) * scene.noise(6) - 6
     skin, tone = scene.noise(20, 2, gain=0.6), palette("7a2f25")[0]
-    # Those laid first touch; the later ones lie deeper and show between them.
+    # The first beans touch. Later beans lie deeper and are visible between them.
     for taken, depth in ((0.10, 0.0), (0.28, 2.6), (0.5, 4.6)):
         darts = rng.random((int(0.02 * scene.period[0] * scene.period[1]), 2)) * scene.period
         for dart in darts:
@@ -253,6 +259,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
             window = scene.window((dart[0], dart[1]), 17)
             rows, cols = window.where
             below = scene.label[rows, cols]
+            # Try five directions, and take the one that covers the fewest beans.
             shapes = [
                 _measure_bean(window, float(angle), float(rng.uniform(12.5, 15))) for angle in rng.uniform(0, 2 * pi, 5)
             ]
@@ -266,6 +273,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
             height = height + lean[0] * window.y + lean[1] * window.x + rng.uniform(0, 1)
             shade = 1 + np.float32(0.13) * skin[rows, cols]
             albedo = tone * rng.uniform(0.9, 1.1) * shade[..., None]
+            # The scar is a light mark on one side.
             scar = single(np.exp, -((along / 2.6) ** 2) - ((across + 5.2) / 0.9) ** 2)
             albedo = mix(albedo, palette("d8c3a4")[0], 0.8 * scar)
             label = scene.add((dart[0], dart[1]))
@@ -283,7 +291,7 @@ def _lay_sand(scene: Scene) -> None:
 
 
 def _measure_cell(y: Floats, x: Floats, others: NDArray[np.float64], lead: NDArray[np.float64]) -> Floats:
-    """Return the smooth distance to the border of the power cell of the origin among `others`."""
+    """Return the smooth distance to the border of the origin's power cell among the sites `others`."""
     edges = []
     for other, more in zip(others, lead, strict=True):
         length = float(np.hypot(*other))
@@ -302,7 +310,7 @@ def _lay_leaf(
     mottle: Floats,
     crinkle: Floats,
 ) -> None:
-    """Lay one pointed leaf with a midrib and veins over what is there, unless that is higher."""
+    """Lay one pointed leaf with a midrib and veins, visible where it is higher than the scene."""
     rows, cols = window.where
     u = (cos(angle) * window.y + sin(angle) * window.x) / np.float32(length) + 0.5
     v = (cos(angle) * window.x - sin(angle) * window.y) / np.float32(length)
@@ -322,7 +330,7 @@ def _lay_leaf(
 
 
 def _lay_flower(scene: Scene, centre: tuple[float, float], radius: float, tone: Floats, crinkle: Floats) -> None:
-    """Lay one flower of five to eight petals over everything, as a new element."""
+    """Lay one flower of 5 to 8 petals over the scene, as a new element."""
     rng, label = scene.rng, scene.add(centre)
     window = scene.window(centre, 22)
     rows, cols = window.where
@@ -356,7 +364,7 @@ def _lay_flower(scene: Scene, centre: tuple[float, float], radius: float, tone: 
 
 
 def _measure_bean(window: Window, angle: float, half: float) -> tuple[Floats, Floats, Floats]:
-    """Return the squared radius (1 at the rim) of a bean, and the coordinates along and across."""
+    """Return the squared radius (1 at the rim) of a bean, and the coordinates along and across it."""
     along = np.float32(cos(angle)) * window.y + np.float32(sin(angle)) * window.x
     across = np.float32(cos(angle)) * window.x - np.float32(sin(angle)) * window.y
     bent = across - np.float32(0.016) * along**2 + 0.8

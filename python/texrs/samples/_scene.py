@@ -1,9 +1,9 @@
-"""The table on which the planar samples are laid out, lit and photographed.
+"""The scene that a planar sample is laid out, lit and photographed in.
 
-A scene is always a torus, sampled twice a pixel. A sample that wraps is the whole torus; one that
-does not is cut out of a larger torus, so that elements come in over the border as they would in a
-photograph. The odd samples lie between pixels, the even ones on them: labels are read at pixel
-centres, and the picture is the tent average around them.
+A scene is always a torus with two samples per pixel along each axis. A tileable sample is the whole torus. Any other
+sample is cut out of a larger torus, so elements enter across the border as in a photograph. Even samples are at pixel
+centres and odd samples between them. Labels are read at pixel centres, and the image is an average around them with
+tent weights.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ class Window(NamedTuple):
 
 
 class Scene:
-    """Relief, colour, gloss and label of every sample of a torus.
+    """Height, colour, gloss and label of every sample of a torus.
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns of the picture.
+        Rows and columns of the image.
     rng : numpy.random.Generator
-        The only source of randomness.
+        Random generator.
     period : (int, int)
         Rows and columns of the torus, in pixels, at least `size`.
     origin : (int, int)
-        Where on the torus the picture's pixel (0, 0) is.
+        Position of the image's pixel (0, 0) on the torus.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Scene:
 
     @classmethod
     def around(cls, size: tuple[int, ...], rng: np.random.Generator, *, wrap: bool, margin: int) -> Scene:
-        """Return a scene of the picture alone (`wrap`) or with `margin` pixels around it."""
+        """Return a scene of the size of the image (`wrap`), or with `margin` pixels around it."""
         if as_bool(wrap, "wrap"):
             return cls(size, rng)
         period = (size[0] + 2 * margin, size[1] + 2 * margin)
@@ -89,10 +89,10 @@ class Scene:
         return clouds(self.shape, self.rng, coarse=coarse * _FINE, fine=fine * _FINE, gain=gain, stretch=stretch)
 
     def window(self, centre: tuple[float, float], reach: float, wide: float = 0.0) -> Window:
-        """Return the rectangle within `reach` rows and as many (or `wide`) columns of `centre`."""
+        """Return the rectangle within `reach` rows and `wide` (default: `reach`) columns of `centre`."""
         axes, offsets = [], []
         for c, r, n in zip(centre, (reach, wide or reach), self.shape, strict=True):
-            # No sample of the torus comes twice, even where it is smaller than the reach.
+            # Take no sample twice if the torus is smaller than the rectangle.
             r = min(r, (n - 1) / (2 * _FINE))
             first = int(np.ceil((c - r) * _FINE))
             count = int(np.floor((c + r) * _FINE)) - first + 1
@@ -103,7 +103,7 @@ class Scene:
         return Window((rows, cols), offsets[0][:, None], offsets[1][None, :])
 
     def add(self, anchor: tuple[float, float]) -> int:
-        """Return the label of a new element around `anchor`."""
+        """Add an element around `anchor`, and return its label."""
         self.anchors.append((float(anchor[0]), float(anchor[1])))
         return len(self.anchors)
 
@@ -118,7 +118,7 @@ class Scene:
         gloss: float | Floats = 0.0,
         over: bool = False,
     ) -> None:
-        """Lay something down where it is `inside` and higher than what is there (or `over` it)."""
+        """Paint the samples that are `inside` and higher than the scene, or all that are `inside` if `over`."""
         rows, cols = window.where
         shown = inside if over else inside & (height > self.height[rows, cols])
         where = np.nonzero(shown)
@@ -129,23 +129,24 @@ class Scene:
         self.label[r, c] = label
 
     def picture(self, *, grain: float = 0.012, soft: float = 0.0, **lamp: float) -> Floats:
-        """Return the lit torus in sRGB 0..1, at two samples a pixel, with the grain of a sensor."""
+        """Return the lit torus in sRGB 0..1, with two samples per pixel and with sensor noise."""
         lit = light(self.height, self.albedo, self.gloss, pitch=1 / _FINE, **lamp)
         if soft:
             lit = np.stack([blur(lit[..., k], soft * _FINE) for k in range(3)], -1)
-        # Photon noise grows with the root of the light, and so is even in sRGB.
+        # Photon noise grows with the square root of the light, so it is about uniform in sRGB.
         shade = clouds(self.shape, self.rng, coarse=8, fine=2, gain=1.0)[..., None]
         tint = self.rng.standard_normal(lit.shape, dtype=np.float32)
         return encode(lit) + np.float32(grain) * (shade + np.float32(0.7) * tint)
 
     def centroids(self) -> NDArray[np.float64]:
-        """Return the centroid of each label on the torus, in pixels; NaN where nothing shows."""
+        """Return the centroid of each label on the torus, in pixels; NaN if a label is not visible."""
         rows, cols = np.nonzero(self.label)
         owner = self.label[rows, cols]
         anchors = np.array([(0.0, 0.0), *self.anchors])
         count = np.bincount(owner, minlength=len(anchors))
         result = np.full_like(anchors, np.nan)
         seen = count > 0
+        # Average the offsets from the anchors, because elements can cross the border of the torus.
         for k, (at, n) in enumerate(zip((rows, cols), self.period, strict=True)):
             away = (at / _FINE - anchors[owner, k] + n / 2) % n - n / 2
             total = np.bincount(owner, away, len(anchors))
@@ -163,22 +164,23 @@ class Scene:
         soft: float = 0.0,
         **lamp: float,
     ) -> Sample:
-        """Return the photograph of the scene with its labels, cut to the picture.
+        """Photograph the scene, and return the image and its labels, cropped to the image's size.
 
         Parameters
         ----------
         name, layout : str
-            Of the sample.
+            Name and layout of the sample.
         mask : callable, optional
-            The foreground from the labels; ``labels > 0`` if not given.
+            Function that returns the foreground for labels. Default: ``labels > 0``.
         truth : bool
-            False for a texture without countable elements: only the image is returned.
+            If False, return only the image. Textures without countable elements use this.
         grain, soft : float
-            Noise of the sensor in parts of white, blur of the lens in pixels.
+            Sensor noise as a fraction of white, and lens blur in pixels.
         **lamp : float
             Options of `light`.
         """
         fine = self.picture(grain=grain, soft=soft, **lamp)
+        # Average the samples around each pixel with tent weights 1, 2, 1.
         for axis in (0, 1):
             fine = (np.roll(fine, 1, axis) + 2 * fine + np.roll(fine, -1, axis)) / 4
         picture = self._crop(fine)
@@ -189,26 +191,26 @@ class Scene:
         return Sample(name, image, centres, labels, labels > 0 if mask is None else mask(labels), layout)
 
     def _crop(self, fine: NDArray[_Number]) -> NDArray[_Number]:
-        """Return the samples of the torus that are pixels of the picture."""
+        """Return the samples of the torus that are pixels of the image."""
         (top, left), (height, width) = self.origin, self.size
         return np.ascontiguousarray(fine[::_FINE, ::_FINE][top : top + height, left : left + width])
 
     def _move_inside(self) -> NDArray[np.float64]:
-        """Return the centroids in the picture's pixels."""
+        """Return the centroids in pixels of the image."""
         box = np.array(self.period, np.float64)
-        # The picture's own pixels come first: -0.5 <= centre < period - 0.5.
+        # Wrap to -0.5 <= centre < period - 0.5, because pixel 0 covers -0.5 to 0.5.
         return fold(self.centroids() - np.array(self.origin) + 0.5, box) - 0.5
 
 
 def relabel(raw: NDArray[np.int32], centres: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Return the centres inside a picture, and its labels renumbered with those first.
+    """Return the centres inside an image, and its labels renumbered so that their elements come first.
 
     Parameters
     ----------
     raw : int32 array, (H, W)
         ``i + 1`` is the element of ``centres[i]``.
     centres : float64 array, (n, 2)
-        NaN for an element that shows nowhere.
+        Centres of the elements; NaN for an element that is not visible.
     """
     within = ((centres >= -0.5) & (centres < np.array(raw.shape) - 0.5)).all(1)
     seen = np.bincount(raw.ravel(), minlength=len(centres) + 1)[1:] > 0

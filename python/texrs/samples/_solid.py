@@ -17,28 +17,27 @@ _STRIPE = 9.0
 
 
 def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
-    """Return a gently folded stack of layers, 9 voxels apart.
+    """Generate gently folded layers, 9 voxels apart.
 
-    The colour of voxel p is that of an even stack with its normal along the planes' axis, at
-    S(p) = p + d(p), where d is a sum of four slow waves. `mask` is the dark half of the layers:
-    S_0 modulo 9 in 0 to 4.5.
+    Voxel p has the colour of flat layers at S(p) = p + d(p), where d is a sum of four slow waves. The normal of the
+    flat layers is the axis of planes. `mask` is the dark half of each layer: S_0 modulo 9 in 0 to 4.5.
 
     Parameters
     ----------
     size : (int, int, int)
-        Planes, rows and columns, at least 32.
+        Planes, rows and columns, at least 32. Default: (64, 64, 64).
     seed : int
-        Chooses the folds and the grain.
+        Seed of the folds and the noise. Default: 0.
 
     Returns
     -------
     Sample
-        With `mask` and `jacobians`, the exact J = dS/dp.
+        It has `mask` and `jacobians`, the exact J = dS/dp.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -51,6 +50,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     p = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).astype(np.float32)
     source, jacobians = p.copy(), np.zeros((*shape, 3, 3), np.float32)
     jacobians[:] = np.eye(3)
+    # Each wave adds a displacement and its exact derivative.
     for _ in range(4):
         way = rng.standard_normal(3)
         wave = 2 * pi / rng.uniform(52, 90) * way / np.sqrt((way * way).sum())
@@ -65,32 +65,34 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     grain, cloud = clouds(shape, rng, coarse=5, gain=0.9), clouds(shape, rng, coarse=30)
     albedo = shades(dark, "c0a581", "6b4335")
     albedo *= (tint * (1 + np.float32(0.10) * grain + np.float32(0.08) * cloud))[..., None]
+    # A thin darker line follows the middle of each light layer.
     hair = single(np.exp, -(((turn - 0.74) / 0.05) ** 2))
     albedo = mix(albedo, palette("8f6b4b")[0], np.float32(0.55) * hair)
     return Sample("stripes", _quantise(albedo, rng), mask=turn < 0.5, jacobians=jacobians)
 
 
 def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
-    """Return sparse ellipsoids of three colours in grey stone, periodic along every axis.
+    """Generate sparse ellipsoids of three colours in grey stone, periodic along every axis.
 
-    No two touch. The colour of ``centres[i]`` is number ``i % 3`` of red, ochre, blue. The layout is "disjoint".
+    No two ellipsoids touch. The colour of ``centres[i]`` is colour ``i % 3`` of red, ochre and blue. The layout is
+    "disjoint".
 
     Parameters
     ----------
     size : (int, int, int)
-        Planes, rows and columns, at least 32.
+        Planes, rows and columns, at least 32. Default: (64, 64, 64).
     seed : int
-        Chooses the volume.
+        Seed of the texture. Default: 0.
 
     Returns
     -------
     Sample
-        With `centres` (N, 3), `labels` and `mask`.
+        It has `centres` (N, 3), `labels` and `mask`.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -109,10 +111,11 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     labels = np.zeros(shape, np.int32)
     centres: list[NDArray[np.float64]] = []
     tones = palette("8f3f33", "b98f4a", "43607a")
+    # Throw darts, and place an ellipsoid at each dart that is far enough from all others.
     for dart in rng.random((int(box.prod() / 400), 3)) * box:
         away = np.abs(np.array(centres).reshape(-1, 3) - dart)
         away = np.minimum(away, box - away)
-        # Half axes are at most 6, and a voxel must stay between two.
+        # Half axes are at most 6 voxels, and at least one voxel must separate two ellipsoids.
         if len(centres) and (away**2).sum(1).min() < 13.2**2:
             continue
         rho, index = _measure_ellipsoid(dart, shape, rng.uniform(3.4, 6.0, 3), rng)
@@ -122,35 +125,36 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
         body = tone * (shade * (1.08 - 0.25 * np.minimum(rho, 1)))[..., None]
         albedo[index] = mix(albedo[index], body.astype(np.float32), 1 - ramp(rho, 0.9, 1.12))
         labels[index] = np.where(rho <= 1, len(centres), labels[index])
-    # The border of the picture belongs to the first voxels: -0.5 <= centre < size - 0.5.
+    # Wrap to -0.5 <= centre < size - 0.5, because voxel 0 covers -0.5 to 0.5.
     middles = (np.array(centres) + 0.5) % box - 0.5
     return Sample("particles", _quantise(albedo, rng), middles, labels, labels > 0, "disjoint")
 
 
 def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return layers of plain-woven yarn in resin.
+    """Generate layers of plain-woven yarn in resin.
 
-    Yarns run along rows and along columns, 16 voxels apart, and pass over and under each other; the
-    layers are 16 planes apart. `mask` is the yarn.
+    Yarns run along rows and along columns, 16 voxels apart, and pass over and under each other. The layers are 16
+    planes apart. `mask` is the yarn.
 
     Parameters
     ----------
     size : (int, int, int)
-        Planes, rows and columns, at least 32.
+        Planes, rows and columns, at least 32. Default: (64, 64, 64).
     seed : int
-        Chooses the volume.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the volume is a torus in all axes; the pitches are then fitted to it.
+        If True, the volume is tileable along all axes, and the distances of yarns and layers are adjusted to the size.
+        Default: False.
 
     Returns
     -------
     Sample
-        With `mask`.
+        It has `mask`.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -162,6 +166,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
     period = shape if as_bool(wrap, "wrap") else tuple(32 * -(-n // 32) for n in shape)
     counts = [2 * max(round(n / 32), 1) for n in period]
+    # Coordinates in units of layers and yarns, slightly bent.
     z, y, x = (
         at * np.float32(c / n) + np.float32(0.05) * clouds(period, rng, coarse=40, fine=12)
         for at, n, c in zip(np.ogrid[tuple(slice(0, n) for n in period)], period, counts, strict=True)
@@ -174,7 +179,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     for axis, along, across, tone in ((1, x, y, "a58d63"), (2, y, x, "5d6f78")):
         sign = 3 - 2 * axis
         number = np.floor(across)
-        # Odd layers are shifted by a yarn, so that the cloth nests.
+        # Shift odd layers by one yarn, so that the layers nest.
         rise = 0.24 * sign * single(np.cos, pi * (along - 0.5 + number + layer))
         off = ((across - number - 0.5) / 0.44) ** 2 + ((z - layer - 0.5 - rise) / 0.235) ** 2
         off = off.astype(np.float32)
@@ -184,6 +189,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
         tints = rng.uniform(0.85, 1.12, (counts[0], counts[axis]))
         tint = tints[layer.astype(int) % counts[0], number.astype(int) % counts[axis]]
         body = palette(tone)[0] * (shade * tint)[..., None]
+        # At each voxel, the yarn whose axis is nearest is visible.
         nearer = off < best
         weight = np.where(nearer, 1 - ramp(off, 0.8, 1.2), 0).astype(np.float32)
         albedo = mix(albedo, body.astype(np.float32), weight)
@@ -194,26 +200,26 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
 
 
 def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
-    """Return wood: growth rings about a pith outside the block, fibres along the rows' axis.
+    """Generate wood: growth rings around a pith outside the block, and fibres along the axis of rows.
 
     `mask` is the dark late wood.
 
     Parameters
     ----------
     size : (int, int, int)
-        Planes, rows and columns, at least 32.
+        Planes, rows and columns, at least 32. Default: (64, 64, 64).
     seed : int
-        Chooses the block.
+        Seed of the block. Default: 0.
 
     Returns
     -------
     Sample
-        With `mask`.
+        It has `mask`.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -228,7 +234,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     lean = rng.uniform(-0.06, 0.06, 2).astype(np.float32)
     dz, dx = z + 26 + lean[0] * y, x + 14 + lean[1] * y
     radius = single(np.hypot, dz, dx) + np.float32(1.1) * wander
-    # Rings of unequal years: a smooth, growing function of the radius.
+    # Years differ in growth: the ring number is a smooth, growing function of the radius.
     years = np.cumsum(rng.uniform(6.5, 12.5, 8 + int(radius.max()) // 6))
     ring = np.interp(radius, years, np.arange(len(years))).astype(np.float32)
     turn = ring % 1
@@ -237,7 +243,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     cloud = clouds(shape, rng, coarse=40, stretch=(1, 4, 1))
     albedo = shades(np.clip(late, 0, 1), "c29a68", "7d4f2d")
     albedo *= (1 + np.float32(0.10) * fibre + np.float32(0.06) * cloud)[..., None]
-    # Vessels of the early wood, and rays that run from the pith.
+    # Add the vessels of the early wood, and rays that run outward from the pith.
     pores = ramp(clouds(shape, rng, coarse=4, fine=2, stretch=(1, 14, 1)), 1.3, 2.1)
     albedo = mix(albedo, palette("5a3a22")[0], 0.6 * pores * (1 - ramp(turn, 0.2, 0.5)))
     angle = single(np.arctan2, dz, dx)
@@ -251,7 +257,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
 def _measure_ellipsoid(
     centre: NDArray[np.float64], shape: tuple[int, ...], half_axes: NDArray[np.float64], rng: np.random.Generator
 ) -> tuple[Floats, tuple[NDArray[np.intp], ...]]:
-    """Return the radius (1 at the surface) in a window of the torus around a turned ellipsoid."""
+    """Return the radius (1 at the surface) in a window of the torus around a rotated ellipsoid."""
     turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     axes = [np.arange(int(np.floor(c)) - 7, int(np.floor(c)) + 9) for c in centre]
     p = np.stack(np.meshgrid(*axes, indexing="ij"), -1) - centre
@@ -260,7 +266,7 @@ def _measure_ellipsoid(
 
 
 def _quantise(albedo: Floats, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Return linear colours as sRGB bytes with a little grain."""
+    """Convert linear colours to sRGB bytes, with a little noise."""
     grain = rng.standard_normal(albedo.shape, dtype=np.float32)
     image = encode(albedo) + np.float32(0.009) * grain
     return np.asarray(np.rint(np.clip(image, 0, 1) * 255), np.uint8)

@@ -14,26 +14,26 @@ from texrs.samples._scene import Scene
 
 
 def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return the bark of an old tree, its furrows along the rows' axis: a stochastic texture.
+    """Generate the bark of an old tree, with vertical furrows.
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        The image alone: it has no countable elements.
+        It has only an image, because there are no countable elements.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -50,6 +50,7 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     wander = [8.0 * scene.noise(70, 14, stretch=(1.6, 1)), 3.4 * scene.noise(60, 4, stretch=(2, 1))]
     where = np.stack([(scene.y + wander[0]) / long, scene.x + wander[1]], -1)
     box = np.array([scene.period[0] / long, scene.period[1]])
+    # The plates are the cells of stretched sites, and the furrows are their borders.
     tree = cKDTree(fold(points / np.array([long, 1.0]), box), boxsize=box)
     found = tree.query(fold(where.astype(np.float64), box), k=2)
     near, owner = np.asarray(found[0], np.float32), np.asarray(found[1])
@@ -64,32 +65,33 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     tone = shades(ramp(0.5 * ridge + 0.5 * flake + level, -1.2, 1.6), "4e4036", "8b7d6d")
     tone = tone * (1 + 0.10 * fibre)[..., None]
     scene.albedo = mix(np.broadcast_to(palette("241b16")[0], tone.shape), tone, ramp(gap, 0.0, 3.0))
+    # Moss grows in patches on the plates.
     moss = ramp(scene.noise(60, 3, gain=0.62) + 0.5 * plate, 1.3, 2.3)
     scene.albedo = mix(scene.albedo, palette("8e9078")[0], 0.65 * moss * plate)
     return scene.finish("bark", layout=None, truth=False, azimuth=150.0, exposure=1.1)
 
 
 def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
-    """Return crushed stone of many sizes, several layers deep: a stochastic texture.
+    """Generate crushed stone of many sizes, several layers deep.
 
     Parameters
     ----------
     size : (int, int)
-        Rows and columns, at least 32.
+        Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Chooses the picture.
+        Seed of the texture. Default: 0.
     wrap : bool
-        Whether the picture is a torus in both axes.
+        If True, the image is tileable along both axes. Default: False.
 
     Returns
     -------
     Sample
-        The image alone: it has no countable elements.
+        It has only an image, because there are no countable elements.
 
     Raises
     ------
     ValueError
-        If `size` or `seed` is not as above.
+        `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -106,6 +108,7 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
         radius = 3.0 + 6.0 * rng.random() ** 2.5
         window = scene.window((point[0], point[1]), radius * 1.5)
         rows, cols = window.where
+        # Each stone is a hexagon with random sides, rounded at its corners.
         angles = (np.arange(6) + rng.uniform(-0.4, 0.4, 6)) * (pi / 3) + rng.uniform(0, pi)
         planes = radius * rng.uniform(0.75, 1.15, 6)
         edge = soft_minimum(
