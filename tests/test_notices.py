@@ -81,10 +81,8 @@ def test_variants_report_what_is_noticed_while_they_are_made() -> None:
     several = list(texrs.design_variants(material, 2, 48))
     assert len(several) == 2
     for made in several:
-        assert (
-            "maps: few colours, looked up to the nearest pixel and never corrected; see --no-palette"
-            in made.report["assumed"]
-        )
+        noticed = "maps: few colours, looked up to the nearest pixel and never corrected"
+        assert any(text.startswith(noticed) for text in made.report["assumed"])
 
 
 def test_an_array_alone_gives_no_notices() -> None:

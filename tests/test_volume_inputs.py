@@ -107,6 +107,10 @@ def test_samples_without_a_header_need_what_they_are(tmp_path):
         tio.read_volume(scan)
     with pytest.raises(FileError, match=r"96 x 96 x 96 of uint16 need 1769472 bytes, but the file has 884736"):
         tio.read_volume(f"{scan}:96x96x96:uint16")
+    with pytest.raises(
+        FileError, match=r"the type of the samples must follow the size, as in .*scan.raw:96x96x96:uint16"
+    ):
+        tio.read_volume(f"{scan}:96x96x96")
     for options, says in (
         ({"shape": (96, 96, 96)}, "dtype: is needed with shape"),
         ({"dtype": "uint8"}, "shape: is needed with dtype"),

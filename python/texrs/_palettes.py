@@ -42,6 +42,8 @@ CHUNK, MANY = 2**16, 2**12
 """Number of pixels whose colours are listed at a time, and number of colours above which one sort of all pixels is
 faster.
 """
+OFF = "--no-palette or another interpolation turns this off"
+"""The end of each notice: how to get other colours."""
 _ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
 """If True, every image keeps its colours; if False, none. If None, indexed images and images of few colours do."""
 
@@ -110,7 +112,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
     tables = [_list_colours(image) for _, image in images]
     for (name, _), origin, table in zip(images, known, tables, strict=True):
         what = name if origin is None else origin[0]
-        assume(f"{what}: {len(table)} colours, looked up to the nearest pixel and never corrected; see --no-palette")
+        assume(f"{what}: {len(table)} colours, looked up to the nearest pixel and never corrected; {OFF}")
     return Palette([image for _, image in images], len(np.unique(np.concatenate(tables))))
 
 
@@ -144,7 +146,7 @@ def keeps_colours(image: Array) -> bool:
     asked = _ASKED.get()
     kept = has_few_colours(image) if asked is None else asked
     if kept:
-        assume("exemplar: few colours, looked up to the nearest pixel; see interpolation (--no-palette)")
+        assume("exemplar: few colours, looked up to the nearest pixel; {OFF}")
     return kept
 
 
@@ -160,7 +162,7 @@ def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
     few = asked is not False and made.source_map.axes == 2 and all(has_few_colours(base) for base in bases)
     if not few and not asked:
         return made
-    assume("maps: few colours, looked up to the nearest pixel and never corrected; see --no-palette")
+    assume(f"maps: few colours, looked up to the nearest pixel and never corrected; {OFF}")
     return replace(made, source_map=make_plain(made.source_map))
 
 

@@ -152,9 +152,10 @@ def analyse(
     watch("separate", 0.2)
     start, parted = _extend(guide, given, start, parted, how) if cellular is None else (start, parted)
     if len(parted.points) < FEWEST:
+        lower = f"a threshold below {seen.threshold:.2f}, " if seen.threshold > -1 else ""
         raise InvalidInput(
             f"image: must show at least {FEWEST} elements, found {len(parted.points)}; try another box, "
-            f"more rotations or scales, a threshold below {seen.threshold:.2f}, or give the points"
+            f"more rotations or scales, {lower}or give the points"
         )
     watch("separate", 0.3)
     again = _reanalyse(pixels, given, start, parted, how, lambda name, share: watch("separate", 0.3))

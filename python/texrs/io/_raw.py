@@ -21,7 +21,7 @@ __all__ = ["RAW", "Raw", "explain_raw", "make_raw", "parse_raw", "strip_raw"]
 RAW = ".raw"
 """The suffix of samples without a header."""
 _WORDS = re.compile(
-    r"(?P<path>.+\.raw):(?P<sides>\d{1,9}(?:[x×]\d{1,9}){2,3}):(?P<dtype>u?int(?:8|16|32|64)|float(?:16|32|64))"
+    r"(?P<path>.+\.raw):(?P<sides>\d{1,9}(?:[x×]\d{1,9}){2,3})(?::(?P<dtype>u?int(?:8|16|32|64)|float(?:16|32|64)))?"
     r"(?::(?P<order>big|little))?",
     re.IGNORECASE,
 )
@@ -54,6 +54,8 @@ def parse_raw(path: Path) -> Raw | None:
     found = _WORDS.fullmatch(str(path))
     if found is None or path.exists():
         return None
+    if found["dtype"] is None:
+        raise FileError(f"{path}: the type of the samples must follow the size, as in {path}:uint16 (types: {_KINDS})")
     sides = [int(n) for n in re.split("[x×]", found["sides"])]
     order: Any = ">" if (found["order"] or "").lower() == "big" else "<"
     return Raw(Path(found["path"]), (*sides[2::-1], *sides[3:]), np.dtype(found["dtype"].lower()).newbyteorder(order))
