@@ -1,4 +1,4 @@
-//! Kernels of texrs: they synthesise new textures from one example.
+//! Kernels of texrs, a library that synthesises new textures from one example.
 //!
 //! The crate has four layers, listed from the lowest to the highest. A module may use all layers
 //! below its own. In its own layer it uses only the modules after the arrow in its table row. Every

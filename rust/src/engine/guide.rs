@@ -1,47 +1,47 @@
-//! Soft constraints: what an output is asked to show at its points, beside looking like the exemplar (values, a trend, a
-//! scale).
+//! Soft constraints: values, such as a trend or a scale, that the output should show at its points.
 
 use crate::engine::appearance::{CHANNELS, Colour};
 use crate::foundation::error::check_shape;
 use crate::{Error, Result};
 
-/// Samples that are drawn from, at least, as a part of all: those whose first values are nearest to the wanted one.
+/// Draws choose among at least 1 / SHARE of the samples: the ones whose first values are nearest to the wanted value.
 const SHARE: usize = 25;
-/// First values that are as good as the wanted one.
+/// A sample whose first value is this near to the wanted value counts as equally good.
 const ALIKE: i32 = 48;
-/// Cost of windows that have nothing to do with each other: what is asked counts in these units.
+/// Cost of two unrelated windows, in the units of vectors. The stitcher divides the costs of a guide by it.
 pub(crate) const UNRELATED: f32 = 2.0 * 512.0 * 512.0;
-/// Weight of samples whose first value is more than what is asked where that counts as much as less.
+/// Weight of an excess (a first value above the wanted one) that equals the weight of a deficit.
 const EVEN: i64 = 256;
-/// Values that 12 bits hold.
+/// Number of values that 12 bits can have.
 const VALUES: i32 = 4096;
 
-/// Values of the exemplar's samples and those wanted at the points of the output, both within 12 bits.
+/// Values of the exemplar's samples, and wanted values at the points of the output. Both have 12 bits.
 #[derive(Debug, Clone)]
 pub struct Guide<'a> {
     exemplar: &'a [Colour],
     output: Wanted<'a>,
-    /// Cost of a squared difference of one, in 1 / 256; 0 where nothing is asked. One, or one a point.
+    /// Cost of a squared difference of 1, in units of 1 / 256; 0 at points without a constraint. One for all points,
+    /// or one for each.
     weight: &'a [u16],
-    /// Samples by their first value, the least first; empty where samples are drawn from anywhere.
+    /// Samples that may be drawn, in ascending order of their first value. Empty if draws ignore the guide.
     order: &'a [u32],
-    /// For each first value, how many of the order have a lesser one.
+    /// For each first value, the number of samples in `order` that have a lower one.
     before: Vec<u32>,
-    /// What it counts that a sample's first value is more than what is asked, in 1 / 256 of what it counts that it is less.
+    /// Weight of an excess, in units of 1 / 256 of the weight of a deficit.
     excess: i64,
 }
 
-/// Values at the points of the output. Outputs are large, and a scale is one number.
+/// Wanted values at the points of the output. Outputs are large, and a scale needs only one value at each point.
 #[derive(Debug, Clone, Copy)]
 enum Wanted<'a> {
     All(&'a [Colour]),
-    /// The first ones; the others are zero.
+    /// Only the first values; the others are zero.
     First(&'a [i16]),
 }
 
 impl<'a> Guide<'a> {
-    /// A guide for an exemplar of `samples` and an output of `points`: for each its four values or the first, and a
-    /// weight for each or one for all.
+    /// Creates a guide for an exemplar of `samples` and an output of `points`. Each sample has four values. Each point
+    /// has four or one, and weights are one for all points or one for each.
     pub fn new(
         exemplar: &'a [Colour],
         output: &'a [i16],
@@ -61,7 +61,7 @@ impl<'a> Guide<'a> {
         }
         let within = |x: &i16| (-2048..2048).contains(x);
         if !exemplar.as_flattened().iter().chain(output).all(within) {
-            return Err(Error::value("guide", "values of 12 bits are allowed"));
+            return Err(Error::value("guide", "must have values from -2048 to 2047"));
         }
         Ok(Self {
             exemplar,
@@ -77,16 +77,18 @@ impl<'a> Guide<'a> {
         })
     }
 
-    /// Draws from samples near what is asked: `order` holds those that may be drawn, by their first value.
+    /// Makes draws prefer samples near the wanted value. `order` contains the samples that may be drawn, sorted by
+    /// their first value.
     pub fn ordered(mut self, order: &'a [u32]) -> Result<Self> {
         let value = |k: &u32| self.exemplar.get(*k as usize).map(|v| i32::from(v[0]));
         if !order.iter().all(|k| value(k).is_some()) || !order.is_sorted_by_key(value) {
             return Err(Error::value(
                 "order of the guide",
-                "needs samples of the exemplar, by their first value",
+                "must contain samples of the exemplar, sorted by their first value",
             ));
         }
         if !order.is_empty() {
+            // Count the samples by value, then sum the counts up.
             self.before = vec![0; VALUES as usize + 1];
             for k in order {
                 let v = i32::from(self.exemplar[*k as usize][0]) + VALUES / 2;
@@ -100,13 +102,14 @@ impl<'a> Guide<'a> {
         Ok(self)
     }
 
-    /// Lets samples whose first value is more than what is asked count so many 256th of those where it is less.
+    /// Sets the weight of an excess, in units of 1 / 256 of the weight of a deficit.
     pub fn lopsided(mut self, excess: u16) -> Self {
         self.excess = i64::from(excess);
         self
     }
 
-    /// A sample drawn near what is asked at a point, by a random word; none where samples are drawn from anywhere.
+    /// Draws a sample whose value is near the wanted one at a point, by a random word. Returns none if draws ignore
+    /// the guide.
     #[inline(always)]
     pub(crate) fn near(&self, point: usize, word: u32) -> Option<usize> {
         if self.order.is_empty() {
@@ -115,6 +118,7 @@ impl<'a> Guide<'a> {
         let wanted = i32::from(self.wanted(point)[0]) + VALUES / 2;
         let before = |v: i32| self.before[v.clamp(0, VALUES) as usize] as usize;
         let (middle, half) = (before(wanted), (self.order.len() / SHARE).max(12) / 2);
+        // Draw from all samples that are good enough, or from the nearest ones if these are few.
         let low = before(wanted - ALIKE).min(middle.saturating_sub(half));
         let high = before(wanted + ALIKE + 1)
             .max(middle + half)
@@ -124,23 +128,23 @@ impl<'a> Guide<'a> {
         Some(self.order[pick] as usize)
     }
 
-    /// Whether anything is asked at a point.
+    /// Returns whether a point is constrained.
     pub(crate) fn asks(&self, point: usize) -> bool {
         self.weight(point) > 0
     }
 
-    /// The values of a sample.
+    /// Returns the values of a sample.
     pub(crate) fn value(&self, sample: usize) -> Colour {
         self.exemplar[sample]
     }
 
-    /// What a squared difference of one costs at a point, in 1 / 256.
+    /// Returns the cost of a squared difference of 1 at a point, in units of 1 / 256.
     #[inline(always)]
     pub(crate) fn weight(&self, point: usize) -> u16 {
         self.weight[point.min(self.weight.len() - 1)]
     }
 
-    /// The values that are wanted at a point.
+    /// Returns the wanted values at a point.
     #[inline(always)]
     pub(crate) fn wanted(&self, point: usize) -> Colour {
         match self.output {
@@ -149,7 +153,7 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// What it costs to show a sample at a point.
+    /// Returns the cost of showing a sample at a point.
     #[inline(always)]
     pub(crate) fn cost(&self, point: usize, sample: usize) -> i64 {
         let weight = self.weight(point);
@@ -159,7 +163,7 @@ impl<'a> Guide<'a> {
         (self.difference(sample, &self.wanted(point)) * i64::from(weight)) >> 8
     }
 
-    /// Squared difference of the values of a sample and of wanted ones.
+    /// Returns the squared difference between the values of a sample and wanted values.
     #[inline(always)]
     pub(crate) fn difference(&self, sample: usize, wanted: &Colour) -> i64 {
         let mut sum = 0;
@@ -175,12 +179,12 @@ impl<'a> Guide<'a> {
         sum
     }
 
-    /// Whether more than what is asked counts otherwise than less.
+    /// Returns whether an excess has another weight than a deficit.
     pub(crate) fn is_lopsided(&self) -> bool {
         self.excess != EVEN
     }
 
-    /// The least and the largest first value that is wanted.
+    /// Returns the lowest and the highest wanted first value.
     pub(crate) fn span(&self) -> (i16, i16) {
         let firsts: &mut dyn Iterator<Item = i16> = match self.output {
             Wanted::All(values) => &mut values.iter().map(|v| v[0]),

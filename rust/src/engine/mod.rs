@@ -1,4 +1,5 @@
-//! The inner calls of coarse-to-fine synthesis: one resolution of an exemplar and an output, in fixed point.
+//! The inner loops of coarse-to-fine synthesis. Each works on one resolution of an exemplar and an output, in fixed
+//! point.
 
 pub mod appearance;
 pub mod blocks;

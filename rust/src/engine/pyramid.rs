@@ -1,4 +1,4 @@
-//! From one resolution to the next.
+//! Upsampling of places to the next resolution.
 
 use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{Frames, ONE, Place, add, apply};
@@ -6,16 +6,17 @@ use crate::foundation::grid::Region;
 use crate::foundation::{memory, par};
 use crate::{Error, Result};
 
-/// Points a task takes at a time.
+/// Number of points in a task.
 const CHUNK: usize = 4096;
 
-/// Places of a region from those of the region of half the resolution: S(p) = 2 S'(p / 2) + 1/2 + J (p mod 2 - 1/2).
+/// Computes the places of a region from the places at half the resolution: S(p) = 2 S'(p / 2) + 1/2 + J (p mod 2 -
+/// 1/2).
 ///
-/// A parent lies between its children, hence the halves; where frames leave everything in place, whole coordinates stay
-/// whole. Parents must hold p / 2, rounded down, for every p of the world; along cyclic axes of odd length the last
-/// parent has three children.
+/// The halves are there because a parent is in the middle between its children. With identity frames, whole
+/// coordinates remain whole. The parents must include p / 2, rounded down, for every p of the world. Along periodic
+/// axes of odd length the last parent has three children.
 ///
-/// Lefebvre and Hoppe, *Parallel controllable texture synthesis*, SIGGRAPH 2005, section 3.1.
+/// Reference: Lefebvre and Hoppe, *Parallel controllable texture synthesis*, SIGGRAPH 2005, section 3.1.
 pub fn upsample<const D: usize>(
     parents: &[Place<D>],
     from: &Region<D>,
@@ -23,6 +24,7 @@ pub fn upsample<const D: usize>(
     frames: Frames<'_, D>,
 ) -> Result<Vec<Place<D>>> {
     let (coarse, fine) = (from.grid.shape(), to.grid.shape());
+    // Missing parents are an error: they would change the result.
     for axis in 0..D {
         let first = to.origin[axis].div_euclid(2) - from.origin[axis];
         let last = (to.origin[axis] + fine[axis] as i32 - 1).div_euclid(2) - from.origin[axis];
@@ -30,7 +32,7 @@ pub fn upsample<const D: usize>(
         if first < 0 || last >= coarse[axis] as i32 + i32::from(odd) {
             return Err(Error::value(
                 "parents",
-                format!("{from:?} does not hold the parents of {to:?}"),
+                format!("must cover {to:?} at half the resolution, got {from:?}"),
             ));
         }
     }
@@ -47,7 +49,7 @@ pub fn upsample<const D: usize>(
                 let at =
                     (world[axis].div_euclid(2) - from.origin[axis]).min(coarse[axis] as i32 - 1);
                 parent[axis] = at as usize;
-                // Twice the step from the middle of the first two children.
+                // Twice the step from the middle between the first two children.
                 twice[axis] = 2 * (world[axis] - 2 * (at + from.origin[axis])) - 1;
             }
             let middle =

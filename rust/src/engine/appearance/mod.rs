@@ -1,12 +1,12 @@
-//! Appearance vectors: what the surroundings of each sample of an exemplar look like, in few numbers.
+//! Appearance vectors: short descriptions of the neighbourhood of each sample of an exemplar.
 //!
-//! Lefebvre and Hoppe, *Appearance-space texture synthesis*, SIGGRAPH 2006. A window of (2 r + 1)^D colours, weighted
-//! by a Gaussian, is projected onto its leading principal components. All of it is integer arithmetic: colours,
-//! components and vectors have 12 bits, so a vector is the same however a window was put together, and distances are
+//! The method is by Lefebvre and Hoppe, *Appearance-space texture synthesis*, SIGGRAPH 2006. A window of (2 r + 1)^D
+//! colours, weighted by a Gaussian, is projected onto its leading principal components. Colours, components and
+//! vectors are integers of 12 bits. So a vector does not depend on how its window was assembled, and distances are
 //! exact in any order.
 //!
-//! Distances are divided by the variance of all windows, so they mean the same for every exemplar; [`UNIT`] is
-//! the distance of two windows that have nothing to do with each other, halved.
+//! Distances are divided by the variance of all windows, so they have the same scale for every exemplar. [`UNIT`] is
+//! half the distance of two unrelated windows.
 
 mod padding;
 mod projection;
@@ -29,40 +29,43 @@ pub use table::Parts;
 pub(crate) use window::Centres;
 use window::{check_sides, numbers, window};
 
-/// Numbers of an appearance vector.
+/// Number of components of an appearance vector.
 pub const KEEP: usize = 24;
-/// Channels of a colour, at most; missing ones are zero.
+/// Maximum number of channels of a colour. Missing channels are zero.
 pub const CHANNELS: usize = 4;
 /// Squared distance that equals the variance of all windows.
 pub const UNIT: i32 = SCALE * SCALE;
 
-/// An appearance vector, in units of the windows' standard deviation / 512.
+/// An appearance vector, in units of 1 / 512 of the standard deviation of the windows.
 pub type Feature = [i16; KEEP];
-/// A vector that fills a line of the cache: what is read at random costs one access.
+/// A vector aligned to a cache line, so that a random read costs one access.
 #[repr(align(64))]
 #[derive(Debug, Clone, Copy)]
 struct Line(Feature);
-/// A colour, scaled so that the exemplar fills 12 bits.
+/// A colour, scaled so that the colours of the exemplar fill 12 bits.
 pub type Colour = [i16; CHANNELS];
 
+/// Standard deviation of windows in an appearance vector.
 const SCALE: i32 = 512;
+/// Largest number of 12 bits with a sign.
 const TOP: f32 = 2047.0;
 /// Standard deviation of the Gaussian over a window, in samples.
 const SIGMA: f64 = 2.0;
-/// Windows that the components are computed from, at most.
+/// Maximum number of windows that the components are computed from.
 const SAMPLES: usize = 6000;
-/// Variance of windows, in squared steps of a colour, below which an exemplar shows nothing.
+/// Variance of windows, in squared colour steps. Up to this value an exemplar counts as uniform.
 const FLAT: f64 = 1e-3;
-/// Numbers of a window, at most: the components come from a square matrix of this side.
+/// Maximum number of values in a window: the components come from a square matrix of this side.
 const LONGEST: usize = 2048;
-/// Numbers that fill a register.
+/// Number of 16-bit values in a register.
 const LANES: usize = 16;
-/// Places that differ by less are of one piece of the exemplar: rounding moves them by half a sample.
+/// Largest difference of two places that belong to the same patch of the exemplar: rounding moves them by half a
+/// sample.
 const SAME: i32 = ONE * 3 / 4;
-/// Points a task takes at a time.
+/// Number of points in a task.
 const CHUNK: usize = 1024;
 
-/// An exemplar at one resolution, with an appearance vector for each of its points.
+/// An exemplar at one resolution, with an appearance vector for each of its samples.
 #[derive(Debug, Clone)]
 pub struct Appearance<const D: usize> {
     grid: Grid<D>,
@@ -73,18 +76,18 @@ pub struct Appearance<const D: usize> {
     offsets: Vec<[i32; D]>,
     projection: Projection,
     features: Vec<Line>,
-    /// Median distance from a window to the nearest other one: what is near enough to be the same.
+    /// Median distance from a window to the nearest other window: closer windows count as equal.
     spacing: i32,
 }
 
 impl<const D: usize> Appearance<D> {
-    /// Analyses `colours`: points of `grid` by `channels`. A cyclic axis of the grid is one along which the exemplar
-    /// repeats.
+    /// Analyses `colours`, an array of the points of `grid` by `channels`. The exemplar must be tileable along
+    /// periodic axes of the grid.
     pub fn new(colours: &[f32], grid: Grid<D>, channels: usize, radius: usize) -> Result<Self> {
         Self::watched(colours, grid, channels, radius, &Monitor::default())
     }
 
-    /// As [`Appearance::new`], until its caller asks it to stop.
+    /// Does the same as [`Appearance::new`], but stops if the monitor asks for it.
     pub fn watched(
         colours: &[f32],
         grid: Grid<D>,
@@ -93,20 +96,23 @@ impl<const D: usize> Appearance<D> {
         monitor: &Monitor,
     ) -> Result<Self> {
         if !(1..=CHANNELS).contains(&channels) {
-            let message = format!("1 to {CHANNELS} are allowed, got {channels}");
+            let message = format!("must be from 1 to {CHANNELS}, got {channels}");
             return Err(Error::value("channels", message));
         }
         check_shape("colours", &[grid.len(), channels], colours.len())?;
         memory::room("the appearance of the exemplar", grid.len(), 96)?;
         if let Some(bad) = colours.iter().find(|x| !x.is_finite()) {
-            return Err(Error::value("colours", format!("{bad} is not finite")));
+            return Err(Error::value(
+                "colours",
+                format!("must be finite, got {bad}"),
+            ));
         }
         let numbers = numbers::<D>(radius, channels);
         if radius == 0 || numbers > LONGEST {
             return Err(Error::value(
                 "radius",
                 format!(
-                    "{radius} with {channels} channels makes windows of {numbers} numbers, 1 to {LONGEST} are allowed"
+                    "must be at least 1 with windows of at most {LONGEST} values, got {radius}: {numbers} values with {channels} channels"
                 ),
             ));
         }
@@ -123,6 +129,7 @@ impl<const D: usize> Appearance<D> {
             features: Vec::new(),
             spacing: 0,
         };
+        // Learn the projection first: the vectors are computed by it, and the spacing from them.
         this.projection = this.learn();
         monitor.check()?;
         this.features = this.describe_all(monitor);
@@ -132,32 +139,32 @@ impl<const D: usize> Appearance<D> {
         Ok(this)
     }
 
-    /// The exemplar's grid; cyclic axes are those along which it repeats.
+    /// Returns the grid of the exemplar. The exemplar is tileable along its periodic axes.
     pub fn grid(&self) -> &Grid<D> {
         &self.grid
     }
 
-    /// Radius of the windows.
+    /// Returns the radius of the windows.
     pub fn radius(&self) -> usize {
         self.radius
     }
 
-    /// Channels that count.
+    /// Returns the number of channels in use.
     pub fn channels(&self) -> usize {
         self.channels
     }
 
-    /// The offsets of a window, in row-major order.
+    /// Returns the offsets of a window, in row-major order.
     pub fn offsets(&self) -> &[[i32; D]] {
         &self.offsets
     }
 
-    /// Median distance from a window to the nearest other one.
+    /// Returns the median distance from a window to the nearest other window.
     pub fn spacing(&self) -> i32 {
         self.spacing
     }
 
-    /// Variance of the colours over all samples, summed over channels.
+    /// Returns the variance of the colours over all samples, summed over channels.
     pub fn colour_variance(&self) -> f64 {
         let count = self.colours.len() as f64;
         let (mut sum, mut squares) = ([0i64; CHANNELS], 0i64);
@@ -171,7 +178,7 @@ impl<const D: usize> Appearance<D> {
         squares as f64 / count - means
     }
 
-    /// First and last sample along an axis whose window lies inside the exemplar.
+    /// Returns the first and the last sample along an axis whose window is inside the exemplar.
     #[inline(always)]
     pub fn range(&self, axis: usize) -> [i32; 2] {
         let last = self.grid.shape()[axis] as i32 - 1;
@@ -182,7 +189,7 @@ impl<const D: usize> Appearance<D> {
         }
     }
 
-    /// Row-major position of a sample whose window lies inside the exemplar, around cyclic axes.
+    /// Returns the row-major position of a sample if its window is inside the exemplar. Periodic axes wrap.
     #[inline(always)]
     pub fn inside(&self, sample: [i32; D]) -> Option<usize> {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
@@ -205,7 +212,7 @@ impl<const D: usize> Appearance<D> {
         Some(at)
     }
 
-    /// Row-major position of the sample nearest to one that may lie outside.
+    /// Returns the row-major position of the sample nearest to one that may be outside.
     #[inline(always)]
     pub fn clamped(&self, sample: [i32; D]) -> usize {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
@@ -225,7 +232,7 @@ impl<const D: usize> Appearance<D> {
         at
     }
 
-    /// A place brought to where windows lie inside the exemplar: around cyclic axes, to the border of the others.
+    /// Moves a place to where its window is inside the exemplar: wraps periodic axes, and clamps the others.
     #[inline(always)]
     pub fn bring_inside(&self, mut place: Place<D>) -> Place<D> {
         for axis in 0..D {
@@ -233,7 +240,7 @@ impl<const D: usize> Appearance<D> {
             if self.grid.wrap()[axis] {
                 place[axis] = place[axis].rem_euclid((high + 1) * ONE);
             } else {
-                // Only from where the nearest sample is outside: fractions are kept.
+                // Clamp only if the nearest sample is outside, so that fractions are kept.
                 let sample = (place[axis] + ONE / 2) >> BITS;
                 if !(low..=high).contains(&sample) {
                     place[axis] = sample.clamp(low, high) * ONE;
@@ -243,7 +250,7 @@ impl<const D: usize> Appearance<D> {
         place
     }
 
-    /// Whether two places for one point are of one piece of the exemplar.
+    /// Returns whether two places for one point belong to the same patch of the exemplar.
     #[inline(always)]
     pub fn same(&self, a: Place<D>, b: Place<D>) -> bool {
         (0..D).all(|axis| {
@@ -257,37 +264,37 @@ impl<const D: usize> Appearance<D> {
         })
     }
 
-    /// The colours with a rim of one sample more than windows reach.
+    /// Returns the colours with a margin of one sample more than the radius of windows.
     #[inline(always)]
     pub fn padding(&self) -> &Padding<D> {
         &self.padding
     }
 
-    /// The colour at a row-major position.
+    /// Returns the colour at a row-major position.
     #[inline(always)]
     pub fn colour(&self, at: usize) -> Colour {
         self.colours[at]
     }
 
-    /// The appearance vector at a row-major position; zero where the window does not lie inside the exemplar.
+    /// Returns the appearance vector at a row-major position. It is zero if the window is not inside the exemplar.
     #[inline(always)]
     pub fn feature(&self, at: usize) -> &Feature {
         &self.features[at].0
     }
 
-    /// Memory for the numbers of one window.
+    /// Allocates memory for the values of one window.
     pub fn scratch(&self) -> Vec<i16> {
-        // A colour is written whole, so the last one reaches beyond the numbers that count.
+        // Reserve room for a whole colour after the last one: `put` writes all four channels.
         vec![0; (self.offsets.len() * self.channels).next_multiple_of(LANES) + CHANNELS]
     }
 
-    /// Puts the colour of the `k`-th offset into a window.
+    /// Writes the colour of the `k`-th offset into a window.
     #[inline(always)]
     pub fn put(&self, window: &mut [i16], k: usize, colour: Colour) {
         window[k * self.channels..][..CHANNELS].copy_from_slice(&colour);
     }
 
-    /// The appearance vector of a window whose colours were [`put`](Self::put) in order.
+    /// Returns the appearance vector of a window whose colours were written by [`put`](Self::put), in order.
     #[inline(always)]
     pub fn project(&self, window: &mut [i16]) -> Feature {
         let p = &self.projection;
@@ -295,6 +302,7 @@ impl<const D: usize> Appearance<D> {
         p.apply(&window[..p.padded])
     }
 
+    /// Computes the projection from the principal components of many windows.
     fn learn(&self) -> Projection {
         let centres = self.valid_centres();
         let n = self.offsets.len() * self.channels;
@@ -306,6 +314,7 @@ impl<const D: usize> Appearance<D> {
                 exp(-f64::from(square) / (2.0 * SIGMA * SIGMA)) as f32
             })
             .collect();
+        // A large exemplar has too many windows, so draw some of them.
         let noise = Noise::new(0x5EED);
         let count = centres.len().min(SAMPLES);
         let mut samples = vec![0.0f32; count * n];
@@ -318,6 +327,7 @@ impl<const D: usize> Appearance<D> {
                 } else {
                     noise.below(centres.len() as u64, [k as u32, 0, 0, 0]) as usize
                 };
+                // Weight the colours like the projection does.
                 self.cut(centres.get(pick), &mut window);
                 for (k, x) in sample.iter_mut().enumerate() {
                     *x = f32::from(window[k]) * weights[k / self.channels];
@@ -327,7 +337,7 @@ impl<const D: usize> Appearance<D> {
         Projection::new(&principal(&samples, n, KEEP), &weights, self.channels)
     }
 
-    /// Writes the colours around a sample of the exemplar.
+    /// Writes the colours around a sample of the exemplar into a window.
     fn cut(&self, centre: [i32; D], window: &mut [i16]) {
         for (k, o) in self.offsets.iter().enumerate() {
             let mut sample = centre;
@@ -338,6 +348,7 @@ impl<const D: usize> Appearance<D> {
         }
     }
 
+    /// Computes the appearance vectors of all samples.
     fn describe_all(&self, monitor: &Monitor) -> Vec<Line> {
         let mut features = vec![Line([0; KEEP]); self.grid.len()];
         par::chunks_mut(&mut features, CHUNK, |chunk, features| {
@@ -356,12 +367,13 @@ impl<const D: usize> Appearance<D> {
         features
     }
 
-    /// All samples whose windows lie inside, addressed by number.
+    /// Returns the samples whose windows are inside the exemplar, addressed by number.
     pub(crate) fn valid_centres(&self) -> Centres<D> {
         let ranges = std::array::from_fn(|axis| self.range(axis));
         Centres { ranges }
     }
 
+    /// Returns the median distance from a window to the nearest one that does not overlap it much.
     fn measure_spacing(&self, monitor: &Monitor) -> i32 {
         let centres = self.valid_centres();
         let count = (60_000_000 / self.grid.len())
@@ -380,11 +392,13 @@ impl<const D: usize> Appearance<D> {
         nearest[count / 2]
     }
 
-    /// Distance from the window at `me` to the nearest one that is more than `apart` away on some axis.
+    /// Returns the distance from the window at `me` to the nearest window that is more than `apart` away along some
+    /// axis.
     #[inline(always)]
     fn nearest_other(&self, me: [i32; D], apart: i32) -> i32 {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
         let mine = self.features[self.clamped(me)].0;
+        // Go line by line: only the last axis needs a check for each sample.
         let columns = self.range(D - 1);
         let lines = self.grid.len() / shape[D - 1];
         let mut best = i32::MAX;
@@ -409,30 +423,32 @@ impl<const D: usize> Appearance<D> {
                 best = best.min(distance(&mine, other));
             }
         }
-        // An exemplar so small that all windows are neighbours.
+        // A small exemplar may have no window that is far enough away.
         if best == i32::MAX { UNIT / 4 } else { best }
     }
 }
 
-/// Squared distance of two appearance vectors.
-// Inlined between checks of bounds it is unrolled into single numbers: on its own it is a few wide instructions.
+/// Returns the squared distance of two appearance vectors.
+// Do not inline it: next to bounds checks the compiler unrolls it to scalar code; alone it becomes a few SIMD
+// instructions.
 #[inline(never)]
 pub fn distance(a: &Feature, b: &Feature) -> i32 {
     let mut sum = 0;
     for k in 0..KEEP {
-        // Twelve bits each, so the difference fits: products of 16 bits are what registers multiply fastest.
+        // Vectors have 12 bits, so the difference fits into 16. Products of 16 bits are the fastest in SIMD.
         let d = a[k].wrapping_sub(b[k]);
         sum += i32::from(d) * i32::from(d);
     }
     sum
 }
 
+/// Returns the distance of two coordinates along an axis, the short way round if it is periodic.
 fn gap(a: i32, b: i32, n: i32, wrap: bool) -> i32 {
     let d = (a - b).abs();
     if wrap { d.min(n - d) } else { d }
 }
 
-/// Colours less their mean, with the farthest at the end of 12 bits.
+/// Subtracts the mean from colours and scales them so that the largest difference fills 12 bits.
 fn quantise(colours: &[f32], channels: usize) -> Vec<Colour> {
     let count = (colours.len() / channels) as f64;
     let mut mean = [0.0f64; CHANNELS];
@@ -448,6 +464,7 @@ fn quantise(colours: &[f32], channels: usize) -> Vec<Colour> {
             largest = largest.max((x - m).abs());
         }
     }
+    // A uniform exemplar becomes zero instead of amplified noise.
     let scale = if largest > 1e-6 { TOP / largest } else { 0.0 };
     colours
         .chunks_exact(channels)

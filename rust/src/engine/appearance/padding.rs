@@ -1,14 +1,14 @@
-//! The exemplar's colours with a rim around them, for places that are known to be near.
+//! The colours of an exemplar with a margin, so that reads near its border need no checks.
 
 use super::Colour;
 use crate::foundation::grid::Grid;
 
-/// Colours that can be read a little beyond the exemplar's ends: around cyclic axes, and from the border beyond others.
+/// Colours of an exemplar with a margin: it wraps around periodic axes and repeats the border along the others.
 #[derive(Debug, Clone)]
 pub struct Padding<const D: usize> {
     colours: Vec<Colour>,
     strides: [i32; D],
-    /// Position of sample zero.
+    /// Position of the sample at the origin.
     zero: i32,
 }
 
@@ -32,7 +32,7 @@ impl<const D: usize> Padding<D> {
         }
     }
 
-    /// The colour of a sample at most the rim away from the exemplar.
+    /// Returns the colour of a sample that is at most the margin outside of the exemplar.
     #[inline(always)]
     pub fn colour(&self, sample: [i32; D]) -> Colour {
         let mut at = self.zero;

@@ -1,4 +1,4 @@
-//! An analysis taken apart into plain arrays, to be kept, and put together again.
+//! Conversion of an analysis to plain arrays, which can be stored, and back.
 
 use super::{
     Appearance, CHANNELS, Colour, Feature, KEEP, LANES, Line, Padding, Projection, check_sides,
@@ -10,28 +10,28 @@ use crate::{Error, Result};
 /// The arrays of an [`Appearance`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parts<const D: usize> {
-    /// Samples along each axis, and which axes are cyclic.
+    /// Samples along each axis, and which axes are periodic.
     pub grid: Grid<D>,
-    /// Radius of the windows.
+    /// Radius of the windows, in samples.
     pub radius: usize,
-    /// Channels that count.
+    /// Number of channels in use.
     pub channels: usize,
-    /// A colour a sample.
+    /// The colour of each sample.
     pub colours: Vec<Colour>,
-    /// An appearance vector a sample.
+    /// The appearance vector of each sample.
     pub features: Vec<Feature>,
-    /// Rows of the projection, each filled up to whole registers.
+    /// Rows of the projection, each padded to whole registers.
     pub basis: Vec<i16>,
-    /// What the mean window projects to.
+    /// The projection of the mean window.
     pub bias: [i64; KEEP],
-    /// From products to vectors, in units of 2^-32.
+    /// Factor from products to vectors, in units of 2^-32.
     pub gain: i64,
-    /// Median distance from a window to the nearest other one.
+    /// Median distance from a window to the nearest other window.
     pub spacing: i32,
 }
 
 impl<const D: usize> Appearance<D> {
-    /// Takes the analysis apart.
+    /// Returns the arrays of the analysis.
     pub fn parts(&self) -> Parts<D> {
         Parts {
             grid: self.grid,
@@ -46,7 +46,7 @@ impl<const D: usize> Appearance<D> {
         }
     }
 
-    /// Puts an analysis together again; an error where the arrays do not belong together.
+    /// Restores an analysis from its arrays. Returns an error if they do not match.
     pub fn from_parts(parts: Parts<D>) -> Result<Self> {
         let points = parts.grid.len();
         let known = (1..=8).contains(&parts.radius) && (1..=CHANNELS).contains(&parts.channels);
@@ -57,6 +57,7 @@ impl<const D: usize> Appearance<D> {
             0
         };
         let padded = length.next_multiple_of(LANES);
+        // Check everything that the unchecked integer arithmetic relies on: stored arrays may be damaged.
         let sums_fit = parts
             .basis
             .chunks(padded.max(1))
@@ -75,7 +76,7 @@ impl<const D: usize> Appearance<D> {
         {
             return Err(Error::value(
                 "analysis",
-                "its arrays do not belong together",
+                "must contain arrays that match, as `parts` returns them",
             ));
         }
         Ok(Self {

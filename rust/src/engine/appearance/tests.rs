@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-/// Smooth noise, three channels.
+/// Returns smooth noise with three channels.
 fn exemplar<const D: usize>(shape: [usize; D], wrap: bool) -> (Vec<f32>, Grid<D>) {
     let grid = Grid::new(shape, [wrap; D]).unwrap();
     let noise = Noise::new(5);
@@ -120,7 +120,7 @@ proptest! {
         let other: Vec<f32> = colours.iter().map(|x| x * gain + lift).collect();
         let [a, b] = [colours, other].map(|c| Appearance::new(&c, grid, 3, 2).unwrap());
         for i in 0..grid.len() {
-            // Rounding of the colours may differ by one step.
+            // Colours may differ by one step after rounding.
             prop_assert!(distance(a.feature(i), b.feature(i)) < UNIT / 100);
         }
     }

@@ -1,17 +1,18 @@
-//! Windows of an exemplar: which of its points lie in one, and where one lies inside.
+//! Windows of an exemplar: their offsets, and the samples whose windows are inside.
 
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
-/// Samples along an axis, at most: places have 12 of 32 bits after the point, and steps must fit too.
+/// Maximum number of samples along an axis: places have 12 of 32 bits after the point, and steps must fit too.
 const SIDE: usize = 1 << 18;
 
-/// Samples whose windows lie inside an exemplar.
+/// Samples whose windows are inside an exemplar.
 pub(crate) struct Centres<const D: usize> {
     pub(super) ranges: [[i32; 2]; D],
 }
 
 impl<const D: usize> Centres<D> {
+    /// Returns the number of samples.
     pub(crate) fn len(&self) -> usize {
         self.ranges
             .iter()
@@ -19,6 +20,7 @@ impl<const D: usize> Centres<D> {
             .product()
     }
 
+    /// Returns the sample with a number.
     pub(crate) fn get(&self, mut number: usize) -> [i32; D] {
         let mut sample = [0; D];
         for axis in (0..D).rev() {
@@ -31,23 +33,24 @@ impl<const D: usize> Centres<D> {
     }
 }
 
-/// Numbers of a window.
+/// Returns the number of values in a window.
 pub(super) fn numbers<const D: usize>(radius: usize, channels: usize) -> usize {
     let side = radius.saturating_mul(2).saturating_add(1);
     side.saturating_pow(D as u32).saturating_mul(channels)
 }
 
-/// Refuses exemplars in which windows of `radius` do not fit, and those that 32 bits cannot address with their rim.
+/// Returns an error if windows of `radius` do not fit, or if 32 bits cannot address the exemplar with its margin.
 pub(super) fn check_sides<const D: usize>(grid: &Grid<D>, radius: usize) -> Result<()> {
     let (shape, least) = (grid.shape(), 2 * radius + 2);
     if shape.iter().any(|&n| n < least) {
         return Err(Error::value(
             "exemplar",
             format!(
-                "{shape:?} is too small for windows of radius {radius}: sides of at least {least} are needed"
+                "must have sides of at least {least} for windows of radius {radius}, got shape {shape:?}"
             ),
         ));
     }
+    // The margin counts as well, because it is stored.
     let wide = shape.map(|n| n.saturating_add(least));
     let points = wide.iter().fold(1usize, |n, &side| n.saturating_mul(side));
     if shape.iter().any(|&n| n > SIDE) || points > i32::MAX as usize {
@@ -60,7 +63,7 @@ pub(super) fn check_sides<const D: usize>(grid: &Grid<D>, radius: usize) -> Resu
     Ok(())
 }
 
-/// The offsets of a window, in row-major order.
+/// Returns the offsets of a window, in row-major order.
 pub(super) fn window<const D: usize>(radius: usize) -> Vec<[i32; D]> {
     let side = 2 * radius + 1;
     (0..side.pow(D as u32))

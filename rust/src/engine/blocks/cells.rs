@@ -1,4 +1,4 @@
-//! A region divided into cells with borders that are nowhere straight.
+//! The division of a region into cells whose borders are not straight.
 
 use super::{CHUNK, Options};
 use crate::Result;
@@ -7,31 +7,32 @@ use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
 use crate::foundation::{memory, par};
 
-/// How far a centre strays from the middle of its cell, as a share of the cell.
+/// Maximum offset of a centre from the middle of its cell, as a fraction of the cell's side.
 const STRAY: f64 = 0.4;
 
 /// The cells of a region.
 pub(super) struct Cells<const D: usize> {
     pub(super) region: Region<D>,
-    /// Cells along each axis, those that only border on the region included.
+    /// Number of cells along each axis, including cells that only border on the region.
     pub(super) grid: Grid<D>,
     /// World index of the first cell.
     pub(super) first: [i32; D],
-    /// Points a cell has along each axis.
+    /// Number of points of a cell along each axis.
     pub(super) sides: [f64; D],
     pub(super) centres: Vec<[i32; D]>,
 }
 
-/// One cell: its points, and those of the shell around it with the steps from its centre.
+/// A cell: its points, and the points of the shell around it with their steps from its centre.
 pub(super) struct Cell<const D: usize> {
     pub(super) points: Vec<u32>,
     pub(super) shell: Vec<(u32, [i32; D])>,
     pub(super) even: bool,
-    /// The frame at its centre, or at the point of the region nearest to it.
+    /// The frame at the cell's centre, or at the nearest point of the region.
     pub(super) frame: Frame<D>,
 }
 
 impl<const D: usize> Cells<D> {
+    /// Divides a region into cells.
     pub(super) fn new(region: &Region<D>, options: &Options) -> Result<Self> {
         let (shape, wrap) = (region.grid.shape(), region.grid.wrap());
         let side = options.cell as i32;
@@ -41,10 +42,11 @@ impl<const D: usize> Cells<D> {
         for axis in 0..D {
             let n = shape[axis];
             if wrap[axis] {
+                // Stretch the cells of a periodic axis so that a whole number of them fits.
                 counts[axis] = ((n + options.cell / 2) / options.cell).max(1);
                 sides[axis] = n as f64 / counts[axis] as f64;
             } else {
-                // Centres stray, so a cell beside the region may own points of it.
+                // Add a cell on both sides: centres are shifted, so a cell outside the region may own points inside.
                 first[axis] = region.origin[axis].div_euclid(side) - 1;
                 let last = (region.origin[axis] + n as i32 - 1).div_euclid(side) + 1;
                 counts[axis] = (last - first[axis] + 1) as usize;
@@ -52,6 +54,7 @@ impl<const D: usize> Cells<D> {
         }
         let grid = Grid::new(counts, wrap)?;
         memory::check::<[i32; D]>("the cells of a region", grid.len())?;
+        // Shift centres by noise of the cell's world index, so that overlapping regions have the same cells.
         let noise = Noise::new(options.seed).part(2);
         let centres = (0..grid.len())
             .map(|c| {
@@ -74,11 +77,11 @@ impl<const D: usize> Cells<D> {
         })
     }
 
-    /// Whether anything inside the margin hangs on what a cell chooses in a round.
+    /// Returns whether a point inside the margin depends on the choice of a cell in a round.
     ///
-    /// A point lies within `far` of its cell's centre, as near as to that of the cell it falls into; each round after
-    /// this one looks at the shell, one point further, and at the centres of the cells that own it; and at those of
-    /// cells two steps away where what they show counts.
+    /// A point is at most `far` from the centre of the cell it falls into, and its own cell's centre is not farther.
+    /// Each later round reads the shell, one point further, and the centres of the cells that own it. If repetition
+    /// counts, it also reads the centres of cells two steps away.
     pub(super) fn counts(&self, cell: usize, options: &Options, round: usize) -> bool {
         let side = options.cell as f64;
         let far = ((0.5 + STRAY) * side).ceil() as usize;
@@ -96,7 +99,7 @@ impl<const D: usize> Cells<D> {
         })
     }
 
-    /// The step from a cell's centre to a point of the world: the short way around where the output repeats.
+    /// Returns the step from a cell's centre to a point of the world, the short way round along periodic axes.
     pub(super) fn step_from_centre(&self, cell: usize, world: [i32; D]) -> [i32; D] {
         let (shape, wrap) = (self.region.grid.shape(), self.region.grid.wrap());
         let mut step = sub(world, self.centres[cell]);
@@ -109,12 +112,12 @@ impl<const D: usize> Cells<D> {
         step
     }
 
-    /// The cell that each point belongs to: that of the nearest centre, along the axis on which it is farthest.
+    /// Returns the cell of each point: the cell with the nearest centre in the maximum norm.
     pub(super) fn owners(&self) -> Result<Vec<u32>> {
         let grid = &self.region.grid;
         let mut owners = memory::filled("the points of cells", 0u32, grid.len())?;
         par::chunks_mut(&mut owners, CHUNK, |chunk, owners| {
-            // Points one after the other mostly fall into one cell.
+            // Reuse the neighbours of the previous point: consecutive points mostly fall into the same cell.
             let (mut seen, mut around) = (None, Vec::new());
             for (i, owner) in owners.iter_mut().enumerate() {
                 let world = self.region.world(grid.point(chunk * CHUNK + i));
@@ -136,7 +139,7 @@ impl<const D: usize> Cells<D> {
         Ok(owners)
     }
 
-    /// The cell at a position of the lattice of cells, and those beside it.
+    /// Returns the cell at a position of the lattice of cells, and its neighbours.
     fn around(&self, home: [i32; D]) -> Vec<usize> {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
         (0..3usize.pow(D as u32))
@@ -159,7 +162,7 @@ impl<const D: usize> Cells<D> {
             .collect()
     }
 
-    /// Points and shells of all cells.
+    /// Lists the points and the shells of all cells.
     pub(super) fn list(&self, owners: &[u32], frames: Frames<'_, D>) -> Result<Vec<Cell<D>>> {
         let grid = &self.region.grid;
         memory::check::<Cell<D>>("the cells of a region", self.grid.len())?;
@@ -177,6 +180,7 @@ impl<const D: usize> Cells<D> {
                 }
             })
             .collect();
+        // The steps to all neighbours, and the same steps in row-major order.
         let steps: Vec<[i32; D]> = (0..3usize.pow(D as u32))
             .map(|mut k| {
                 std::array::from_fn(|_| {
@@ -191,6 +195,7 @@ impl<const D: usize> Cells<D> {
             .iter()
             .map(|step| (0..D).map(|a| step[a] as isize * strides[a] as isize).sum())
             .collect();
+        // Add each point to its own cell, and to the shell of each other cell next to it.
         for at in 0..grid.len() {
             let point = grid.point(at);
             let owner = owners[at];
@@ -221,7 +226,7 @@ impl<const D: usize> Cells<D> {
         Ok(list)
     }
 
-    /// The cells within two steps of a cell.
+    /// Returns the cells within two steps of a cell.
     pub(super) fn near(&self, c: usize) -> impl Iterator<Item = usize> {
         let lattice = Region {
             grid: self.grid,
@@ -238,7 +243,7 @@ impl<const D: usize> Cells<D> {
         })
     }
 
-    /// The frame at a cell's centre, or at the point of the region nearest to it.
+    /// Returns the frame at a cell's centre, or at the nearest point of the region.
     fn frame(&self, frames: Frames<'_, D>, c: usize) -> Frame<D> {
         let grid = &self.region.grid;
         let point = std::array::from_fn(|axis| {

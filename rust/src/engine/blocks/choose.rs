@@ -1,4 +1,4 @@
-//! The piece of the exemplar for one cell: the one that fits what lies around it.
+//! The choice of the exemplar patch that fits the surroundings of a cell best.
 
 use super::cells::{Cell, Cells};
 use super::{Constraints, Options};
@@ -7,44 +7,45 @@ use crate::engine::guide::Guide;
 use crate::foundation::fixed::{ONE, Place, add, apply, nearest, sub};
 use crate::foundation::hash::Noise;
 
-/// Cost of a shell point whose continuation lies outside the exemplar.
+/// Cost of a shell point whose continuation is outside the exemplar.
 const OUTSIDE: i64 = 4 * UNIT as i64;
 
-/// The points of a cell of which a guide asks something, with the steps from its centre.
+/// The points of a cell that the guide constrains, with their steps from the cell's centre.
 pub(super) struct Asked<'a, const D: usize> {
     guide: Option<&'a Guide<'a>>,
-    /// The point nearest to the cell's centre, or one of its own.
+    /// The constrained point nearest to the cell's centre.
     middle: usize,
     points: Vec<(usize, [i32; D])>,
 }
 
-/// What lies around a cell, and what candidates are compared by.
+/// The surroundings of a cell, which candidates are compared with.
 pub(super) struct Around<'a, const D: usize> {
     shell: Vec<Beyond<D>>,
-    /// Of each sample of the exemplar.
+    /// Contrast of each sample of the exemplar: the squared length of its vector.
     contrasts: &'a [i32],
 }
 
 /// A point of the shell.
 struct Beyond<const D: usize> {
-    /// Samples of the exemplar from the place of the cell's centre to what the piece would go on with.
+    /// Step in the exemplar from the place of the cell's centre to the continuation at this point.
     step: [i32; D],
-    /// The sample that is there.
+    /// The sample that the output shows at this point.
     there: usize,
 }
 
-/// The places that one cell may take, and what they cost.
+/// The places that a cell may take, and their costs.
 pub(super) struct Chooser<'a, const D: usize> {
     appearance: &'a Appearance<D>,
     cell: &'a Cell<D>,
     index: usize,
     /// World index of the cell.
     world: [i32; D],
-    /// Places of the centre for which all points of the cell lie inside the exemplar, in whole samples.
+    /// Places of the centre, in whole samples, for which all points of the cell are inside the exemplar.
     range: [[i32; 2]; D],
 }
 
 impl<'a, const D: usize> Chooser<'a, D> {
+    /// Prepares the choice for the cell `c`.
     pub(super) fn new(
         appearance: &'a Appearance<D>,
         cells: &Cells<D>,
@@ -53,6 +54,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
     ) -> Self {
         let cell = &list[c];
         let index = cells.grid.point(c);
+        // Measure how far the cell extends in the exemplar, to keep all its points inside.
         let (mut low, mut high) = ([0; D], [0; D]);
         for &p in &cell.points {
             let world = cells.region.world(cells.region.grid.point(p as usize));
@@ -71,7 +73,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
                 first - low[axis].div_euclid(ONE),
                 last - (high[axis] + ONE - 1).div_euclid(ONE),
             ];
-            // A cell as large as the exemplar has one place, in the middle.
+            // A cell that is larger than the exemplar has one place, in the middle.
             if least <= most {
                 [least, most]
             } else {
@@ -87,7 +89,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }
     }
 
-    /// A place drawn for the cell's centre.
+    /// Draws a place for the cell's centre.
     pub(super) fn place(&self, noise: &Noise, round: u32, draw: u32) -> Place<D> {
         let words = noise.at(self.world, round << 16 | draw);
         std::array::from_fn(|axis| {
@@ -97,7 +99,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         })
     }
 
-    /// A place drawn near what is asked at the cell's centre.
+    /// Draws a place whose value is near the wanted one at the cell's centre.
     fn near(&self, asked: &Asked<'_, D>, noise: &Noise, round: u32, draw: u32) -> Option<Place<D>> {
         let word = noise.at(self.world, round << 16 | draw)[D];
         let sample = asked.guide?.near(asked.middle, word)?;
@@ -108,10 +110,10 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }))
     }
 
-    /// What lies around the cell.
+    /// Returns the surroundings of the cell.
     pub(super) fn around<'c>(&self, places: &[Place<D>], contrasts: &'c [i32]) -> Around<'c, D> {
         let shell = self.cell.shell.iter().map(|&(q, step)| Beyond {
-            // Pieces are placed on whole samples, so what a step rounds to is the same for all of them.
+            // Round the step alone: patches are placed on whole samples, so the result is the same for all candidates.
             step: nearest(apply(&self.cell.frame, step)),
             there: self.appearance.clamped(nearest(places[q as usize])),
         });
@@ -121,8 +123,8 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }
     }
 
-    /// The best of the present place and many drawn ones; the first of equals.
-    #[allow(clippy::too_many_arguments)] // what lies around, what is asked, and how to choose
+    /// Returns the best of the present place and the drawn ones. If costs are equal, the first place wins.
+    #[allow(clippy::too_many_arguments)] // the surroundings, the guide, and how to choose
     pub(super) fn choose(
         &self,
         around: &Around<'_, D>,
@@ -152,7 +154,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         best
     }
 
-    /// The points of the cell of which something is asked.
+    /// Returns the points of the cell that the guide constrains.
     pub(super) fn asked<'g>(
         &self,
         cells: &Cells<D>,
@@ -177,7 +179,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }
     }
 
-    /// What a place costs by the guide.
+    /// Returns the cost of a place by the guide.
     #[inline(always)]
     fn obey(&self, origin: Place<D>, asked: &Asked<'_, D>) -> i64 {
         let Some(guide) = asked.guide else {
@@ -191,9 +193,9 @@ impl<'a, const D: usize> Chooser<'a, D> {
         sum
     }
 
-    /// How badly the piece goes on into what lies around the cell: 0 for a perfect fit, 1 for pieces that have nothing
-    /// to do with each other. Divided by the contrast of both sides, so that a piece is neither favoured for being
-    /// bland, and so near everything on average, nor for being the opposite.
+    /// Returns how badly the patch continues the surroundings: 0 for a perfect fit, about 1 for unrelated patches. The
+    /// squared difference is divided by the contrast of both sides. Otherwise low-contrast patches would win, because
+    /// they are near every other patch on average.
     #[inline(always)]
     fn misfit(&self, around: &Around<'_, D>, origin: Place<D>, options: &Options) -> f64 {
         let centre = nearest(origin);
@@ -209,13 +211,13 @@ impl<'a, const D: usize> Chooser<'a, D> {
             same += usize::from(at == there);
         }
         let shell = self.cell.shell.len().max(1) as f64;
-        // Twice the variance of windows is what two of them differ by on average.
+        // Two unrelated windows differ by twice the variance of windows on average.
         let usual = 2.0 * shell * f64::from(UNIT);
         let scale = options.contrast * contrast as f64 + (1.0 - options.contrast) * usual;
         difference as f64 / scale.max(0.05 * usual) + options.continuation * same as f64 / shell
     }
 
-    /// How much of the piece is shown near by already.
+    /// Returns how much of the patch the neighbouring cells show already.
     #[inline(always)]
     fn repeated(&self, origin: Place<D>, near: &[Place<D>], cell: usize) -> f64 {
         let reach = (cell as u32 * ONE as u32 / 2).max(ONE as u32);

@@ -1,12 +1,12 @@
-//! Patch-based initialisation: the output divided into cells, each filled by one piece of the exemplar.
+//! Patch-based initialisation: the output is divided into cells, and each cell is filled with a patch of the exemplar.
 //!
-//! The lattice is divided into cells of about `cell` points a side, with centres shifted by noise and each point given
-//! to the nearest centre, so that no seam is straight. A cell's piece is chosen to fit its neighbours: cells of even
-//! and odd parity take turns, each trying many places. The cost of a place counts how the shell just outside the cell
-//! would continue, against what lies there. Plain squared differences would favour bland pieces, which are near
-//! everything on average, so they are divided by the contrast of both.
+//! Cells have about `cell` points on each side. Their centres are shifted by noise, and each point belongs to the
+//! nearest centre, so that seams are not straight. The patch of a cell is chosen to fit its neighbours. Cells of even
+//! and odd parity take turns, and each tries many places. The cost of a place compares its continuation outside the
+//! cell with the samples that are there. Plain squared differences would favour low-contrast patches, which are near
+//! every other patch on average. So they are divided by the contrast of both.
 //!
-//! Everything is a function of the world's coordinates, within two cells for each of the `rounds`.
+//! The result at a point depends only on the world's coordinates within two cells for each of the `rounds`.
 
 mod cells;
 mod choose;
@@ -23,41 +23,41 @@ use crate::{Error, Result};
 use cells::Cells;
 use choose::Chooser;
 
-/// Points that a thread takes at once.
+/// Number of points in a task.
 const CHUNK: usize = 4096;
 
-/// Points of a cell along an axis, rounds, and candidates of a round, at most: places of cells fit into 32 bits, and draws
-/// are told apart by 16.
+/// Limit of the side of a cell, of rounds, and of candidates in a round. Places of cells must fit into 32 bits, and
+/// the noise has 16 bits for the number of a draw.
 const MOST: usize = 1 << 16;
 
-/// What [`blocks`] is asked for.
+/// Options of [`blocks`].
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// Side of a cell, in points.
     pub cell: usize,
-    /// Half-rounds of choosing; the even and the odd cells take turns, and the first places the even ones anywhere.
+    /// Number of rounds after the random start. Odd cells choose in odd rounds, even cells in even rounds.
     pub rounds: usize,
-    /// Places a cell tries in a round.
+    /// Number of places that a cell tries in a round.
     pub candidates: usize,
-    /// How far misfits are divided by the contrast of the pieces, 0 to 1.
+    /// Weight of the contrast of the patches in the divisor of misfits, 0 to 1. At 0 the divisor is constant.
     pub contrast: f64,
-    /// Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces: otherwise the exemplar is copied
-    /// whole.
+    /// Cost of continuing a neighbour exactly, in misfits of unrelated patches. Without it the exemplar would be
+    /// copied whole.
     pub continuation: f64,
-    /// Cost of showing what one of the cells around shows, in the same units.
+    /// Cost of repeating a cell nearby, in the same units.
     pub repetition: f64,
-    /// Chooses the texture.
+    /// Seed of the random numbers. Each seed gives another texture.
     pub seed: u64,
-    /// Points along borders that are there only for the others to look at: no cell is chosen that these do not hang on.
+    /// Width in points of a margin that only supports the inner points. Cells that cannot affect these are not chosen.
     pub margin: usize,
 }
 
-/// Hard constraints, points that keep their places: none, or one flag and one place a point.
+/// Hard constraints: points that keep their places. Both slices are empty, or have one entry for each point.
 #[derive(Debug, Clone, Copy)]
 pub struct Constraints<'a, const D: usize> {
-    /// Which.
+    /// True for each point that keeps its place.
     pub points: &'a [bool],
-    /// Where they look; those of other points do not count.
+    /// The places of the constrained points. Entries of other points are ignored.
     pub places: &'a [Place<D>],
 }
 
@@ -69,6 +69,7 @@ impl<const D: usize> Constraints<'_, D> {
     };
 
     #[inline(always)]
+    /// Returns whether a point keeps its place.
     fn hold(&self, point: usize) -> bool {
         self.points.get(point).is_some_and(|&h| h)
     }
@@ -89,7 +90,7 @@ pub fn blocks<const D: usize>(
         return Err(Error::value(
             "cell",
             format!(
-                "needs at least 2 points a cell, 1 candidate and 1 round, and at most {MOST}, got {options:?}"
+                "must be from 2 to {MOST} points, with at least 1 and fewer than {MOST} candidates and rounds, got {options:?}"
             ),
         ));
     }
@@ -97,7 +98,7 @@ pub fn blocks<const D: usize>(
     if !costs.iter().all(|x| x.is_finite()) || options.margin > u32::MAX as usize {
         return Err(Error::value(
             "options",
-            format!("finite costs and a margin within the region are allowed, got {options:?}"),
+            format!("must have finite costs and a margin below 2^32, got {options:?}"),
         ));
     }
     frames.check(region.grid.len())?;
@@ -110,7 +111,7 @@ pub fn blocks<const D: usize>(
             });
         }
     }
-    // Lists grow by doubling; small cells have as many points around them as in them.
+    // Include the spare memory of growing lists. The shell of a small cell has as many points as the cell.
     let listed = 4 * D + 24 + 16 * D * (D + 1) / options.cell;
     memory::room("the cells of a region", region.grid.len(), listed)?;
     let mut places = memory::filled("the places of a region", [0; D], region.grid.len())?;
@@ -118,15 +119,18 @@ pub fn blocks<const D: usize>(
     let noise = Noise::new(options.seed).part(1);
     let owners = cells.owners()?;
     let list = cells.list(&owners, frames)?;
+    // Start from a random place for each cell.
     let mut origins: Vec<Place<D>> = par::map(list.len(), |c| {
         Chooser::new(appearance, &cells, &list, c).place(&noise, 0, 0)
     });
+    // The squared length of a vector is the contrast of its window.
     let contrasts = par::map(appearance.grid().len(), |at| {
         distance(appearance.feature(at), &[0; KEEP])
     });
     monitor.expect((options.rounds * list.len()) as u64);
     for round in 0..=options.rounds {
         if round > 0 {
+            // Cells that take turns do not touch, so all of a round can choose at once.
             let even = round % 2 == 0;
             origins = par::map(list.len(), |c| {
                 let idle = list[c].even != even
@@ -143,7 +147,7 @@ pub fn blocks<const D: usize>(
             });
             monitor.check()?;
         }
-        // Each point shows what its cell's piece has for it.
+        // Fill each cell with its patch.
         par::chunks_mut(&mut places, CHUNK, |chunk, places| {
             for (i, place) in places.iter_mut().enumerate() {
                 let p = chunk * CHUNK + i;

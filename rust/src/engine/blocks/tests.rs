@@ -66,7 +66,7 @@ fn pieces_are_coherent_and_inside() {
 #[test]
 fn a_window_is_the_same_wherever_it_is_seen_from() {
     let exemplar = exemplar(true);
-    // Each half-round reaches one cell further.
+    // Each round reaches one cell further.
     let pad = (OPTIONS.rounds + 2) * OPTIONS.cell * 2;
     let [a, b] = [0, 11].map(|extra| {
         let start = -(pad as i32) - extra;
@@ -98,7 +98,7 @@ fn cells_that_do_not_count_are_not_missed() {
 #[test]
 fn a_guide_is_followed() {
     let exemplar = exemplar(false);
-    // The exemplar's rows as the guide: the left half of the output asks for the first, the right for the last.
+    // The guide is the row of the exemplar: the left half of the output wants the first row, the right half the last.
     let rows: Vec<[i16; 4]> = (0..1024).map(|i| [(i / 32 * 60) as i16, 0, 0, 0]).collect();
     let wanted: Vec<[i16; 4]> = (0..1600)
         .map(|i| [if i % 40 < 20 { 0 } else { 1860 }, 0, 0, 0])
@@ -153,7 +153,7 @@ fn choosing_makes_the_pieces_fit() {
 fn what_is_drawn_near_the_guide_is_found_with_few_candidates() {
     let exemplar = exemplar(false);
     let rows: Vec<[i16; 4]> = (0..1024).map(|i| [(i / 32 * 60) as i16, 0, 0, 0]).collect();
-    // One weight, and the first values alone.
+    // One weight for all points, and only first values.
     let (wanted, weight) = (vec![900; 1600], [256]);
     let order: Vec<u32> = (0..1024).collect();
     let region = Region::new(Grid::new([40; 2], [false; 2]).unwrap(), [0; 2]).unwrap();
@@ -184,7 +184,7 @@ fn what_is_drawn_near_the_guide_is_found_with_few_candidates() {
 fn what_is_held_stays_and_is_gone_on_from() {
     let exemplar = exemplar(false);
     let region = Region::new(Grid::new([24; 2], [false; 2]).unwrap(), [0; 2]).unwrap();
-    // All but a square in the middle shows the exemplar as it is.
+    // All points except a square in the middle show a copy of the exemplar.
     let given: Vec<Place<2>> = (0..576)
         .map(|i| [(i / 24 + 4) * ONE, (i % 24 + 4) * ONE])
         .collect();

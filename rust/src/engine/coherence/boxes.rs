@@ -1,33 +1,34 @@
-//! Eight vectors, or eight boxes, against one vector: squared distances of whole numbers, exact whatever computes them.
+//! Squared distances of one vector to eight vectors or eight boxes. They are integers, so they are exact on every
+//! processor.
 
 use super::FEW;
 
-/// Vectors, and boxes, that are compared at a time.
+/// Number of vectors or boxes that are compared at a time.
 pub(super) const WIDTH: usize = 8;
-/// Pairs of numbers of a vector.
+/// Number of pairs of numbers in a vector.
 const PAIRS: usize = FEW / 2;
 
-/// The first [`FEW`] numbers of [`WIDTH`] vectors: for each pair of numbers those of one vector after the other, as the
-/// instruction that multiplies pairs and adds them wants them.
+/// The first [`FEW`] numbers of [`WIDTH`] vectors. Each row has one pair of numbers of each vector, because the SIMD
+/// instruction multiplies and adds pairs.
 pub(super) type Block = [[i16; 2 * WIDTH]; PAIRS];
-/// The first [`FEW`] numbers of a vector, pair by pair.
+/// The first [`FEW`] numbers of a vector, as pairs.
 pub(super) type Query = [[i16; 2]; PAIRS];
-/// Which of eight are no farther than a limit, bit by bit, and how far each is.
+/// A bit for each of eight distances that is at most a limit, and the eight distances.
 pub(super) type Found = (u32, [i32; WIDTH]);
-/// The lowest and the highest of each number.
+/// The minimum and the maximum of each of the first [`FEW`] numbers.
 pub(super) type Extent = [(i16, i16); FEW];
 
-/// The boxes of up to eight things, and the least number within each.
+/// Bounding boxes of up to eight sets of vectors, and the lowest vector number in each set.
 pub(super) struct Boxes {
     low: Block,
     high: Block,
     pub(super) least: [u32; WIDTH],
-    /// Which there are, bit by bit.
+    /// A bit for each box that exists.
     there: u32,
 }
 
 impl Boxes {
-    /// The boxes of up to eight things.
+    /// Collects up to eight boxes, each with its lowest vector number.
     pub(super) fn of(things: impl Iterator<Item = (Extent, u32)>) -> Self {
         let mut boxes = Self {
             low: [[0; 2 * WIDTH]; PAIRS],
@@ -46,7 +47,7 @@ impl Boxes {
         boxes
     }
 
-    /// The box of all, and the least number.
+    /// Returns the box around all boxes, and the lowest vector number.
     pub(super) fn whole(&self) -> (Extent, u32) {
         let lanes = 0..self.there.count_ones() as usize;
         let at = |side: &Block, k: usize, lane: usize| side[k / 2][2 * lane + k % 2];
@@ -59,7 +60,7 @@ impl Boxes {
     }
 }
 
-/// The block of eight vectors.
+/// Returns the block of eight vectors.
 pub(super) fn block(vector: impl Fn(usize) -> [i16; FEW]) -> Block {
     let mut block = [[0; 2 * WIDTH]; PAIRS];
     for lane in 0..WIDTH {
@@ -70,12 +71,12 @@ pub(super) fn block(vector: impl Fn(usize) -> [i16; FEW]) -> Block {
     block
 }
 
-/// A vector, pair by pair.
+/// Returns a vector as pairs.
 pub(super) fn pairs(vector: &[i16; FEW]) -> Query {
     std::array::from_fn(|k| [vector[2 * k], vector[2 * k + 1]])
 }
 
-/// The box of vectors.
+/// Returns the bounding box of vectors.
 pub(super) fn extent(vectors: impl Iterator<Item = [i16; FEW]>) -> Extent {
     let mut bounds = [(i16::MAX, i16::MIN); FEW];
     for vector in vectors {
@@ -86,7 +87,7 @@ pub(super) fn extent(vectors: impl Iterator<Item = [i16; FEW]>) -> Extent {
     bounds
 }
 
-/// Squared distances of a vector to those of a block.
+/// Returns the squared distances of a vector to the vectors of a block.
 pub(super) fn distances(block: &Block, query: &Query, limit: i32) -> Found {
     found(limit, |k, lane| {
         let apart = block[k / 2][2 * lane + k % 2].wrapping_sub(query[k / 2][k % 2]);
@@ -94,7 +95,7 @@ pub(super) fn distances(block: &Block, query: &Query, limit: i32) -> Found {
     })
 }
 
-/// What any vector of each box is at least away by.
+/// Returns the squared distance of a vector to each box, which is a lower bound for the vectors in the box.
 pub(super) fn bounds(boxes: &Boxes, query: &Query, limit: i32) -> Found {
     let (near, found) = found(limit, |k, lane| {
         let (side, x) = (2 * lane + k % 2, query[k / 2][k % 2]);
@@ -118,7 +119,7 @@ fn found(limit: i32, apart: impl Fn(usize, usize) -> i32) -> Found {
     (near, sums)
 }
 
-/// The same in the registers that nearly every x86-64 has.
+/// The same functions with AVX2, which nearly every x86-64 processor has.
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 pub(super) mod v3 {
     use std::arch::x86_64::__m256i;
@@ -126,7 +127,7 @@ pub(super) mod v3 {
     use super::{Block, Boxes, Found, PAIRS, Query, WIDTH};
     use crate::foundation::simd::{V3, cast};
 
-    // Wide by themselves, for not all of a search is inlined into the function that is.
+    // Vectorise these functions themselves: the compiler does not inline all of a search into its vectorised caller.
     #[inline(always)]
     pub(in super::super) fn distances(simd: V3, block: &Block, query: &Query, limit: i32) -> Found {
         simd.vectorize(
@@ -164,14 +165,14 @@ pub(super) mod v3 {
         )
     }
 
-    /// Adds the squares, pair by pair.
+    /// Adds the squares of the differences, pair by pair.
     #[inline(always)]
     fn add(simd: V3, sums: __m256i, apart: __m256i) -> __m256i {
         let squares = simd.avx2._mm256_madd_epi16(apart, apart);
         simd.avx2._mm256_add_epi32(sums, squares)
     }
 
-    /// One pair for all vectors.
+    /// Repeats one pair for all vectors.
     #[inline(always)]
     fn same(simd: V3, [first, second]: [i16; 2]) -> __m256i {
         simd.avx

@@ -1,4 +1,5 @@
-//! One point chooses among what its diagonal neighbours' samples are like.
+//! One level of the correction: each point chooses among the samples that are similar to its diagonal neighbours'
+//! samples.
 
 use super::pass::{Kinds, Options};
 use super::{CHUNK, LARGEST, Similarity, Table};
@@ -9,16 +10,18 @@ use crate::foundation::grid::Region;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::simd::square_apart;
 
-/// Diagonal neighbours, at most.
+/// Maximum number of diagonal neighbours.
 const CORNERS: usize = 8;
-/// Points of a class that a task takes at a time: small pictures have few, and no thread is to wait long for another.
+/// Number of points of a class in a task. It is small because small images have few points, and no thread should wait
+/// long for another.
 const SHARE: usize = 256;
-/// Sums that a cost is added up in, each of pairs of numbers.
+/// Number of partial sums of a cost; each sums pairs of numbers.
 const LANES: usize = 4;
 
-/// Coordinates of a sample in one number: an exemplar's sides leave room.
+/// Bits of each coordinate of a packed sample. The sides of an exemplar are below 2^21.
 const BITS_EACH: u32 = 21;
 
+/// Packs the coordinates of a sample into one number.
 fn pack<const D: usize>(sample: [usize; D]) -> u64 {
     sample
         .iter()
@@ -26,14 +29,15 @@ fn pack<const D: usize>(sample: [usize; D]) -> u64 {
 }
 
 #[inline(always)]
+/// Returns the coordinates of a packed sample.
 fn unpack<const D: usize>(packed: u64) -> [i32; D] {
     std::array::from_fn(|axis| {
         (packed >> (BITS_EACH * (D - 1 - axis) as u32)) as i32 & ((1 << BITS_EACH) - 1)
     })
 }
 
-/// A diagonal neighbour, warped: where it lies on the output's lattice, what that is in the exemplar, and what a place
-/// there lacks of the diagonal.
+/// A diagonal neighbour of a point, warped by the frame. `step` is its offset on the output's lattice, and `moved` the
+/// same offset in the exemplar. `lacking` is the difference of `moved` from the unwarped diagonal.
 #[derive(Clone, Copy)]
 struct Corner<const D: usize> {
     step: [i32; D],
@@ -41,12 +45,14 @@ struct Corner<const D: usize> {
     lacking: Place<D>,
 }
 
-/// What a neighbour's sample looks like, and how far from a candidate the same neighbour lies in the table.
+/// The vector that a neighbour shows, and the table offset from a candidate to the sample at the same diagonal.
 type Seen<const N: usize> = ([i16; N], i32);
 
+/// The inputs and tables of a correction.
 pub(super) struct Level<'a, const D: usize, const N: usize> {
     appearance: &'a Appearance<D>,
-    /// What each sample may be replaced by, `k` each, packed: to divide positions would cost more than all else here.
+    /// `k` substitutes for each sample, as packed coordinates: computing them from positions needs divisions, the
+    /// costliest step here.
     sets: Vec<u64>,
     k: usize,
     region: &'a Region<D>,
@@ -55,12 +61,13 @@ pub(super) struct Level<'a, const D: usize, const N: usize> {
     kinds: Kinds<'a>,
     options: &'a Options,
     table: Table<D, N>,
-    /// The diagonals, and how far they lead in the table.
+    /// The diagonals; `beside` contains the table offset of each.
     diagonals: Vec<[i32; D]>,
     beside: Vec<i32>,
 }
 
 impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
+    /// Prepares the tables that all points read.
     pub(super) fn new(
         appearance: &'a Appearance<D>,
         similarity: &Similarity,
@@ -96,13 +103,14 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         }
     }
 
+    /// Makes all passes over `places`.
     pub(super) fn run(&self, places: &mut [Place<D>], monitor: &Monitor) -> Result<()> {
         let constant = match self.frames {
             Frames::Constant(frame) => Some(self.corners(&frame)),
             Frames::Dense(_) => None,
         };
         let classes = self.classes();
-        // The turn, counted from 1, in which each point last changed.
+        // The turn in which each point last changed, counted from 1.
         let mut changed = vec![0u32; places.len()];
         let turns = self.options.passes << D;
         monitor.expect(turns as u64);
@@ -112,7 +120,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             let before = now.saturating_sub(1 << D);
             let mut found = vec![[0; D]; class.len()];
             par::chunks_mut(&mut found, SHARE, |chunk, found| {
-                // Neighbours mostly share their frame.
+                // Reuse the corners of the previous point: neighbours mostly have the same frame.
                 let mut last = constant.map(|corners| (None, corners));
                 for (i, place) in found.iter_mut().enumerate() {
                     let p = class[chunk * SHARE + i] as usize;
@@ -123,8 +131,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                         _ => self.corners(&self.frames.at(p)),
                     };
                     last = Some((frame, corners));
-                    // What a point chooses hangs on its neighbours alone: where none of them has changed since it last
-                    // chose, it would choose the same.
+                    // Skip a point if its neighbours have not changed since its last choice: the choice depends only
+                    // on them.
                     let stirred = |corner: &Corner<D>| {
                         self.region
                             .step(point, corner.step)
@@ -137,6 +145,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                     };
                 }
             });
+            // Write the choices after the whole class has chosen: its points must read the places from before.
             for (&p, &place) in class.iter().zip(&found) {
                 if places[p as usize] != place {
                     places[p as usize] = place;
@@ -148,7 +157,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         Ok(())
     }
 
-    /// The points that may change, by their parities along the axes.
+    /// Returns the points that are not held, grouped by the parity of their coordinates.
     fn classes(&self) -> Vec<Vec<u32>> {
         let mut classes = vec![vec![]; 1 << D];
         for p in 0..self.region.grid.len() {
@@ -162,7 +171,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         classes
     }
 
-    /// The neighbours phi / |phi|, phi = F d, on the lattice, for a frame J = F^-1.
+    /// Returns the lattice neighbours phi / |phi|, where phi = F d and the frame is J = F^-1.
     fn corners(&self, frame: &Frame<D>) -> [Corner<D>; CORNERS] {
         let turned = inverse(frame);
         let mut corners = [Corner {
@@ -171,13 +180,14 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             lacking: [0; D],
         }; CORNERS];
         for (corner, &diagonal) in corners.iter_mut().zip(&self.diagonals) {
+            // Map the diagonal to the output's lattice by the inverse frame.
             let phi: [i64; D] = std::array::from_fn(|i| {
                 (0..D)
                     .map(|j| i64::from(turned[i][j]) * i64::from(diagonal[j]))
                     .sum()
             });
             let square: i64 = phi.iter().map(|x| x * x).sum();
-            // The nearest whole number of x / |phi|, at most 1: 1 from a half on.
+            // Round x / |phi|, which is at most 1, to the nearest integer: 1 from 0.5.
             corner.step = phi.map(|x| {
                 if 4 * x * x >= square {
                     x.signum() as i32
@@ -194,6 +204,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
     }
 
     #[inline(always)]
+    /// Returns the best place for the point `p`, or its present place if no candidate is allowed.
     fn choose(
         &self,
         places: &[Place<D>],
@@ -201,8 +212,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         point: [usize; D],
         corners: &[Corner<D>; CORNERS],
     ) -> Place<D> {
-        // Eq. 3: what is seen around the point, by its diagonal neighbours that the region has. Step by step for all of
-        // them, so that what one reads does not wait for another.
+        // Collect the vectors that the diagonal neighbours inside the region show (Eq. 3), and their substitutes. Each
+        // step handles all neighbours, so that no read waits for the previous one.
         let mut seen = [([0i16; N], 0i32); CORNERS];
         let mut rests = [[0; D]; CORNERS];
         let mut similar = [0u64; CORNERS * LARGEST];
@@ -222,6 +233,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             }
             count += 1;
         }
+        // Turn the substitutes into candidates: add the subsample rest and the step back, then drop those that are not
+        // allowed.
         let seen = &seen[..count];
         let wanted = match self.kinds.points.get(p) {
             Some(&Kinds::ANY) | None => None,
@@ -240,7 +253,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                 if wanted.is_some_and(|kind| self.kinds.samples[number] != kind) {
                     continue;
                 }
-                // Within a piece of the exemplar, what one neighbour knows the next one knows too.
+                // Skip duplicates: within a patch of the exemplar, neighbours propose the same candidates in the same
+                // order.
                 let centre = self.table.at(self.settle(there));
                 if std::mem::replace(before, centre) == centre {
                     continue;
@@ -250,7 +264,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             }
         }
         let candidates = &candidates[..count];
-        // Most points have all their neighbours: what those show stays in registers then.
+        // Pass the usual numbers of neighbours as arrays: then the compiler keeps their vectors in registers.
         let best = if let Ok(seen) = <&[Seen<N>; 8]>::try_from(seen) {
             self.least(seen, candidates)
         } else if let Ok(seen) = <&[Seen<N>; 4]>::try_from(seen) {
@@ -261,12 +275,12 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         self.appearance.bring_inside(best.unwrap_or(places[p]))
     }
 
-    /// The first of the candidates around which least differs from what is seen.
+    /// Returns the first candidate whose diagonal neighbours differ least from the seen vectors.
     #[inline(always)]
     fn least(&self, seen: &[Seen<N>], candidates: &[(Place<D>, i32)]) -> Option<Place<D>> {
         let (mut best, mut least) = (None, u32::MAX);
         for &(candidate, centre) in candidates {
-            // To add all up costs less than to ask after each whether it is too much already.
+            // Sum all differences: this costs less than a check after each for a sum that is already too large.
             let cost = seen.iter().fold([0; LANES], |sums, (vector, beside)| {
                 added(
                     sums,
@@ -282,7 +296,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         best
     }
 
-    /// A sample that `inside` allows, brought around cyclic axes.
+    /// Wraps a sample that `inside` accepts around the periodic axes.
     #[inline(always)]
     fn settle(&self, mut sample: [i32; D]) -> [i32; D] {
         let (shape, wrap) = (
@@ -299,7 +313,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
     }
 }
 
-/// Adds squared differences: of twelve bits each, so the sums of eight vectors fit, and those of all lanes.
+/// Adds squared differences. Vectors have 12 bits, so the sums of eight vectors fit, and so does the total of all
+/// lanes.
 #[inline(always)]
 fn added<const N: usize>(mut sums: [u32; LANES], a: &[i16; N], b: &[i16; N]) -> [u32; LANES] {
     for (a, b) in a.as_chunks().0.iter().zip(b.as_chunks().0) {
@@ -311,7 +326,7 @@ fn added<const N: usize>(mut sums: [u32; LANES], a: &[i16; N], b: &[i16; N]) -> 
     sums
 }
 
-/// Which side of an axis the `corner`-th of 2^D corners lies on: the last axis alternates fastest.
+/// Returns the side, 0 or 1, of the `corner`-th of 2^D corners along an axis. The last axis alternates fastest.
 #[inline(always)]
 fn bit<const D: usize>(corner: usize, axis: usize) -> i32 {
     (corner >> (D - 1 - axis) & 1) as i32

@@ -1,15 +1,15 @@
-//! k-coherence: each sample of an exemplar knows the few that look most like it, and a point of the output chooses among
-//! those that its neighbours' samples know.
+//! k-coherence: each sample of an exemplar has a set of the samples that are most similar to it. A point of the output
+//! chooses among the sets of its neighbours' samples.
 //!
-//! Tong et al., *Synthesis of bidirectional texture functions on arbitrary surfaces*, SIGGRAPH 2002; the correction in
-//! sub-passes is that of Lefebvre and Hoppe, *Parallel controllable texture synthesis*, SIGGRAPH 2005.
+//! The method is by Tong et al., *Synthesis of bidirectional texture functions on arbitrary surfaces*, SIGGRAPH 2002.
+//! The correction in sub-passes is by Lefebvre and Hoppe, *Parallel controllable texture synthesis*, SIGGRAPH 2005.
 //!
-//! 1. [`similar`]: the similarity set of each sample, once an exemplar;
-//! 2. [`jitter`]: coordinates displaced by noise;
-//! 3. [`correct`]: passes over a region, in which each point takes the candidate whose diagonal neighbours look most like
-//!    its own.
+//! 1. [`similar`] finds the similarity set of each sample, once for each exemplar.
+//! 2. [`jitter`] displaces coordinates by noise.
+//! 3. [`correct`] makes passes over a region. Each point takes the candidate whose diagonal neighbours are most
+//!    similar to the point's own.
 //!
-//! Coordinates and vectors are whole numbers, so a cost is exact and the least is found whatever the order.
+//! Coordinates and vectors are integers, so costs are exact, and the minimum does not depend on the order of the sums.
 
 mod boxes;
 mod level;
@@ -28,15 +28,15 @@ use crate::foundation::grid::Region;
 use crate::foundation::hash::Noise;
 use crate::foundation::par;
 
-/// Points a task takes at a time.
+/// Number of points in a task.
 const CHUNK: usize = 1024;
-/// Numbers of a vector that are kept where few are enough: what a register holds.
+/// Length of shortened vectors, used if the leading numbers are sufficient: they fill one register.
 pub const FEW: usize = 8;
-/// Samples of a similarity set, at most.
+/// Maximum number of samples in a similarity set.
 pub const LARGEST: usize = 16;
 
-/// Displaces each place that is not `held` by noise of its point in the world and of the `level`: up to `reach` along each
-/// axis, in the units of places.
+/// Displaces each place that is not `held` by noise that depends on its point in the world and on the `level`. The
+/// displacement is at most `reach` along each axis, in the units of places.
 pub fn jitter<const D: usize>(
     places: &mut [Place<D>],
     region: &Region<D>,
@@ -50,7 +50,7 @@ pub fn jitter<const D: usize>(
     }
     check_shape("places", &region.grid.shape(), places.len())?;
     if reach > i32::MAX as u32 {
-        let message = format!("up to {} is allowed, got {reach}", i32::MAX);
+        let message = format!("must be at most {}, got {reach}", i32::MAX);
         return Err(crate::Error::value("reach", message));
     }
     let noise = Noise::new(seed).part(4);
@@ -70,8 +70,8 @@ pub fn jitter<const D: usize>(
     Ok(())
 }
 
-/// The first `N` numbers of the vectors of all samples whose windows lie inside, and of those one step beyond: around
-/// cyclic axes, of the border's along the others.
+/// The first `N` numbers of the vectors of all samples whose windows are inside the exemplar, with a margin of one
+/// sample. The margin wraps around periodic axes and repeats the border sample of the others.
 struct Table<const D: usize, const N: usize> {
     low: [i32; D],
     strides: [i32; D],
@@ -95,7 +95,8 @@ impl<const D: usize, const N: usize> Table<D, N> {
                     let [low, high] = ranges[axis];
                     let x = (rest % sides[axis]) as i32 + low - 1;
                     rest /= sides[axis];
-                    // `clamped` goes around cyclic axes, whose samples all lie inside.
+                    // Leave the sample as it is on periodic axes: `clamped` wraps it, and all windows are inside
+                    // there.
                     sample[axis] = if appearance.grid().wrap()[axis] {
                         x
                     } else {
@@ -112,7 +113,7 @@ impl<const D: usize, const N: usize> Table<D, N> {
         }
     }
 
-    /// Position of a sample that lies inside.
+    /// Returns the table position of a sample whose window is inside.
     #[inline(always)]
     fn at(&self, sample: [i32; D]) -> i32 {
         let mut at = 0;
@@ -122,18 +123,19 @@ impl<const D: usize, const N: usize> Table<D, N> {
         at
     }
 
-    /// How far a step lies from a sample.
+    /// Returns the table offset of a step.
     fn step(&self, step: [i32; D]) -> i32 {
         step.iter().zip(&self.strides).map(|(s, n)| s * n).sum()
     }
 }
 
 #[inline(always)]
+/// Returns the first `N` numbers of a vector.
 fn first<const N: usize>(vector: &[i16; KEEP]) -> [i16; N] {
     std::array::from_fn(|k| vector[k])
 }
 
-/// Squared distance of two vectors: twelve bits each, so differences fit.
+/// Returns the squared distance of two vectors. They have 12 bits, so differences fit into 16.
 #[inline(always)]
 fn apart<const N: usize>(a: &[i16; N], b: &[i16; N]) -> i32 {
     let mut sum = 0;

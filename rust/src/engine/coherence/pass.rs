@@ -1,4 +1,4 @@
-//! What a correction is asked for, and whether it can be done.
+//! The arguments of a correction, their checks, and its start.
 
 use super::level::Level;
 use super::{CHUNK, FEW, LARGEST, Similarity};
@@ -10,40 +10,42 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Passes, at most: turns are counted by 32 bits.
+/// Maximum number of passes. Each pass has 2^D turns, which are counted in 32 bits.
 const MOST: usize = 1 << 24;
 
-/// What [`correct`] is asked for.
+/// Options of [`correct`].
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// Passes over the region.
+    /// Number of passes over the region.
     pub passes: usize,
-    /// Numbers of the appearance vectors that are compared: [`FEW`] or all.
+    /// Number of components of the appearance vectors that are compared: [`FEW`] or all.
     pub numbers: usize,
-    /// Read neighbours where the diagonal itself leads, not only where the lattice makes it end: x(q) + D - J q.
+    /// If true, read the vectors of neighbours at the exact diagonal, x(q) + D - J q, instead of at the lattice point
+    /// near it.
     pub compensated: bool,
 }
 
-/// What may lie where: points take candidates of the kind they want. Empty: anything anywhere.
+/// Kinds of samples: a point takes only candidates of the kind that it wants. If both slices are empty, all candidates
+/// are allowed.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Kinds<'a> {
-    /// Kind of each of the exemplar's samples.
+    /// Kind of each sample of the exemplar.
     pub samples: &'a [u8],
-    /// Kind that each point wants; [`Kinds::ANY`] takes any.
+    /// Kind that each point wants; [`Kinds::ANY`] accepts every kind.
     pub points: &'a [u8],
 }
 
 impl Kinds<'_> {
-    /// What a point wants that does not care.
+    /// The kind of a point that accepts every kind.
     pub const ANY: u8 = 255;
 }
 
-/// Corrects `places`, one a point of `region`; points that are `held` keep theirs, and so do those that are offered
-/// nothing of the kind they want.
+/// Corrects `places`, one for each point of `region`. Points that are `held` keep their places. So do points without a
+/// candidate of the kind that they want.
 ///
-/// A pass goes over 2^D classes of points, those of the same parity along each axis, in fixed order. Points of a class
-/// are corrected all at once, from the places as the class found them.
-#[allow(clippy::too_many_arguments)] // the exemplar, the region, and what is known of both
+/// A pass visits 2^D classes of points in a fixed order; the points of a class have the same parity along each axis.
+/// All points of a class are corrected at once, from the places before the class.
+#[allow(clippy::too_many_arguments)] // the exemplar, the region, and their properties
 pub fn correct<const D: usize>(
     appearance: &Appearance<D>,
     similarity: &Similarity,
@@ -60,9 +62,13 @@ pub fn correct<const D: usize>(
     frames.check(points)?;
     memory::room("the corrected coordinates", points, 32 * D)?;
     if !(1..=LARGEST).contains(&similarity.k) {
-        let message = format!("needs sets of 1 to {LARGEST}, got {}", similarity.k);
+        let message = format!(
+            "must have 1 to {LARGEST} samples in each set, got {}",
+            similarity.k
+        );
         return Err(Error::value("similarity", message));
     }
+    // Empty `held` and `kinds` mean no restriction, so they have no required length.
     for (argument, length, wanted) in [
         ("places", places.len(), points),
         ("held", held.len(), if held.is_empty() { 0 } else { points }),
@@ -81,13 +87,14 @@ pub fn correct<const D: usize>(
         check_shape(argument, &[wanted], length)?;
     }
     memory::room("the similarity sets", similarity.sets.len(), 8)?;
-    // Each sample once, for divisions cost more than all else here.
+    // Compute the flag once for each sample: divisions are the costliest step here.
     let inside: Vec<bool> = (0..samples)
         .map(|s| {
             let sample = appearance.grid().point(s).map(|x| x as i32);
             appearance.inside(sample).is_some()
         })
         .collect();
+    // Candidates are read with a margin, so each must be the sample itself or have its window inside.
     let sets = similarity.sets.chunks_exact(similarity.k);
     let sound = sets.enumerate().all(|(i, set)| {
         let allowed = |&s: &u32| s as usize == i || inside.get(s as usize).is_some_and(|&b| b);
@@ -97,7 +104,7 @@ pub fn correct<const D: usize>(
         return Err(Error::value(
             "similarity",
             format!(
-                "needs sets of 1 to {LARGEST} of the exemplar's {samples} samples whose windows lie inside"
+                "must contain only samples whose windows are inside the exemplar of {samples} samples"
             ),
         ));
     }
@@ -107,9 +114,10 @@ pub fn correct<const D: usize>(
         }
     });
     if options.passes > MOST {
-        let message = format!("up to {MOST} are allowed, got {}", options.passes);
+        let message = format!("must be at most {MOST}, got {}", options.passes);
         return Err(Error::value("passes", message));
     }
+    // The length of the vectors is a constant of the inner loops.
     match options.numbers {
         FEW => Level::<D, FEW>::new(appearance, similarity, region, frames, held, kinds, options)
             .run(places, monitor),
@@ -117,7 +125,7 @@ pub fn correct<const D: usize>(
             .run(places, monitor),
         other => Err(Error::value(
             "numbers",
-            format!("{FEW} or {KEEP} are allowed, got {other}"),
+            format!("must be {FEW} or {KEEP}, got {other}"),
         )),
     }
 }

@@ -1,4 +1,4 @@
-//! Similarity sets: the samples of an exemplar that look most like each one, far from it and from each other.
+//! Similarity sets: for each sample of an exemplar, the most similar samples that are far from it and from each other.
 
 use super::tree::{Place, Tree};
 use super::{FEW, LARGEST, first};
@@ -7,19 +7,21 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// What a sample of the exemplar may be replaced by.
+/// The similarity set of each sample of an exemplar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Similarity {
-    /// Samples of a set, the sample itself among them.
+    /// Number of samples in a set, including the sample itself.
     pub k: usize,
-    /// `k` row-major positions for each sample, the sample's own first; all its own where its window does not lie inside.
+    /// `k` row-major positions for each sample, starting with its own. All are its own if its window is not inside the
+    /// exemplar.
     pub sets: Vec<u32>,
 }
 
-/// The similarity set of each sample: C_1 is the sample, and each further C_j the nearest in the first `numbers` of the
-/// appearance vectors ([`FEW`] or all) of those more than (n - 1) / 2 away, along some axis, from every earlier one.
+/// Finds the similarity set of each sample. C_1 is the sample itself. Each further C_j is the nearest in the first
+/// `numbers` of the appearance vectors ([`FEW`] or all). It must be more than (n - 1) / 2 away, along some axis, from
+/// every earlier one.
 ///
-/// The whole exemplar is searched; of equally near samples the first one is taken.
+/// The whole exemplar is searched. If distances are equal, the first sample is taken.
 pub fn similar<const D: usize>(
     appearance: &Appearance<D>,
     k: usize,
@@ -30,13 +32,16 @@ pub fn similar<const D: usize>(
     if !(1..=LARGEST).contains(&k) || n.is_multiple_of(2) || n > i32::MAX as usize {
         return Err(Error::value(
             "k",
-            format!("1 to {LARGEST} samples an odd n apart are allowed, got k = {k} and n = {n}"),
+            format!("must be 1 to {LARGEST} with an odd n, got k = {k} and n = {n}"),
         ));
     }
     if appearance.grid().len() > u32::MAX as usize / 2 {
         return Err(Error::value(
             "exemplar",
-            format!("{:?} has too many samples", appearance.grid().shape()),
+            format!(
+                "must have at most 2^31 - 1 samples, got shape {:?}",
+                appearance.grid().shape()
+            ),
         ));
     }
     memory::room("the similarity sets", appearance.grid().len(), 128 + 8 * k)?;
@@ -46,13 +51,14 @@ pub fn similar<const D: usize>(
         _ => {
             return Err(Error::value(
                 "numbers",
-                format!("{FEW} or {KEEP} are allowed, got {numbers}"),
+                format!("must be {FEW} or {KEEP}, got {numbers}"),
             ));
         }
     };
     Ok(Similarity { k, sets })
 }
 
+/// Finds the sets by the first `N` numbers of the vectors.
 fn search<const D: usize, const N: usize>(
     appearance: &Appearance<D>,
     k: usize,
@@ -60,6 +66,7 @@ fn search<const D: usize, const N: usize>(
     monitor: &Monitor,
 ) -> Result<Vec<u32>> {
     let grid = appearance.grid();
+    // Only samples whose windows are inside the exemplar have vectors.
     let samples = (0..grid.len()).filter_map(|number| {
         let sample = grid.point(number).map(|x| x as i32);
         appearance.inside(sample)?;
@@ -73,7 +80,7 @@ fn search<const D: usize, const N: usize>(
     let far = |a: [i32; D], b: [i32; D]| far(appearance, a, b, (n / 2) as i32);
 
     monitor.expect(tree.leaves() as u64);
-    // Leaf by leaf: what was looked at for one vector is at hand for the next.
+    // Search leaf by leaf: the vectors of a leaf visit the same boxes, which are still in the cache.
     let found = par::map(tree.leaves(), |leaf| {
         monitor.check()?;
         let mut sets = Vec::with_capacity(tree.places(leaf).len() * k);
@@ -95,6 +102,7 @@ fn search<const D: usize, const N: usize>(
         monitor.advance(1)?;
         Ok(Some(sets))
     });
+    // Samples without a vector have only themselves in their sets.
     let mut sets: Vec<u32> = (0..grid.len() as u32)
         .flat_map(|number| std::iter::repeat_n(number, k))
         .collect();
@@ -103,7 +111,7 @@ fn search<const D: usize, const N: usize>(
             return Err(Error::value(
                 "n",
                 format!(
-                    "an exemplar of {:?} has no {k} samples {n} apart for windows of radius {}: fewer, nearer ones, or a larger exemplar are needed",
+                    "must be smaller, because an exemplar of shape {:?} does not have {k} samples {n} apart for windows of radius {}; lower k or n, or use a larger exemplar",
                     grid.shape(),
                     appearance.radius()
                 ),
@@ -116,7 +124,7 @@ fn search<const D: usize, const N: usize>(
     Ok(sets)
 }
 
-/// Whether two samples are more than `reach` apart along some axis.
+/// Returns whether two samples are more than `reach` apart along some axis.
 #[inline(always)]
 fn far<const D: usize>(appearance: &Appearance<D>, a: [i32; D], b: [i32; D], reach: i32) -> bool {
     let (shape, wrap) = (appearance.grid().shape(), appearance.grid().wrap());

@@ -25,7 +25,7 @@ const OPTIONS: Options = Options {
     compensated: false,
 };
 
-/// By definition: every sample against every other one.
+/// Computes the sets by definition: compares each sample with every other one.
 fn brute<const D: usize>(appearance: &Appearance<D>, k: usize, n: i32) -> Vec<u32> {
     let grid = appearance.grid();
     let point = |i: usize| grid.point(i).map(|x| x as i32);
@@ -236,7 +236,7 @@ fn points_take_only_the_kind_they_want() {
     let sets = similar(&exemplar, 3, 7, FEW, &Monitor::default()).unwrap();
     let kind = |sample: [i32; 2]| u8::from(sample[1].rem_euclid(24) < 12);
     let samples: Vec<u8> = (0..576).map(|i| kind([i / 24, i % 24])).collect();
-    // Each half of the output starts from the half of the exemplar that it wants.
+    // Each half of the output starts from the half of the exemplar that has the kind it wants.
     let points: Vec<u8> = (0..400).map(|p| u8::from(p % 20 < 10)).collect();
     let mut places: Vec<Place<2>> = (0..400)
         .map(|p| {

@@ -1,4 +1,4 @@
-//! Windows of the output, in the axes of the exemplar.
+//! Windows of the output, along the axes of the exemplar.
 
 use super::{CHUNK, Level};
 use crate::engine::appearance::{Colour, Feature};
@@ -8,8 +8,8 @@ use crate::foundation::fixed::{
 use crate::foundation::par;
 use std::ops::Range;
 
-/// The output's colours as they are, where frames leave everything in place: a window is a box of them. Of some points,
-/// and as many before and behind as windows reach.
+/// The colours of a range of the output and of the points within the reach of windows. Only filled if all frames are
+/// the identity: then a window is a box of these colours.
 #[derive(Default)]
 pub(super) struct Seen {
     first: usize,
@@ -17,6 +17,7 @@ pub(super) struct Seen {
 }
 
 impl Seen {
+    /// Reads the colours of a range of points.
     pub(super) fn look<const D: usize>(
         &mut self,
         level: &Level<'_, D>,
@@ -42,34 +43,35 @@ impl Seen {
 }
 
 impl<const D: usize> Level<'_, D> {
-    /// How far apart in row-major order a point and another of its window are.
+    /// Returns the maximum distance between a point and another of its window, in row-major order.
     pub(super) fn margin(&self) -> usize {
         let rows: usize = self.region.grid.strides().iter().sum();
         self.appearance.radius() * rows
     }
 }
 
-/// Where one offset of a window looks.
+/// The position that an offset o of a window reads.
 struct Look<const D: usize> {
-    /// The point of the output nearest to F o, and how far away that is in row-major order.
+    /// The step to the point of the output nearest to F o; `across` is the same step in row-major order.
     step: [i32; D],
     across: isize,
-    /// o - J step: without it turned textures come out at the wrong scale.
+    /// The remainder o - J step. Without it, rotated textures would get the wrong scale.
     rest: Place<D>,
 }
 
-/// Looks at windows, one after the other; where to look is worked out anew only where the frame changes.
+/// Reads windows one after another. Recomputes the positions only if the frame changes.
 pub(super) struct Eye<'a, const D: usize> {
     level: &'a Level<'a, D>,
     seen: &'a Seen,
     window: Vec<i16>,
     frame: Option<Frame<D>>,
     looks: Vec<Look<D>>,
-    /// How far looks reach along each axis of the output; none where they must be checked one by one.
+    /// Distance that the positions reach along each axis of the output; none if each position must be checked.
     reach: Option<[usize; D]>,
 }
 
 impl<'a, const D: usize> Eye<'a, D> {
+    /// Creates a reader; a constant frame is set here, once.
     pub(super) fn new(level: &'a Level<'a, D>, seen: &'a Seen) -> Self {
         let mut eye = Self {
             level,
@@ -85,7 +87,7 @@ impl<'a, const D: usize> Eye<'a, D> {
         eye
     }
 
-    /// The appearance vector of the window around a point.
+    /// Returns the appearance vector of the window around a point.
     #[inline(always)]
     pub(super) fn window(&mut self, places: &[Place<D>], p: usize) -> Feature {
         let grid = &self.level.region.grid;
@@ -97,6 +99,7 @@ impl<'a, const D: usize> Eye<'a, D> {
         let interior = self.reach.is_some_and(|reach| {
             (0..D).all(|a| point[a] >= reach[a] && point[a] + reach[a] < grid.shape()[a])
         });
+        // Choose the fastest way to read that is allowed here.
         if !interior {
             self.look_around(places, p, point);
         } else if self.seen.colours.is_empty() {
@@ -112,7 +115,7 @@ impl<'a, const D: usize> Eye<'a, D> {
         self.level.appearance.project(&mut self.window)
     }
 
-    /// Works out where windows look under a frame.
+    /// Computes the positions that windows read under a frame.
     fn turn(&mut self, frame: Frame<D>) {
         let appearance = self.level.appearance;
         let strides = self.level.region.grid.strides();
@@ -134,7 +137,8 @@ impl<'a, const D: usize> Eye<'a, D> {
             Look { step, across, rest }
         }));
         self.frame = Some(frame);
-        // Places lie inside, and the exemplar's rim is as wide as windows reach: what is nearer than that needs no check.
+        // Skip the checks if the remainders are short: places are inside, and the margin of the exemplar is wider than
+        // windows.
         let near = frame == identity()
             || frame
                 .iter()
@@ -144,7 +148,7 @@ impl<'a, const D: usize> Eye<'a, D> {
         });
     }
 
-    /// Looks where everything is known to be inside.
+    /// Reads a window that is known to be inside.
     #[inline(always)]
     fn look(&mut self, places: &[Place<D>], p: usize) {
         let appearance = self.level.appearance;
@@ -155,7 +159,8 @@ impl<'a, const D: usize> Eye<'a, D> {
         }
     }
 
-    /// Looks where the region or the exemplar may end: what is not there goes on as the point's own piece.
+    /// Reads a window near the end of the region or of the exemplar. Outside the region, the patch of the point
+    /// continues.
     fn look_around(&mut self, places: &[Place<D>], p: usize, point: [usize; D]) {
         let appearance = self.level.appearance;
         let looks = self.looks.iter().zip(appearance.offsets());

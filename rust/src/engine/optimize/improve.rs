@@ -1,4 +1,4 @@
-//! A better match for a point, from its neighbours and drawn.
+//! The search for a better match of a point, among its neighbours' matches and drawn ones.
 
 use super::gather::{Eye, Seen};
 use super::{FINEST, Level};
@@ -8,21 +8,21 @@ use crate::foundation::fixed::{ONE, Place, add, apply, nearest};
 use crate::foundation::hash::Noise;
 use crate::foundation::par::Monitor;
 
-/// Matches drawn around the best: within the exemplar, then a half of it, a quarter and so on.
+/// Number of matches drawn around the best one: within the whole exemplar, then half of it, a quarter and so on.
 const DRAWS: usize = 6;
 
-/// What stays the same in a pass.
+/// Values that are constant in a pass.
 struct Search {
     noise: Noise,
     number: u32,
-    /// What a drawn match must be better by.
+    /// The minimum improvement of a drawn match.
     limit: i64,
-    /// What each neighbour costs whose piece of the exemplar is another.
+    /// The cost of each neighbour that shows another patch of the exemplar.
     coherence: i64,
 }
 
 impl<const D: usize> Level<'_, D> {
-    /// The match of every point that a pass corrects.
+    /// Finds the match of every point that a pass corrects.
     pub(super) fn matches(
         &self,
         places: &[Place<D>],
@@ -30,7 +30,7 @@ impl<const D: usize> Level<'_, D> {
         number: u32,
         monitor: &Monitor,
     ) -> Result<()> {
-        // An exemplar that repeats has no spacing, but rounding of colours still leaves some.
+        // A periodic exemplar has a spacing of 0, but rounded colours still differ a little.
         let spacing = f64::from(self.appearance.spacing().max(FINEST));
         let search = Search {
             noise: Noise::new(self.options.seed).part(3),
@@ -38,6 +38,7 @@ impl<const D: usize> Level<'_, D> {
             limit: (self.options.acceptance * spacing) as i64,
             coherence: (self.options.coherence * spacing) as i64,
         };
+        // Work in slabs, so that the colours of identity frames need little memory.
         let mut seen = Seen::default();
         let slab = self.slab();
         for start in (0..places.len()).step_by(slab) {
@@ -57,6 +58,7 @@ impl<const D: usize> Level<'_, D> {
     }
 
     #[inline(always)]
+    /// Returns the best match for a point.
     fn improve(
         &self,
         places: &[Place<D>],
@@ -68,6 +70,7 @@ impl<const D: usize> Level<'_, D> {
         let feature = &eye.window(places, p);
         let point = region.grid.point(p);
         let frame = self.frames.at(p);
+        // Start from the present place, so that equal matches change nothing.
         let mut best = places[p];
         let mut at = appearance.clamped(nearest(best));
         let cost_of = |at| i64::from(distance(feature, appearance.feature(at))) + self.asked(p, at);
@@ -83,7 +86,7 @@ impl<const D: usize> Level<'_, D> {
                 }
             }
         }
-        // What the neighbours propose: those beside the point come first.
+        // Collect the proposals of the neighbours. The adjacent ones come first.
         let mut proposals = [(best, at); 12];
         let (mut count, mut beside) = (0, 0);
         for far in 1..=self.options.reach {
@@ -106,6 +109,7 @@ impl<const D: usize> Level<'_, D> {
                 beside = count;
             }
         }
+        // The coherence cost of a place: the adjacent proposals that belong to another patch.
         let apart = |place: Place<D>| -> i64 {
             if search.coherence == 0 {
                 return 0;
@@ -124,14 +128,16 @@ impl<const D: usize> Level<'_, D> {
                 }
             }
         }
-        // None that is drawn can be better by enough: hardly any is nearer than the exemplar's own windows are.
+        // Stop here if no drawn match can be better by the limit: windows of the exemplar are hardly ever nearer than
+        // their spacing.
         if least <= search.limit + search.limit / 2 {
             return best;
         }
         let world = region.world(point);
-        // All around the same one, so that their costs are read from memory at once.
+        // Draw all candidates around one place, so that their costs are close in memory.
         let drawn: [Place<D>; DRAWS] = std::array::from_fn(|draw| {
             let words = search.noise.at(world, search.number << 8 | draw as u32);
+            // The first draw takes a sample near the value that the guide wants.
             if draw == 0
                 && let Some(near) = self.guide.and_then(|g| g.near(p, words[0]))
             {
@@ -148,6 +154,7 @@ impl<const D: usize> Level<'_, D> {
             Some(there) => cost_of(there),
             None => i64::MAX / 2,
         });
+        // Compute the coherence cost only if the match could win without it.
         for (place, cost) in drawn.into_iter().zip(costs) {
             let cost = cost + search.limit;
             if cost < least {

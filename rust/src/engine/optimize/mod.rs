@@ -1,19 +1,20 @@
-//! Texture optimisation: coordinates corrected until every window of the output is like one of the exemplar.
+//! Texture optimisation: coordinates are corrected until every window of the output resembles one of the exemplar.
 //!
-//! Kwatra et al., *Texture optimization for example-based synthesis*, SIGGRAPH 2005, on coordinates instead of colours:
-//! the last word of every step is a copy. A pass corrects every other point, as on a chess board: where two pieces of the
-//! exemplar meet, neighbours that look at each other at once would only swap. For each of its points it
+//! The method is by Kwatra et al., *Texture optimization for example-based synthesis*, SIGGRAPH 2005, applied to
+//! coordinates instead of colours, so each step copies. A pass corrects every other point, as on a chessboard.
+//! Otherwise neighbours at the border of two patches would read each other at once and only swap. For each of its
+//! points a pass does the following:
 //!
-//! 1. gathers the window around it, in the exemplar's axes, through the coordinates as they are;
-//! 2. looks for a better match among those of its neighbours (Barnes et al., *PatchMatch*, SIGGRAPH 2009) and a few drawn
-//!    around the best;
-//! 3. votes: takes one of the coordinates that the windows around it propose.
+//! 1. It gathers the window around the point, along the exemplar's axes, through the present coordinates.
+//! 2. It looks for a better match among the neighbours' matches (Barnes et al., *PatchMatch*, SIGGRAPH 2009) and a few
+//!    drawn around the best.
+//! 3. It votes: it takes one of the coordinates that the windows around the point propose.
 //!
-//! Departures: a drawn match must be better by some of the exemplar's own spacing (an acceptance threshold), so that what is good
-//! enough stays and sparse features are not washed out. Points whose neighbours all go on with the same piece of the
-//! exemplar are left: only where pieces meet is there anything to correct. So are those around which nothing changed since
-//! they were corrected last. Coordinates are displaced by the frame's
-//! Jacobian wherever a window or a match is carried from one point to another (Lefebvre and Hoppe, 2006).
+//! There are three departures from the papers. A drawn match must be better by a multiple of the exemplar's own
+//! spacing (an acceptance threshold). So good matches stay, and sparse features are not washed out. A point is skipped
+//! if all its neighbours show the same patch of the exemplar, because only borders of patches need corrections. It is
+//! also skipped if nothing around it has changed since its last correction. The frame's Jacobian displaces a window or
+//! a match that is carried to another point (Lefebvre and Hoppe, 2006).
 
 mod gather;
 mod improve;
@@ -31,42 +32,43 @@ use crate::{Error, Result};
 
 use self::recent::Recent;
 
-/// Points that a task takes at a time.
+/// Number of points in a task.
 const CHUNK: usize = 2048;
-/// Distance of windows below which they are the same.
+/// Windows at this distance or nearer count as equal.
 const FINEST: i32 = UNIT / 256;
-/// How far a change makes points look again.
+/// Distance from a change, in points, within which points are corrected again.
 const NEAR: usize = 1;
-/// What the acceptance and the coherence may be, at most.
+/// Maximum of the acceptance and the coherence.
 const DEAREST: f64 = 1e6;
-/// Points between two looks at whether to stop, at least.
+/// Minimum number of points between two checks for cancellation.
 const SLAB: usize = 1 << 18;
 
-/// What [`correct`] is asked for.
+/// Options of [`correct`].
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// Passes, at most; each corrects every other point.
+    /// Maximum number of passes. Each corrects every other point.
     pub passes: usize,
-    /// Number of the first, for work that is done in parts.
+    /// Number of the first pass, if several calls share the work.
     pub first: u32,
-    /// Compare each window with all of the exemplar's as well: for small ones.
+    /// If true, also compare each window with all windows of the exemplar. For small exemplars.
     pub exhaustive: bool,
-    /// How far the neighbours are whose matches are tried, 1 or 2.
+    /// Distance of the neighbours whose matches are tried, 1 or 2 points.
     pub reach: i32,
-    /// Acceptance threshold: how much better a drawn match must be, in units of the exemplar's spacing.
+    /// Acceptance threshold: the minimum improvement of a drawn match, in units of the exemplar's spacing.
     pub acceptance: f64,
-    /// Coherence penalty: what each neighbour costs whose piece of the exemplar is another, in units of the exemplar's spacing.
+    /// Coherence penalty: the cost of each neighbour that shows another patch of the exemplar, in units of the
+    /// exemplar's spacing.
     pub coherence: f64,
-    /// Radius of the vote; 0: each point takes the match of its own window.
+    /// Radius of the vote, in points. At 0 each point takes the match of its own window.
     pub vote: usize,
-    /// Stop when two passes change less than this share of the points; 0: never, for results that must not hang on
-    /// distant ones.
+    /// Stop if two passes change less than this share of the points. At 0 never stop early, so that results do not
+    /// depend on distant points.
     pub settled: f64,
-    /// Chooses the texture; another for each resolution.
+    /// Seed of the random numbers. It should differ for each resolution.
     pub seed: u64,
 }
 
-/// All that stays the same while a level is corrected.
+/// Values that are constant while a level is corrected.
 struct Level<'a, const D: usize> {
     appearance: &'a Appearance<D>,
     region: &'a Region<D>,
@@ -74,14 +76,14 @@ struct Level<'a, const D: usize> {
     guide: Option<&'a Guide<'a>>,
     held: &'a [bool],
     options: &'a Options,
-    /// Steps to all neighbours, corners included.
+    /// Steps to all neighbours, including diagonal ones.
     around: Vec<[i32; D]>,
     recent: Recent,
 }
 
-/// Corrects `places`, one a point of `region`, and returns the number of passes and the share of the points that the
-/// last two changed. Points that are `held` are hard constraints: they keep their places.
-#[allow(clippy::too_many_arguments)] // the exemplar, the region, and what is known of it
+/// Corrects `places`, one for each point of `region`. Points that are `held` are hard constraints: they keep their
+/// places. Returns the number of passes, and the share of the points that the last two passes changed.
+#[allow(clippy::too_many_arguments)] // the exemplar, the region, and their properties
 pub fn correct<const D: usize>(
     appearance: &Appearance<D>,
     region: &Region<D>,
@@ -101,7 +103,7 @@ pub fn correct<const D: usize>(
         return Err(Error::value(
             "options",
             format!(
-                "neighbours 1 or 2 away and a vote within the windows are allowed, got {options:?}"
+                "must have a reach of 1 or 2 and a vote of at most the radius of windows, got {options:?}"
             ),
         ));
     }
@@ -109,10 +111,13 @@ pub fn correct<const D: usize>(
     if !costs.iter().all(|x| (0.0..=DEAREST).contains(x)) || options.settled.is_nan() {
         return Err(Error::value(
             "options",
-            format!("acceptance and coherence from 0 to {DEAREST:e} are allowed, got {options:?}"),
+            format!(
+                "must have acceptance and coherence from 0 to {DEAREST:e}, and a settled share, got {options:?}"
+            ),
         ));
     }
     frames.check(points)?;
+    // A vote needs a second copy of the places.
     let copies = if options.vote > 0 { 2 * points } else { points };
     memory::room("the matches of a region", copies, 4 * D + 4)?;
     par::chunks_mut(places, CHUNK, |_, places| {
@@ -133,7 +138,7 @@ pub fn correct<const D: usize>(
     monitor.expect(options.passes.saturating_mul(points.div_ceil(level.slab())) as u64);
     let mut matches = places.to_vec();
     let mut elected = vec![[0; D]; if options.vote > 0 { points } else { 0 }];
-    // What is before a pass and what is after it take turns.
+    // Swap the buffers after each pass.
     let (mut before, mut matches, mut elected) = (places, &mut matches[..], &mut elected[..]);
     let (mut moved, mut done) = ([0, 0], 0);
     while done < options.passes {
@@ -145,6 +150,7 @@ pub fn correct<const D: usize>(
         } else {
             &mut matches
         };
+        // Two passes correct all points once, so the changes of both count.
         moved = [moved[1], level.recent.note(before, newest)];
         std::mem::swap(&mut before, newest);
         done += 1;
@@ -155,6 +161,7 @@ pub fn correct<const D: usize>(
             level.recent.spread(&region.grid);
         }
     }
+    // After an odd number of passes the result is in a buffer of this function: copy it to the caller's.
     if done % 2 == 1 {
         let places = if options.vote > 0 { elected } else { matches };
         places.copy_from_slice(before);
@@ -163,19 +170,21 @@ pub fn correct<const D: usize>(
 }
 
 impl<const D: usize> Level<'_, D> {
-    /// Points that are corrected between two looks at whether to stop: many more than windows reach beyond them.
+    /// Returns the number of points between two checks for cancellation. It is much larger than the reach of windows,
+    /// which is computed twice.
     fn slab(&self) -> usize {
         SLAB.max(8 * self.margin())
     }
 
-    /// What the guide says of showing a sample at a point.
+    /// Returns the cost of showing a sample at a point by the guide.
     #[inline(always)]
     fn asked(&self, point: usize, sample: usize) -> i64 {
         self.guide.as_ref().map_or(0, |g| g.cost(point, sample))
     }
 
-    /// Whether a pass corrects a point: one of its colour of the chess board that sees something new, where pieces of
-    /// the exemplar meet.
+    /// Returns whether a pass corrects a point. The point must have the colour of the pass on the chessboard, a recent
+    /// change nearby, and another patch next to it. With a guide or an exhaustive search the last condition is not
+    /// required.
     #[inline(always)]
     fn corrects(&self, places: &[Place<D>], p: usize, pass: u32) -> bool {
         let point = self.region.grid.point(p);
@@ -187,7 +196,7 @@ impl<const D: usize> Level<'_, D> {
             && (self.options.exhaustive || self.guide.is_some() || self.meet(places, p, point))
     }
 
-    /// Whether a neighbour of a point does not go on with the point's own piece of the exemplar.
+    /// Returns whether a neighbour of a point shows another patch than the point.
     #[inline(always)]
     fn meet(&self, places: &[Place<D>], p: usize, point: [usize; D]) -> bool {
         let frame = self.frames.at(p);
@@ -199,7 +208,8 @@ impl<const D: usize> Level<'_, D> {
         })
     }
 
-    /// Runs `each`, with scratch memory of its own, on the points that a pass corrects; the others keep their places.
+    /// Runs `each`, with its own scratch memory, on the points that a pass corrects. The other points keep their
+    /// places.
     fn pass<S>(
         &self,
         places: &[Place<D>],
@@ -223,7 +233,7 @@ impl<const D: usize> Level<'_, D> {
     }
 }
 
-/// Steps to all neighbours, corners included.
+/// Returns the steps to all neighbours, including diagonal ones.
 fn around<const D: usize>() -> Vec<[i32; D]> {
     (0..3usize.pow(D as u32))
         .map(|mut k| {

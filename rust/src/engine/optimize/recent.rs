@@ -1,21 +1,23 @@
-//! Where something changed lately. Elsewhere a window looks much as it did when its point was corrected last, and another
-//! look would find what that one found: a change of a neighbour moves a point, one further off hardly ever does.
+//! Recent changes, near which points are corrected again. Elsewhere a window is much the same as at the last
+//! correction, so another search would find the same match. A change next to a point often moves it, a distant change
+//! hardly ever.
 
 use super::CHUNK;
 use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 
-/// The points around which a place changed in one of the last two passes: one of each colour of the chess board.
+/// The points near a place that changed in one of the last two passes, one of each colour of the chessboard.
 pub(super) struct Recent {
     radius: usize,
-    /// One bit a pass, the last one lowest.
+    /// One bit for each of two passes; the lowest bit is the latest pass.
     changed: Vec<u8>,
-    /// Not zero near a change; empty before there are two passes to look back on.
+    /// Not zero near a change. Empty until two passes are complete.
     near: Vec<u8>,
 }
 
 impl Recent {
+    /// Starts without changes.
     pub(super) fn new(points: usize, radius: usize) -> Self {
         Self {
             radius,
@@ -24,13 +26,13 @@ impl Recent {
         }
     }
 
-    /// Whether there is anything new for a point to see.
+    /// Returns whether there is a change near a point.
     #[inline(always)]
     pub(super) fn near(&self, p: usize) -> bool {
         self.near.is_empty() || self.near[p] != 0
     }
 
-    /// Notes what a pass changed, and returns how many points that is.
+    /// Records the changes of a pass, and returns their number.
     pub(super) fn note<const D: usize>(
         &mut self,
         before: &[Place<D>],
@@ -55,7 +57,7 @@ impl Recent {
             .sum()
     }
 
-    /// Finds all points near the changes: a box, one axis after the other.
+    /// Marks all points in a box around each change, one axis after another.
     pub(super) fn spread<const D: usize>(&mut self, grid: &Grid<D>) {
         let row = grid.shape()[D - 1];
         let mut from = self.changed.clone();
@@ -82,14 +84,14 @@ impl Recent {
     }
 }
 
-/// What is set in either.
+/// Sets the bits of `from` in `to`.
 fn join(to: &mut [u8], from: &[u8]) {
     for (to, &from) in to.iter_mut().zip(from) {
         *to |= from;
     }
 }
 
-/// Spreads what is set along a row.
+/// Spreads the bits along a row.
 fn along(from: &[u8], to: &mut [u8], radius: usize, wrap: bool) {
     let n = from.len();
     to.copy_from_slice(from);

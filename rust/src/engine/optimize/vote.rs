@@ -1,16 +1,17 @@
-//! One coordinate for each point, out of those that the windows around it propose.
+//! The vote: one place for each point, chosen from the proposals of the windows around it.
 
 use super::Level;
 use crate::engine::appearance::{CHANNELS, Colour, UNIT};
 use crate::foundation::fixed::{Place, add, apply, nearest};
 use crate::foundation::libm::exp;
 
-/// Standard deviation of a proposal's weight over the distance of its window, in points.
+/// Standard deviation of the weights of proposals over the distance of their windows, in points.
 const SIGMA: f64 = 2.0;
-/// How much a proposal from far away must be nearer to the mean, as a share of the variance of colours.
+/// Handicap of a proposal from a distant window, in units of the variance of colours.
 const DISTANCE: f64 = 0.03;
 
-/// A window that proposes: the step to its centre, and the weight of what it says in 1/256.
+/// A window that proposes a place: the step to its centre, the weight of its colour in units of 1/256, and its
+/// handicap.
 struct Voter<const D: usize> {
     step: [i32; D],
     weight: i32,
@@ -18,8 +19,8 @@ struct Voter<const D: usize> {
 }
 
 impl<const D: usize> Level<'_, D> {
-    /// Takes, for each point that a pass corrects, the proposal nearest in colour to the weighted mean of all of them: a
-    /// copy, never an average.
+    /// Gives each point that a pass corrects the proposal nearest in colour to the weighted mean of all proposals. The
+    /// result is a copy, never an average.
     pub(super) fn vote(
         &self,
         places: &[Place<D>],
@@ -28,7 +29,7 @@ impl<const D: usize> Level<'_, D> {
         number: u32,
     ) {
         let voters = self.voters(self.options.vote as i32);
-        // From the units of vectors to those of colours.
+        // Factor from the units of vectors to the units of colours.
         let unit = (256.0 * self.appearance.colour_variance() / f64::from(UNIT)) as i64;
         let all = 0..places.len();
         self.pass(places, all, to, number, Vec::new, |proposals, p| {
@@ -36,6 +37,7 @@ impl<const D: usize> Level<'_, D> {
         });
     }
 
+    /// Returns the windows that vote for a point, with their weights.
     fn voters(&self, radius: i32) -> Vec<Voter<D>> {
         let variance = self.appearance.colour_variance();
         self.appearance
@@ -55,6 +57,7 @@ impl<const D: usize> Level<'_, D> {
     }
 
     #[inline(always)]
+    /// Returns the proposal that wins the vote for a point.
     fn elect(
         &self,
         matches: &[Place<D>],
@@ -73,6 +76,7 @@ impl<const D: usize> Level<'_, D> {
             let Some(q) = self.region.step(point, voter.step) else {
                 continue;
             };
+            // Carry the match of the window back to the point by the frame.
             let place = add(matches[q], apply(&frame, voter.step.map(|x| -x)));
             if let Some(at) = appearance.inside(nearest(place)) {
                 let colour = appearance.colour(at);
@@ -84,6 +88,7 @@ impl<const D: usize> Level<'_, D> {
                 proposals.push((place, colour, voter.handicap + asked));
             }
         }
+        // Choose the proposal with the colour nearest to the weighted mean.
         let mut best = (i64::MAX, matches[p]);
         for &(place, colour, handicap) in proposals.iter() {
             let mut cost = handicap;
