@@ -102,10 +102,10 @@ def test_coordinates_may_jump_and_end():
     ("work", "words"),
     [
         (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4, 3))), "normals: no pixel shows a surface"),
-        (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4))), "normals: needs numbers of shape"),
+        (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4))), "normals: must be numbers of shape"),
         (lambda: scale_maps.jacobians_of_normals(make_column(), green="left"), "green: must be one of up, down"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 2))), "coordinates: no pixel shows a surface"),
-        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((1, 4, 2))), "coordinates: needs two rows"),
+        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((1, 4, 2))), "coordinates: must have at least two rows"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 3))), "coordinates: needs shape"),
     ],
 )
@@ -265,7 +265,7 @@ def test_a_column_that_repeats(weave):
         ({"target": "plane:slant=99"}, "target: slant: needs a number from 0 to 88"),
         ({"target": "plane:slant=80,fov=90"}, "target: the horizon of a plane at 80 degrees lies inside"),
         ({"target": np.zeros((8, 8, 2, 2))}, "target: 64 of 64 matrices are flat"),
-        ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: needs finite numbers"),
+        ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),
         ({"target": np.zeros((8, 8, 3))}, "target: normals: no pixel shows a surface"),
         ({"target": np.zeros((8, 8, 2), np.uint8)}, "target: coordinates .* need floats"),
         ({"target": np.ones((8, 8, 3, 3))}, "target: needs shape"),

@@ -77,7 +77,7 @@ def test_one_pixel_has_a_scale() -> None:
         ({"tilt": np.inf}, r"^tilt: .* got inf$"),
         ({"tilt": "up"}, r"^tilt: needs a number .* got 'up'$"),
         ({"fov": 180}, r"^fov: needs a number from 1 to 170, got 180$"),
-        ({"slant": 80, "fov": 90}, r"^slant: at 80 degrees the plane's horizon lies inside a picture that spans 90"),
+        ({"slant": 80, "fov": 90}, r"^slant: at 80 degrees the plane's horizon is inside an image with a fov of 90"),
         ({"shape": (0, 5)}, r"^shape: each side must be at least 1"),
         ({"shape": (2**20, 2**20)}, r"^shape: .* more than the limit"),
     ],
@@ -139,13 +139,13 @@ def test_user_and_angles_do_not_need_a_map() -> None:
     ("arguments", "options", "message"),
     [
         ((FLOOR, (5, 5), "tile"), {}, r"^mode: must be one of stretch, extend, user, angles; got 'tile'$"),
-        ((FLOOR, (5, 5), "user"), {}, r"^pattern: the mode 'user' needs a pattern of scales$"),
-        ((FLOOR, (5, 5), "angles"), {"slant": 4}, r"^tilt: the mode 'angles' needs a slant and a tilt$"),
+        ((FLOOR, (5, 5), "user"), {}, r"^pattern: the mode 'user' requires an array of scales$"),
+        ((FLOOR, (5, 5), "angles"), {"slant": 4}, r"^tilt: the mode 'angles' requires a slant and a tilt$"),
         ((FLOOR, (5, 0)), {}, r"^size: each side must be at least 1"),
         ((FLOOR - 5, (5, 5)), {}, r"^scale: \d+ of 4800 scales are outside 0.001 to 1000"),
         ((np.zeros((4, 4)), (5, 5)), {}, r"^scale: 16 of 16 scales are outside"),
         ((np.full((4, 4), np.nan), (5, 5)), {}, r"^scale: 16 of 16 values are NaN or infinite"),
-        ((np.full((4, 4), 128, np.uint8), (5, 5)), {}, r"^scale: needs float scales, got uint8; scale_maps.decode"),
+        ((np.full((4, 4), 128, np.uint8), (5, 5)), {}, r"^scale: must be floats, got uint8; convert"),
         ((np.ones((4, 4, 3)), (5, 5)), {}, r"^scale: needs shape \(rows, columns\), got \(4, 4, 3\)"),
         ((FLOOR, (5, 5), "user"), {"pattern": np.ones(4)}, r"^pattern: needs shape \(rows, columns\)"),
     ],
@@ -201,7 +201,7 @@ def test_one_known_pixel_is_enough() -> None:
 @pytest.mark.parametrize(
     ("scale", "known", "message"),
     [
-        (FLOOR, np.zeros(FLOOR.shape, bool), r"^known: no pixel of the map is known"),
+        (FLOOR, np.zeros(FLOOR.shape, bool), r"^known: must mark at least one pixel, got none$"),
         (FLOOR, np.ones((5, 5), bool), r"^known: needs shape \(60, 80\), got \(5, 5\)$"),
         (FLOOR, np.ones(FLOOR.shape), r"^known: needs bool or integers, got dtype float64$"),
         (-FLOOR, np.eye(60, 80, dtype=bool), r"^scale: 60 of 4800 scales are outside"),
@@ -252,8 +252,8 @@ def test_128_is_the_normal_size_and_the_ends_hold() -> None:
 @pytest.mark.parametrize(
     ("image", "encoding", "message"),
     [
-        (np.ones((4, 4)), "log2", r"^image: needs grey levels in uint8 or uint16, got float64; floats are scales"),
-        (np.eye(3, dtype=np.uint8)[None], "log2", r"^image: needs grey levels, got colours; a false-colour"),
+        (np.ones((4, 4)), "log2", r"^image: must be grey levels in uint8 or uint16, got float64; floats are scales"),
+        (np.eye(3, dtype=np.uint8)[None], "log2", r"^image: must be grey levels, got colours; a false-colour"),
         (np.ones((4, 4), np.uint8), "log10", r"^encoding: must be one of log2, paper; got 'log10'$"),
     ],
 )

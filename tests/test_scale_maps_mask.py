@@ -265,13 +265,13 @@ BLANK = np.zeros((64, 64), bool)
         (BLANK, {}, r"^mask: marks nothing, so there are no features to count; mark the elements"),
         (~BLANK, {}, r"^mask: marks every pixel, so there are no features to count"),
         (BLANK, {"measure": "area"}, r"^mask: marks nothing"),
-        (np.arange(64) < np.full((64, 1), 30), {}, r"^mask: holds too few features to count them in windows of \d+ pixels"),
-        (np.arange(64) < np.full((64, 1), 30), {"measure": "count"}, r"^mask: holds too few features"),
+        (np.arange(64) < np.full((64, 1), 30), {}, r"^mask: has too few features to count in windows of \d+ pixels"),
+        (np.arange(64) < np.full((64, 1), 30), {"measure": "count"}, r"^mask: has too few features"),
         (np.ones((64, 64)), {}, r"^mask: needs bool or integers, got dtype float64$"),
         (np.ones((64, 64, 3), bool), {}, r"^mask: needs shape \(64, 64\), got \(64, 64, 3\)$"),
         (np.eye(12, dtype=bool), {}, r"^mask: each side must be at least 16, got \(12, 12\)$"),
         (TILES.mask, {"known": BLANK}, r"^known: needs shape \(256, 256\), got \(64, 64\)$"),
-        (TILES.mask, {"known": np.zeros((256, 256), bool)}, r"^known: no pixel of the mask is known"),
+        (TILES.mask, {"known": np.zeros((256, 256), bool)}, r"^known: must mark at least one pixel, got none$"),
         (TILES.mask, {"known": TILES.mask}, r"^mask: marks every pixel"),
         (TILES.mask, {"window": 8}, r"^window: needs an integer from 16 to 256, got 8$"),
         (TILES.mask, {"measure": "volume"}, r"^measure: must be one of boundary, skeleton, count, area; got 'volume'$"),
@@ -290,7 +290,7 @@ def test_masks_without_features_are_refused(mask: np.ndarray, options: dict, mes
         (np.zeros((8, 64)), {}, r"^image: each side must be at least 16, got \(8, 64\)$"),
         (np.full((64, 64), np.nan), {}, r"^image: 4096 of 4096 values are NaN"),
         (TILES.image, {"known": BLANK}, r"^known: needs shape \(256, 256\), got \(64, 64\)$"),
-        (TILES.image, {"known": np.zeros((256, 256), bool)}, r"^known: no pixel of the picture is known"),
+        (TILES.image, {"known": np.zeros((256, 256), bool)}, r"^known: must mark at least one pixel, got none$"),
         (TILES.image, {"min_feature_size": 0}, r"^min_feature_size: needs a number from 0.5 to 64.0, got 0$"),
         (TILES.image, {"trend": "flat"}, r"^trend: must be one of"),
     ],
@@ -303,7 +303,7 @@ def test_pictures_without_features_are_refused(image: np.ndarray, options: dict,
 def test_a_picture_with_one_edge_has_too_few_features() -> None:
     image = np.zeros((64, 64), np.uint8)
     image[:, 30:] = 200
-    with pytest.raises(InvalidInput, match=r"^image: shows too few features"):
+    with pytest.raises(InvalidInput, match=r"^image: has too few features"):
         scale_maps.auto_mask(image)
 
 

@@ -1,32 +1,33 @@
-"""Scale maps: how large the elements are at each place of a picture.
+"""Scale maps: the apparent size of the elements at each pixel of an image.
 
-A scale map is a float32 array (rows, columns) that is 1 where elements have their normal size, 2 where they are seen
-twice as large. Only ratios count, so maps that are measured have a geometric mean of 1. Everything here takes maps
-and gives new ones; nothing is changed in place.
+A scale map is a float32 array (rows, columns). It is 1 where elements have their normal size, and 2 where they appear
+twice as large. Only ratios count, so measured maps have a geometric mean of 1. All functions return new maps and leave
+their arguments unchanged.
 
 ===================  ==========================================================================
-`ScaleMap`           an array that says whether it holds widths, or square roots of areas
-`from_mask`          the map measured from a mask of features
-`auto_mask`          a mask of features, found in the picture
-`Measuring`          how a map is measured in such a mask, where nobody gives one
-`from_angles`        the map of a plane seen aslant
-`slant_for_ratio`    the slant at which near elements are so many times as large as far ones
-`resample`           a map for another size: stretched, continued, drawn or by angles
-`extend`             a map continued into what is not known
+`ScaleMap`           a map that records its kind: widths, or square roots of areas
+`from_mask`          a map measured from a mask of features
+`auto_mask`          a mask of features, detected in the image
+`Measuring`          options for detecting a mask and measuring a map in one step
+`from_angles`        the map of an oblique plane
+`slant_for_ratio`    the slant for a ratio of the largest to the smallest elements
+`resample`           a map for another size: stretched, continued, given or from angles
+`extend`             a map continued into unknown pixels
 `edit`               a map changed by a list of edits
-`jacobians_of_...`   how surfaces are seen, by their normals or by the UV coordinates of a mesh
-`encode` `decode`    8-bit pictures of maps, for other programs
-`picture`            false colours with a scale bar, to look at
+`jacobians_of_...`   Jacobians of a surface, from its normals or from UV coordinates of a mesh
+`encode` `decode`    8-bit images of maps, for other programs
+`picture`            a false-colour image with a scale bar
 ===================  ==========================================================================
 
-What is seen aslant is as wide as it is near, and foreshortened besides: maps of widths (`from_angles`) are linear in the
-picture of a plane, and maps of areas (`from_mask`), which hold their square roots, are the power 3/2 of those. What makes maps
-gives a `ScaleMap`, which says which of them it is, and PNG and TIFF files keep that; of other arrays it is told by which fits.
+Elements on an oblique plane become smaller with distance, and they are also foreshortened along the slope. Maps of
+widths (`from_angles`) are linear in the image of a plane. Maps of areas (`from_mask`) contain the square roots of
+areas, which are the power 3/2 of the widths. Functions that create a map return a `ScaleMap`, which records its kind,
+and PNG and TIFF files keep the kind. For other arrays, texrs assumes the kind that fits a plane better.
 
-Two angles say how a plane lies. `slant` is that between the line of sight and the plane's normal: 0 is seen from the
-front, 85 nearly edge on. `tilt` is the direction in the picture in which depth grows, in degrees counter-clockwise from
-the right (+x) with y up: a floor that runs away upwards has 90. Dong, Zhou and Paul [1]_ measure it from +y towards +x,
-so theirs is 90 - tilt.
+Two angles describe the orientation of a plane. `slant` is the angle between the line of sight and the plane's normal:
+0 is seen from the front, 85 nearly edge-on. `tilt` is the direction of increasing depth in the image, in degrees
+counter-clockwise from the right (+x) with y up. A ground plane that recedes upwards has 90. Dong, Zhou and Paul [1]_
+measure the tilt from +y towards +x, so their angle is 90 - tilt.
 
 References
 ----------

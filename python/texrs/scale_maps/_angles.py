@@ -1,4 +1,4 @@
-"""The scale map of a plane seen aslant (equations 3 and 4)."""
+"""The scale map of an oblique plane, from its angles (equations 3 and 4)."""
 
 from __future__ import annotations
 
@@ -13,42 +13,47 @@ from texrs.scale_maps._kinds import ScaleMap
 from texrs.scale_maps._maps import MIN_SCALE
 
 MAX_SLANT = 85.0
-"""Degrees of slant up to which a plane can be asked for."""
+"""Maximum slant of a plane, in degrees."""
 
 
 def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: float | None = None) -> ScaleMap:
-    """Return the scale map of a plane seen aslant.
+    """Return the scale map of an oblique plane.
 
-    The size of elements falls linearly in the direction in which depth grows. Without ``fov`` its ends are set by the
-    slant alone, 1 / cos(slant) in the nearest corner and cos(slant) in the farthest [1]_, with three corrections: the
-    largest scale, not a coordinate, begins equation 4; the picture's middle is (size - 1) / 2; and the extreme corners
-    are those of the tilt, whichever way it points. With ``fov`` the map is that of a pinhole camera: 1 in the middle,
-    and as wide as the angle of view makes it. Cameras see more than the slant alone says: at 45 degrees of slant the nearest
-    elements are 2 times as large as the farthest without ``fov``, 2.1 times with one of 40 degrees, 3.7 times with 60. So give
-    it where it is known (`texrs.io.read_fov`). It is the width of elements across the slope; along it they are
-    foreshortened besides, so that the square root of their area is the 3/2 power of it.
+    The size of elements falls linearly with distance along the slope in the image. Without ``fov``, the slant alone
+    determines the range: 1 / cos(slant) in the nearest corner and cos(slant) in the farthest [1]_. Three corrections
+    are made to the paper. Equation 4 begins with the largest scale, not with a coordinate. The middle of the image is
+    (size - 1) / 2. The extreme corners are chosen by the tilt, whichever way it points.
+
+    With ``fov``, the map is that of a pinhole camera: it is 1 in the middle, and its range grows with the angle of
+    view. The range is usually larger than without ``fov``. If the slant is 45 degrees, the nearest elements are 2x as
+    large as the farthest without ``fov``. They are 2.1x as large with an angle of view of 40 degrees, and 3.7x with 60
+    degrees. Pass the angle of view if it is known (`texrs.io.read_fov`).
+
+    The scale is the width of elements across the slope. Elements are also foreshortened along the slope, so the square
+    root of their area is the power 3/2 of the width.
 
     Parameters
     ----------
     shape : (int, int) or int
-        Rows and columns.
+        Rows and columns of the map.
     slant : float
-        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 85.
+        Angle between the line of sight and the plane's normal, in degrees: 0 (seen from the front) to 85.
     tilt : float
-        Direction in the picture in which depth grows: degrees counter-clockwise from +x with y up, 90 for a floor.
-        Any angle; that of the paper is 90 - tilt.
+        Direction of increasing depth in the image, in degrees counter-clockwise from +x with y up: 90 for a ground
+        plane. Any angle is valid. The angle of the paper is 90 - tilt.
     fov : float, optional
-        Degrees that the longer side of the picture spans, 1 to 170, where they are known.
+        Angle of view of the longer side of the image, in degrees, 1 to 170. Default: unknown, so that the slant alone
+        determines the map.
 
     Returns
     -------
     ScaleMap
-        Float32, (rows, columns), of widths.
+        Float32, (rows, columns), of kind "width".
 
     Raises
     ------
     InvalidInput
-        Angles outside these ranges, or a plane whose horizon lies inside the picture.
+        An angle is outside its range, or the plane's horizon is inside the image.
 
     References
     ----------
@@ -57,7 +62,8 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
 
     Examples
     --------
-    Near below, far above, and four times as large there at 60 degrees:
+    The bottom is near and the top is far. The nearest elements are four times as large as the farthest if the slant is
+    60:
 
     >>> from texrs import scale_maps
     >>> scale_maps.from_angles((4, 1), slant=60, tilt=90).ravel().tolist()
@@ -68,13 +74,14 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
     lean = radians(as_float(slant, "slant", 0, MAX_SLANT))
     angle = radians(as_float(tilt, "tilt", -1e6, 1e6) % 360)
     right, up = cos(angle), sin(angle)
-    # Of quarter turns the one component is nothing but a rounding error.
+    # At multiples of 90 degrees one component is only a rounding error.
     right, up = (0.0 if abs(c) < 1e-12 else c for c in (right, up))
     rows, columns = (np.arange(n) - (n - 1) / 2 for n in size)
-    # Y_proj of equation 4: how far along the slope, from the middle.
+    # Y_proj of equation 4 is the distance along the slope from the middle of the image.
     far = columns * right - rows[:, np.newaxis] * up
     if fov is None:
-        # Y_max of equation 3; in a picture of one pixel there is no slope.
+        # Y_max of equation 3 is the distance of the extreme corners. An image of one pixel has no slope, so any value
+        # above 0 will do.
         reach = (size[1] - 1) / 2 * abs(right) + (size[0] - 1) / 2 * abs(up) or 1.0
         largest, least = 1 / cos(lean), cos(lean)
         scale = largest - (far + reach) * ((largest - least) / (2 * reach))
@@ -83,8 +90,8 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
         scale = 1 - far * (tan(lean) / focal)
         if scale.min() < MIN_SCALE:
             raise InvalidInput(
-                f"slant: at {slant:g} degrees the plane's horizon lies inside a picture that spans {fov:g} degrees; "
-                "a smaller slant, a smaller fov or a crop of the near part has none in it"
+                f"slant: at {slant:g} degrees the plane's horizon is inside an image with a fov of {fov:g}; "
+                "reduce the slant or the fov, or crop the image"
             )
     return ScaleMap(scale.astype(np.float32), "width")
 
@@ -92,22 +99,22 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
 def slant_for_ratio(ratio: float) -> float:
     """Return the slant at which the nearest elements are ``ratio`` times as large as the farthest.
 
-    The inverse of what `from_angles` does without ``fov``, where the ratio is 1 / cos(slant)^2.
+    This is the inverse of `from_angles` without ``fov``, where the ratio is 1 / cos(slant)^2.
 
     Parameters
     ----------
     ratio : float
-        The largest scale over the least, 1 to 131.
+        Ratio of the largest to the smallest scale, 1 to 131.
 
     Returns
     -------
     float
-        Degrees.
+        Slant in degrees.
 
     Raises
     ------
     InvalidInput
-        A ratio outside this range.
+        The ratio is outside its range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A feature mask found without a user."""
+"""Feature masks that are detected in an image."""
 
 from __future__ import annotations
 
@@ -14,49 +14,52 @@ from texrs.scale_maps._trend import Trend, as_trend
 from texrs.scale_maps._windows import Lattice
 
 _AROUND = 1 / 12
-"""Of the shorter side: how far around a pixel is compared with it."""
+"""Radius of a pixel's surroundings, as a share of the shorter side."""
 _DETAIL = 1 / 400
-"""Of the shorter side: the size of what is too fine to be a feature; one pixel at least."""
+"""Default size of the smallest feature, as a share of the shorter side; at least one pixel."""
 _ROUNDS = 6
 _RANGE = 2
-"""Octaves by which elements may be smaller, or larger, than the normal size."""
+"""Range of scales in octaves: elements may be this much smaller or larger than the normal size."""
 _LIGHT = 0.25
-"""Lightness is looked at where it varies at least so much as what varies most."""
+"""Minimum variance of lightness, as a share of the variance along the axis of colour that varies most.
+
+Below it, that axis is used instead.
+"""
 _FLAT = 1e-4
-"""Standard deviation of colours, of 1, below which a picture shows nothing."""
+"""Standard deviation of colours in 0 to 1 below which an image is treated as uniform."""
 
 
 def auto_mask(
     image: object, *, min_feature_size: float | None = None, trend: Trend = "plane", known: object = None
 ) -> Bools:
-    """Return a mask of the features of a picture: what is lighter than its surroundings.
+    """Detect the features of an image: the pixels that are lighter than their surroundings.
 
-    How far the surroundings reach, and what is too fine to be seen, must grow with the elements, or else the mask has
-    features of one size everywhere. So a scale map is measured in the mask (`from_mask`), and the mask made anew by it,
-    several times.
+    The radius of the surroundings, and the size of the finest detail, must grow with the elements. Otherwise the mask
+    would have features of the same size everywhere. Therefore a scale map is measured in the mask (`from_mask`), and
+    the mask is detected again with this map, several times.
 
     Parameters
     ----------
     image : array_like
-        Shape (H, W) or (H, W, C).
+        Image, (H, W) or (H, W, C), with sides of at least 16.
     min_feature_size : float, optional
-        What is finer than so many pixels, where elements have their normal size, is no feature. By default 1/400 of the
-        shorter side, at least 1.
+        Smallest feature, in pixels at scale 1, 0.5 to a quarter of the shorter side. Finer detail is ignored. Default:
+        1/400 of the shorter side, at least 1.
     trend : {"plane", "linear", "quadratic", "none"}
-        What the scales follow meanwhile, as in `from_mask`.
+        Model that the scales follow during detection, as in `from_mask`. Default: "plane".
     known : array_like of bool, optional
-        Shape (H, W): where the picture shows the texture. What is not known does not count as surroundings, and is not
-        in the mask.
+        Pixels that show the texture, (H, W). Other pixels do not count as surroundings, and are not in the mask.
+        Default: all.
 
     Returns
     -------
     ndarray
-        Bool, (H, W).
+        Mask, (H, W), of bool.
 
     Raises
     ------
     InvalidInput
-        A picture of one colour, of noise without features, or smaller than 16 pixels.
+        The image has one colour, only noise without features, or a side below 16 pixels.
 
     Examples
     --------
@@ -72,7 +75,7 @@ def auto_mask(
         raise InvalidInput(f"image: each side must be at least {SMALLEST}, got {size}")
     there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
     if not there.any():
-        raise InvalidInput("known: no pixel of the picture is known; there must be some to look at")
+        raise InvalidInput("known: must mark at least one pixel, got none")
     fine = (
         max(1.0, _DETAIL * min(size))
         if min_feature_size is None
@@ -83,13 +86,14 @@ def auto_mask(
     if float(colours[there].std(axis=0).max()) < _FLAT:
         raise InvalidInput("image: has one colour, so there are no features; give the scale by a mask or by angles")
     grey = take_grey(colours, there)
-    # What is finer than `detail` is not looked at, so large pictures need not be looked at pixel by pixel.
+    # Detail below `fine` is ignored, so work on cells of half this size. Large images then cost less.
     cells = Lattice((size[0], size[1]), max(1, int(fine / 2)), 1)
     small, seen = (grey, there) if cells.cell == 1 else shrink(grey, there, cells.cell)
     del colours, grey
     sigmas = (s / cells.cell for s in (fine, max(2 * fine, _AROUND * min(size))))
     centre, around = (_Blurs(small, seen, sigma) for sigma in sigmas)
     octaves = np.zeros(small.shape, np.float32)
+    # Alternate between the mask and the scales, which determine the radii of the blurs at each pixel.
     for _ in range(_ROUNDS - 1):
         ask()
         mask = (centre.sample(octaves) > around.sample(octaves)) & seen
@@ -103,19 +107,19 @@ def _measure(mask: Bools, trend: Trend, known: Bools) -> Floats:
         return from_mask(mask, trend=trend, known=known)
     except InvalidInput:
         raise InvalidInput(
-            "image: shows too few features to be counted; a larger part of the texture has more, or give the scale by "
-            "a mask or by angles"
+            "image: has too few features to count; use a larger part of the texture, or give the scale by a mask or by "
+            "angles"
         ) from None
 
 
 def take_grey(colours: Floats, known: Bools) -> Floats:
-    """Return lightness, or where the colours differ in hue rather than in that, the channel that shows most."""
+    """Return lightness, or the axis of colour that varies most if the colours differ mainly in hue."""
     light = np.asarray(colours.mean(-1), np.float32)
     if colours.shape[2] == 1:
         return light
     seen = colours[known].astype(np.float64)
     seen -= seen.mean(axis=0)
-    # Sums in one order, whatever number of threads a matrix product would take.
+    # A matrix product would sum in an order that depends on the number of threads.
     values, axes = np.linalg.eigh(np.einsum("ni,nj->ij", seen, seen) / len(seen))
     axis = axes[:, -1] if axes[:, -1].sum() >= 0 else -axes[:, -1]
     if colours.shape[2] * float(light[known].var()) >= _LIGHT * values[-1]:
@@ -124,7 +128,7 @@ def take_grey(colours: Floats, known: Bools) -> Floats:
 
 
 class _Blurs:
-    """A picture blurred by sigma times 2 to the power of whole octaves, made when first asked for."""
+    """Gaussian blurs of an image by sigma times powers of 2, computed on first use."""
 
     def __init__(self, grey: Floats, known: Bools, sigma: float) -> None:
         self._known = None if known.all() else known.astype(np.float32)
@@ -133,7 +137,7 @@ class _Blurs:
         self._kept: dict[int, Floats] = {}
 
     def sample(self, octaves: Floats) -> Floats:
-        """Return each pixel as its own octave has it, linear between the whole ones."""
+        """Return each pixel blurred by its own octave, interpolated linearly between whole octaves."""
         where = np.clip(octaves, -_RANGE, _RANGE)
         result = np.zeros_like(self._grey)
         for level in range(int(np.floor(where.min())), int(np.ceil(where.max())) + 1):

@@ -1,4 +1,4 @@
-"""Blurs of any width, as cheap for wide ones as for narrow ones, and smaller pictures."""
+"""Blurs whose cost does not depend on their width, and means over cells."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from texrs._typing import Bools, Floats
 
 
 def blur(values: Floats, sigma: float) -> Floats:
-    """Return values blurred by a Gaussian, or by three boxes of its variance where that is cheaper."""
+    """Blur values by a Gaussian, or for large sigma by three boxes of the same variance, which are faster."""
     from scipy import ndimage
 
     if sigma < 3:
@@ -27,7 +27,7 @@ def _choose_boxes(sigma: float) -> list[int]:
 
 
 def shrink(values: Floats, known: Bools, side: int) -> tuple[Floats, Bools]:
-    """Return the means of what is known over cells of side x side pixels, and which cells hold any of it."""
+    """Return the means of known values over cells of side x side pixels, and which cells contain known values."""
 
     def sums(of: Floats) -> Floats:
         rows = np.add.reduceat(of, np.arange(0, of.shape[0], side), axis=0)

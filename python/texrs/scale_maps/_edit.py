@@ -1,4 +1,4 @@
-"""Edits of scale maps: a list that can be kept, changed and done again."""
+"""Edits of scale maps: a list of steps that can be saved, changed and replayed."""
 
 from __future__ import annotations
 
@@ -19,40 +19,41 @@ from texrs.scale_maps._maps import as_map
 from texrs.scale_maps._regions import as_number, as_points, centre, stroke, weights
 
 _LEAST, _LARGEST = 1 / 8, 8.0
-"""No step brings a scale further than that."""
+"""Smallest and largest scale that a step can produce."""
 _MOST = 10_000
 
 
 def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Floats:
     """Return a scale map that is changed by a list of steps.
 
-    Each step is a mapping with the name of the operation, ``"op"``, and what it needs; or the name alone. A region is
-    ``[top, left, bottom, right]`` (a rectangle), ``[row, column, radius]`` (a disc) or a list of at least three points
-    ``[row, column]`` (a polygon); without one the whole map is meant. Edges of regions are ``"feather"`` pixels wide, by
-    default a quarter of the region's shorter side. All is done on log S, and no step brings a scale out of 1/8 to 8.
+    Each step is a mapping with the name of the operation, ``"op"``, and its options, or only the name. A region is a
+    rectangle ``[top, left, bottom, right]``, a disc ``[row, column, radius]``, or a list of the points ``[row,
+    column]`` of a polygon. By default, a step applies to the whole map. The edges of a region are ``"feather"`` pixels
+    wide, by default a quarter of the region's shorter side. All operations work on log S, and no step moves a scale
+    out of 1/8 to 8.
 
     ===========  =============================================  ====================================================
     op           takes                                          does
     ===========  =============================================  ====================================================
     `magnify`    factor (1 to 8, by default 1.25), region       makes elements larger
     `minify`     factor (1 to 8, by default 1.25), region       makes elements smaller
-    `set`        value, region                                  gives all the same size
-    `vary`       gain (-8 to 8), region                         spreads sizes about their mean; 0 makes them alike
-    `ramp`       start, end (points), values (two), region      lets sizes grow from one point to the other
-    `duplicate`  region, to (point), mode                       copies what is around the region's middle to a point;
-                                                                mode ``"ratio"``: how it differs from its mean
-    `brush`      points, radius, factor (1/8 to 8)              draws a line along which elements are larger, or smaller
-    `smooth`     sigma (pixels), region                         takes out what is finer
+    `set`        value, region                                  sets all scales to a value
+    `vary`       gain (-8 to 8), region                         multiplies differences from the mean; 0 removes them
+    `ramp`       start, end (points), values (two), region      varies scales linearly from one point to the other
+    `duplicate`  region, to (point), mode                       copies the scales of the region to a point; mode
+                                                                ``"ratio"`` copies their ratios to the region's mean
+    `brush`      points, radius, factor (1/8 to 8)              draws a line with larger or smaller elements
+    `smooth`     sigma (pixels), region                         removes finer variation
     ===========  =============================================  ====================================================
 
-    As the list is all there is, undo is to replay it without its end, and ``json.dumps`` keeps it.
+    To undo a step, replay the list without it. To save the list, use ``json.dumps``.
 
     Parameters
     ----------
     scale : array_like
-        Shape (H, W); it is not changed.
+        Scale map, (H, W). It is not changed.
     steps : sequence of mappings, or str
-        What to do, in this order; or the JSON text of it.
+        Steps in their order, or their JSON text.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
     Raises
     ------
     InvalidInput
-        Not a scale map, or a step that cannot be done: the message says which.
+        The array is not a scale map, or a step is not valid. The message names the step.
 
     Examples
     --------
@@ -91,24 +92,24 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
             changed = _OPERATIONS[operation](logs, **options)
         except InvalidInput as error:
             raise InvalidInput(f"steps: step {number}, {operation}: {error}") from None
-        # What was beyond the limits already may stay there.
+        # Scales that were beyond the limits before may stay there.
         low, high = np.minimum(logs, np.float32(log(_LEAST))), np.maximum(logs, np.float32(log(_LARGEST)))
         logs = np.clip(changed, low, high).astype(np.float32)
-    # What no step reached is what it was, to the last bit.
+    # Keep the exact bits of pixels that no step changed.
     return keep_kind(np.where(logs == before, given, exp_single(logs)), find_kind(scale))
 
 
 def _read_all(steps: object) -> list[tuple[str, dict[str, Any]]]:
-    """Check a list of steps, or the JSON text of one: each is an operation and its options."""
+    """Check a list of steps or its JSON text, and return the operation and options of each step."""
     if isinstance(steps, str):
         try:
             steps = json.loads(steps)
         except (ValueError, RecursionError) as error:
             raise InvalidInput(f"steps: not JSON ({error})") from None
     if not isinstance(steps, Sequence) or isinstance(steps, str | bytes):
-        raise InvalidInput(f"steps: needs a list of steps, got {type(steps).__name__}")
+        raise InvalidInput(f"steps: must be a list of steps, got {type(steps).__name__}")
     if len(steps) > _MOST:
-        raise InvalidInput(f"steps: up to {_MOST} steps are taken, got {len(steps)}")
+        raise InvalidInput(f"steps: must be at most {_MOST} steps, got {len(steps)}")
     return [_read(one, number) for number, one in enumerate(steps, start=1)]
 
 
@@ -116,7 +117,7 @@ def _read(one: object, number: int) -> tuple[str, dict[str, Any]]:
     options = {"op": one} if isinstance(one, str) else dict(one) if isinstance(one, Mapping) else {}
     operation = options.pop("op", None)
     if not isinstance(operation, str) or operation not in _OPERATIONS:
-        raise InvalidInput(f"steps: step {number} needs an 'op' among {', '.join(_OPERATIONS)}; got {one!r}")
+        raise InvalidInput(f"steps: step {number} must have an 'op', one of {', '.join(_OPERATIONS)}; got {one!r}")
     _, *parameters = inspect.signature(_OPERATIONS[operation]).parameters.values()
     allowed = [p.name for p in parameters]
     for key in options:
@@ -126,7 +127,7 @@ def _read(one: object, number: int) -> tuple[str, dict[str, Any]]:
             )
     for parameter in parameters:
         if parameter.default is parameter.empty and parameter.name not in options:
-            raise InvalidInput(f"steps: step {number}, {operation}, needs {parameter.name}")
+            raise InvalidInput(f"steps: step {number}, {operation}, requires {parameter.name}")
     return operation, options
 
 
@@ -159,12 +160,12 @@ def _ramp(
 ) -> Floats:
     first, last = as_points([start], "start")[0], as_points([end], "end")[0]
     if not isinstance(values, list | tuple) or len(values) != 2:
-        raise InvalidInput(f"values needs two scales, at the start and at the end, got {values!r}")
+        raise InvalidInput(f"values must be two scales, at the start and at the end, got {values!r}")
     low, high = (np.log(as_number(v, "values", _LEAST, _LARGEST)) for v in values)
     along = last - first
     length = float(along @ along)
     if length == 0:
-        raise InvalidInput("end needs to be another point than start")
+        raise InvalidInput("end must differ from start")
     rows, columns = np.arange(logs.shape[0])[:, np.newaxis] - first[0], np.arange(logs.shape[1]) - first[1]
     share = np.clip((rows * along[0] + columns * along[1]) / length, 0, 1)
     return np.asarray(logs + (low + (high - low) * share - logs) * weights(region, feather, logs.shape))
@@ -172,18 +173,18 @@ def _ramp(
 
 def _duplicate(logs: Floats, region: object, to: object, mode: object = "copy", feather: object = None) -> Floats:
     if mode not in ("copy", "ratio"):
-        raise InvalidInput(f"mode needs to be 'copy' or 'ratio', got {mode!r}")
+        raise InvalidInput(f"mode must be 'copy' or 'ratio', got {mode!r}")
     if region is None:
-        raise InvalidInput("region needs to be a part of the map, got None")
+        raise InvalidInput("region must be a part of the map, got None")
     step = np.rint(as_points([to], "to")[0] - centre(region)).astype(int)
     inside = weights(region, feather, logs.shape)
     if not inside.any():
-        raise InvalidInput(f"region needs to be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels")
-    # Beyond the border there is nothing to copy, so what would come from there stays.
+        raise InvalidInput(f"region must be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels")
+    # The source would be outside the map for the rest of the target, so that part stays unchanged.
     there = [slice(max(0, d), min(n, n + d)) for d, n in zip(step, logs.shape, strict=True)]
     here = [slice(max(0, -d), min(n, n - d)) for d, n in zip(step, logs.shape, strict=True)]
     if any(s.stop <= s.start for s in there):
-        raise InvalidInput(f"to needs to be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels, got {to}")
+        raise InvalidInput(f"to must be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels, got {to}")
     source, share = logs[tuple(here)], inside[tuple(here)]
     part = logs[tuple(there)]
     result = logs.copy()
@@ -217,4 +218,4 @@ _OPERATIONS: dict[str, Callable[..., Floats]] = {
     "brush": _brush,
     "smooth": _smooth,
 }
-"""Changes of log S by the names that edits give them; their parameters are what a step takes."""
+"""Operations on log S by name. Their parameters are the options of a step."""

@@ -1,4 +1,4 @@
-"""Scale maps continued into what is not known of them."""
+"""Continuation of scale maps into unknown pixels."""
 
 from __future__ import annotations
 
@@ -14,20 +14,22 @@ from texrs.scale_maps._trend import Trend, as_trend, follow_kind
 
 
 def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
-    """Return a scale map that is continued into holes, and beyond what is known of it.
+    """Continue a scale map into its holes and beyond its known part.
 
-    The trend of the known part says how scales go on; by how much the map differs from it at the hole boundary is spread over
-    the hole as a membrane would, so that nothing jumps where the known part begins.
+    A trend is fitted to the known part and continues it. The difference between map and trend at the boundary of a
+    hole is spread over the hole like a membrane. The result therefore has no step at the boundary. It is clipped to a
+    quarter of the smallest and to four times the largest known scale.
 
     Parameters
     ----------
     scale : array_like
-        Shape (H, W). What it holds where it is not known does not matter, not even NaN.
+        Scale map, (H, W). Its values at unknown pixels are ignored, even NaN.
     known : array_like of bool
-        Shape (H, W): where the map holds. Known pixels come back as they are.
+        Pixels where the map is valid, (H, W). Their values do not change.
     trend : {"plane", "linear", "quadratic", "none"}
-        ``"plane"``: a flat surface in perspective, on which widths are linear in the picture. ``"linear"`` and ``"quadratic"``:
-        log S is, for what is curved. ``"none"``: the membrane alone.
+        Model of the known part. ``"plane"``: a plane in perspective, whose widths vary linearly in the image.
+        ``"linear"``: log S varies linearly. ``"quadratic"``: log S varies quadratically, for curved surfaces.
+        ``"none"``: only the membrane. Default: "plane".
 
     Returns
     -------
@@ -37,7 +39,7 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     Raises
     ------
     InvalidInput
-        Nothing is known, another shape, or scales that are not positive where they are known.
+        No pixel is known, the shapes differ, or known scales are not positive.
 
     Examples
     --------
@@ -54,7 +56,7 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     given, holds = try_array(scale), find_kind(scale)
     there = as_mask(known, "known", given.shape[:2])
     if not there.any():
-        raise InvalidInput("known: no pixel of the map is known; there must be some to go on from")
+        raise InvalidInput("known: must mark at least one pixel, got none")
     if given.dtype.kind == "f" and given.shape == there.shape:
         given = np.where(there, given, given.dtype.type(1))
     kind = as_trend(trend)
@@ -65,9 +67,10 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     course = follow_kind(logs, kind, holds, there)
     logs -= course
     logs[~there] = 0
+    # Solve the Laplace equation in the unknown part, with the differences from the trend as boundary values.
     nothing = np.zeros_like(logs)
     membrane = poisson.solve(logs, nothing, nothing, screening=0, boundary="free", mask=~there)
-    # As the trend, no more than four times beyond what is known.
+    # Clip like the trend, to a factor of four beyond the known scales.
     low, high = max(MIN_SCALE, float(values[there].min()) / 4), min(MAX_SCALE, float(values[there].max()) * 4)
     filled = np.where(there, values, np.clip(exp_single(course + membrane), np.float32(low), np.float32(high)))
     return keep_kind(filled, holds)

@@ -1,4 +1,4 @@
-"""Scale maps as pictures: for other programs in 8 bits, and in false colours to look at."""
+"""Scale maps as images: in 8 bits for other programs, and in false colours for people."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ Encoding: TypeAlias = Literal["log2", "paper"]
 
 _ENCODINGS = ("log2", "paper")
 _COLOURS = ("12306b", "2a6fb0", "6fb7d6", "c9e4e8", "f7f4ea", "f6d9a4", "ee9f5a", "cf4d33", "6e0f22")
-"""Small, normal and large: dark to light to dark, so that the normal size is the lightest."""
+"""False colours from small to large: dark, light, dark, so that the normal size is the lightest."""
 _INK, _PAPER = 0.15, 1.0
 
 
 def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
-    """Return a scale map as grey levels of 8 bits.
+    """Encode a scale map as grey levels of 8 bits.
 
     Parameters
     ----------
     scale : array_like
-        Shape (H, W).
+        Scale map, (H, W).
     encoding : {"log2", "paper"}
-        ``"log2"``: 128 + 64 log2(S), equally fine for small and large, from 1/4 to 3.96. ``"paper"``: 128 S, up to 1.99.
-        Scales beyond are clipped.
+        Formula of the grey levels. ``"log2"``: 128 + 64 log2(S), equally fine for small and large scales, from 1/4 to
+        3.96. ``"paper"``: 128 S, up to 1.99. Scales outside are clipped. Default: "log2".
 
     Returns
     -------
     ndarray
-        Uint8, (H, W); 128 is the scale 1.
+        Grey levels, (H, W), of uint8. The level 128 is the scale 1.
 
     Raises
     ------
     InvalidInput
-        Not a scale map, or an unknown encoding.
+        The array is not a scale map, or the encoding is unknown.
 
     Examples
     --------
@@ -63,25 +63,25 @@ def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
 
 
 def decode(image: object, encoding: Encoding = "log2") -> Floats:
-    """Return the scale map of grey levels, the inverse of `encode`.
+    """Decode a scale map from grey levels: the inverse of `encode`.
 
     Parameters
     ----------
     image : array_like
-        Shape (H, W), uint8; or uint16, of which 257 make one level. Of more channels, which must be equal, the first.
+        Grey levels, (H, W), of uint8, or of uint16 with 257 per level. An image with more channels must be grey.
     encoding : {"log2", "paper"}
-        ``"log2"``: the level is 128 + 64 log2(S). ``"paper"``: it is 128 S; a black pixel, whose scale would be 0, counts
-        as half a grey level.
+        Formula of the grey levels. ``"log2"``: 128 + 64 log2(S). ``"paper"``: 128 S. A black pixel, whose scale would
+        be 0, counts as half a grey level. Default: "log2".
 
     Returns
     -------
     ndarray
-        Float32, (H, W).
+        Scale map, (H, W), of float32.
 
     Raises
     ------
     InvalidInput
-        Colours, another dtype, or an unknown encoding.
+        The image has colours or another dtype, or the encoding is unknown.
     LimitExceeded
         If decoding needs more memory than is available, or than `texrs.limits` allows.
 
@@ -96,10 +96,13 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
     given = as_image(image)
     check_memory(8 * given.size, "image")
     if given.dtype not in (np.uint8, np.uint16):
-        raise InvalidInput(f"image: needs grey levels in uint8 or uint16, got {given.dtype}; floats are scales already")
+        raise InvalidInput(
+            f"image: must be grey levels in uint8 or uint16, got {given.dtype}; floats are scales already"
+        )
+    # Ignore alpha: only the colour channels must be equal.
     grey = given[..., : 3 if given.shape[2] >= 3 else 1]
     if (grey != grey[..., :1]).any():
-        raise InvalidInput("image: needs grey levels, got colours; a false-colour picture cannot be read back")
+        raise InvalidInput("image: must be grey levels, got colours; a false-colour image cannot be decoded")
     levels = grey[..., 0].astype(np.float32)
     if given.dtype == np.uint16:
         levels /= 257
@@ -109,27 +112,28 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
 
 
 def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
-    """Return a scale map in false colours, with a scale bar on the right.
+    """Show a scale map in false colours, with a scale bar on the right.
 
-    Small is blue, the normal size pale, large is red; thin lines mark where the scale passes a label of the bar.
+    Small scales are blue, the normal size is pale, and large scales are red. Thin lines mark where the scale crosses a
+    label of the bar.
 
     Parameters
     ----------
     scale : array_like
-        Shape (H, W).
+        Scale map, (H, W).
     largest : float, optional
-        The scale at the top of the bar, 1.1 to 64; its inverse is at the bottom. By default what the map needs. Give it
-        to compare maps.
+        Scale at the top of the bar, 1.1 to 64. The bottom is its inverse. Give it to compare maps. Default: chosen
+        from the range of the map.
 
     Returns
     -------
     ndarray
-        Uint8, (H or 32, W and some columns more, 3).
+        False colours, (H or at least 32, W and the columns of the bar, 3), of uint8.
 
     Raises
     ------
     InvalidInput
-        Not a scale map, or ``largest`` outside its range.
+        The array is not a scale map, or ``largest`` is outside its range.
 
     Examples
     --------
@@ -139,6 +143,7 @@ def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
 
     """
     logs = np.log2(as_map(scale), dtype=np.float64).astype(np.float32)
+    # Without a given range, cover the map in steps of half an octave, so that similar maps get the same bar.
     if largest is None:
         reach = min(6.0, max(0.5, ceil(2 * float(np.abs(logs).max()) - 0.01) / 2))
     else:
@@ -154,7 +159,7 @@ def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
 
 
 def _colour(at: Floats) -> Floats:
-    """Return the colours of values from -1 to 1."""
+    """Return the colours of values in -1 to 1."""
     table = np.array([[int(c[k : k + 2], 16) for k in (0, 2, 4)] for c in _COLOURS], np.float32) / 255
     place = (np.clip(at, -1, 1) + 1) * ((len(table) - 1) / 2)
     first = np.minimum(place.astype(np.intp), len(table) - 2)
@@ -163,7 +168,7 @@ def _colour(at: Floats) -> Floats:
 
 
 def _mark_contours(levels: Floats) -> NDArray[np.bool_]:
-    """Mark the pixels next to which a whole number is passed."""
+    """Mark the pixels whose right or lower neighbour is on the other side of an integer level."""
     cells = np.floor(levels)
     marked = np.zeros(levels.shape, np.bool_)
     marked[:-1] |= cells[:-1] != cells[1:]
@@ -172,12 +177,12 @@ def _mark_contours(levels: Floats) -> NDArray[np.bool_]:
 
 
 def _draw_bar(height: int, reach: float, ticks: list[float], dot: int) -> Floats:
-    """Draw the bar, its ticks and their labels."""
+    """Draw the bar with its ticks and labels."""
     left, width = 4 * dot, 7 * dot
     bar = np.full((height, left + width + 17 * dot, 3), _PAPER, np.float32)
     top, bottom = 3 * dot, height - 3 * dot
     bar[top:bottom, left : left + width] = _colour(np.linspace(1, -1, bottom - top, dtype=np.float32))[:, np.newaxis]
-    # The normal size first: where there is no room for all, it is labelled.
+    # Label the normal size first, because there may not be space for all labels.
     free = np.ones(height, np.bool_)
     for tick in sorted(ticks, key=abs):
         row = round(top + (bottom - top - 1) * (1 - tick / reach) / 2)

@@ -1,4 +1,4 @@
-"""How surfaces are seen: for each pixel of a picture the step on the surface that a step in the picture is."""
+"""Jacobians of surfaces: the step on a surface that corresponds to a step in the image, at each pixel."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from texrs.scale_maps._maps import MAX_SCALE, MIN_SCALE
 __all__ = ["as_jacobians", "jacobians_of_coordinates", "jacobians_of_normals", "measure_sizes"]
 
 STEEPEST = 0.15
-"""Least z of a normal, 81 degrees of slant: beyond that nothing of a surface is seen but its edge."""
+"""Minimum z of a normal, 81 degrees of slant. A surface that is steeper is seen only as an edge."""
 JUMPS = 3.0
-"""A step between pixels that is so many times as long as the one on the other side goes to another part of a surface."""
+"""Ratio of the steps to both neighbours above which the longer step leads to another part of the surface."""
 WORST = 100.0
-"""How many times as much a surface may be foreshortened along one direction as along another."""
+"""Largest foreshortening of a surface: the ratio of the singular values of its Jacobian."""
 
 Jacobians = NDArray[np.float64]
 
@@ -30,26 +30,26 @@ def as_jacobians(value: object, name: str = "jacobians") -> Jacobians:
     Raises
     ------
     InvalidInput
-        Another shape, values that are not finite, or matrices that are flat or of scales out of range.
+        The shape is wrong, values are not finite, or matrices are flat or have scales outside the range.
 
     """
     given = as_array(value, name, np.float64, ("rows", "columns", 2, 2))
     if not np.isfinite(given).all():
-        raise InvalidInput(f"{name}: needs finite numbers, got {np.count_nonzero(~np.isfinite(given))} that are not")
+        raise InvalidInput(f"{name}: must be finite, got {np.count_nonzero(~np.isfinite(given))} values that are not")
     flat = find_flat(given)
     if flat.any():
         row, column = (int(i) for i in np.argwhere(flat)[0])
         raise InvalidInput(
-            f"{name}: {np.count_nonzero(flat)} of {flat.size} matrices are flat, or of scales outside {MIN_SCALE} to "
+            f"{name}: {np.count_nonzero(flat)} of {flat.size} matrices are flat or have scales outside {MIN_SCALE} to "
             f"{MAX_SCALE:.0f}, the first at row {row}, column {column}"
         )
     return np.asarray(given, np.float64)
 
 
 def find_flat(jacobians: Jacobians) -> Bools:
-    """Return which matrices are flat, or of scales out of range."""
+    """Return which matrices are flat, or have scales outside the range."""
     area, squares = np.abs(measure_determinants(jacobians)), (jacobians * jacobians).sum(axis=(-2, -1))
-    # The larger singular value over the smaller one is about the sum of squares over the determinant.
+    # If the singular values differ much, their ratio is about the sum of squares over the determinant.
     return np.asarray((area < MAX_SCALE**-2) | (area > MIN_SCALE**-2) | (squares > WORST * area), np.bool_)
 
 
@@ -60,39 +60,42 @@ def measure_determinants(jacobians: Jacobians) -> NDArray[np.float64]:
 
 
 def measure_sizes(jacobians: Jacobians) -> NDArray[np.float64]:
-    """Return how large things are seen: square roots of areas."""
+    """Return apparent sizes: square roots of areas."""
     return np.asarray(1 / np.sqrt(np.abs(measure_determinants(jacobians))), np.float64)
 
 
 def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up") -> Jacobians:
-    """Return how a curved surface is seen from far away, by its normals.
+    """Return the Jacobians of a curved surface seen from far away, from its normals.
 
-    Along the direction in which it falls away, a surface is foreshortened by the cosine of its slant; across it things keep
-    their size. Nothing is turned: what is level stays level, as on a cloth that is laid on. On what can be unrolled along its
-    axis, such as a cylinder, that is how a flat texture wraps around it; on what cannot, such as a ball, it is near that.
+    A surface is foreshortened by the cosine of its slant, along the slope. Across the slope, elements keep their size.
+    The texture is not rotated: horizontal lines stay horizontal, as on a cloth that is laid on the surface. For a
+    surface that can be unrolled along its axis, such as a cylinder, this is exactly how a flat texture wraps around
+    it. For others, such as a ball, it is an approximation.
 
     Parameters
     ----------
     normals : (rows, columns, 3) array
-        x to the right, y up, z towards the viewer, as in a normal map: integers, or floats that are never negative and are
-        not of length 1, mean 2 v - 1. Zeros and NaN mark what is no surface, which counts as seen from the front.
+        Normals: x to the right, y up, z towards the viewer. Integers mean 2 v - 1, as in a normal map. Floats mean 2 v
+        - 1 too if they are never negative and do not have length 1. Zeros and NaN mark pixels without a surface, which
+        count as seen from the front.
     green : {"up", "down"}
-        Whether y grows up (OpenGL) or down (DirectX).
+        Direction of y: "up" (OpenGL) or "down" (DirectX). Default: "up".
 
     Returns
     -------
     (rows, columns, 2, 2) float64 array
-        What `texrs.perspective` takes as a target: times a step (row, column) in the picture it is the step on the surface,
-        in pixels of a texture in its normal size. Divided by a scale map, (..., None, None), it is that of elements so large.
+        Jacobians that `texrs.perspective` accepts as a target. The product with a step (row, column) in the image is
+        the step on the surface, in pixels of the texture at its normal size. To get elements of other sizes, divide by
+        a scale map with two more axes: ``jacobians / scale[..., None, None]``.
 
     Raises
     ------
     InvalidInput
-        Another shape, or nothing that is a surface.
+        The shape is wrong, or no pixel shows a surface.
 
     Examples
     --------
-    A wall that turns away to the right, as a cylinder does: its columns come nearer to each other there.
+    A wall that turns away to the right, as a cylinder does, so that its columns come closer together there:
 
     >>> import numpy as np
     >>> from texrs import scale_maps
@@ -105,9 +108,10 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     given = try_array(normals)
     check_memory(8 * given.size, "normals")
     if given.ndim != 3 or given.shape[2] != 3 or given.dtype.kind not in "uif" or 0 in given.shape:
-        raise InvalidInput(f"normals: needs numbers of shape (rows, columns, 3), got {given.dtype} of {given.shape}")
+        raise InvalidInput(f"normals: must be numbers of shape (rows, columns, 3), got {given.dtype} of {given.shape}")
     up = as_choice(green, "green", ("up", "down")) == "up"
     vectors, blank = given.astype(np.float64), (given == 0).all(axis=-1)
+    # Decode normal maps to -1 to 1. Unit vectors without negative components are not encoded.
     if given.dtype.kind in "ui":
         vectors = vectors * (2 / float(np.iinfo(given.dtype).max)) - 1
     elif np.nanmin(vectors, initial=1.0) >= 0 and not _are_unit(vectors):
@@ -115,13 +119,14 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     length = np.sqrt((vectors * vectors).sum(axis=-1))
     there = np.isfinite(length) & (length > 1e-3) & ~blank
     if not there.any():
-        raise InvalidInput("normals: no pixel shows a surface; all of them are zero, or no numbers")
+        raise InvalidInput("normals: no pixel shows a surface, because all are zero or NaN")
     unit = np.where(there[..., np.newaxis], vectors / np.where(there, length, 1)[..., np.newaxis], 0.0)
     x, y = unit[..., 0], unit[..., 1] if up else -unit[..., 1]
     away = np.sqrt(x * x + y * y)
     slanted = there & (away > 1e-9)
-    # Rows grow downwards.
+    # The sign of y changes because rows grow downwards.
     fall = np.stack([-y, x], axis=-1) / np.where(slanted, away, 1)[..., np.newaxis]
+    # Stretch the identity along the slope by 1 / cos(slant).
     more = np.where(slanted, 1 / np.maximum(unit[..., 2], STEEPEST) - 1, 0.0)
     return np.asarray(
         np.eye(2) + more[..., np.newaxis, np.newaxis] * fall[..., :, np.newaxis] * fall[..., np.newaxis, :], np.float64
@@ -129,31 +134,33 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
 
 
 def _are_unit(vectors: NDArray[np.float64]) -> bool:
-    """Return whether most vectors that are not zero are of length 1."""
+    """Return whether most vectors other than zero have length 1."""
     length = np.sqrt((vectors * vectors).sum(axis=-1))
     there = length[np.isfinite(length) & (length > 1e-3)]
     return there.size > 0 and abs(float(np.median(there)) - 1) < 0.02
 
 
 def jacobians_of_coordinates(coordinates: Array) -> Jacobians:
-    """Return how a surface is seen, by which point of its texture each pixel shows: the density of a mesh's UV map.
+    """Return the Jacobians of a surface from its UV coordinates at each pixel, such as those of a mesh.
 
     Parameters
     ----------
     coordinates : (rows, columns, 2) float array
-        (row, column) on the surface, in pixels of a texture in its normal size: of UV coordinates from 0 to 1, v up, for a
-        texture of h x w pixels ``np.stack([(1 - v) * h, u * w], axis=-1)``. NaN marks what is no surface, which is seen as the
-        surface nearest to it. Where two parts of a surface meet in the picture, and at seams of its texture, they may jump.
+        Coordinates (row, column) on the surface, in pixels of the texture at its normal size. UV coordinates with v up
+        become ``np.stack([(1 - v) * h, u * w], axis=-1)`` if the texture has h x w pixels. NaN marks pixels without a
+        surface, which take the Jacobian of the nearest surface. Coordinates may jump between parts of the surface and
+        at seams of its texture.
 
     Returns
     -------
     (rows, columns, 2, 2) float64 array
-        What `texrs.perspective` takes as a target: times a step (row, column) in the picture it is the step on the surface.
+        Jacobians that `texrs.perspective` accepts as a target. The product with a step (row, column) in the image is
+        the step on the surface.
 
     Raises
     ------
     InvalidInput
-        Another shape, fewer than two rows or columns, or nothing that is a surface.
+        The shape is wrong, there are fewer than two rows or columns, or no pixel shows a surface.
 
     Examples
     --------
@@ -167,24 +174,25 @@ def jacobians_of_coordinates(coordinates: Array) -> Jacobians:
     """
     given = as_array(coordinates, "coordinates", np.float64, ("rows", "columns", 2))
     if min(given.shape[:2]) < 2:
-        raise InvalidInput(f"coordinates: needs two rows and columns at least, got {given.shape[:2]}")
+        raise InvalidInput(f"coordinates: must have at least two rows and columns, got {given.shape[:2]}")
     slopes = np.stack([_measure_slope(given, axis) for axis in (0, 1)], axis=-1)
     there = np.asarray(np.isfinite(slopes).all(axis=(-2, -1)) & np.isfinite(given).all(axis=-1), np.bool_)
     there = there & ~find_flat(np.where(there[..., np.newaxis, np.newaxis], slopes, 0.0))
     if not there.any():
         raise InvalidInput(
-            "coordinates: no pixel shows a surface; all of them are no numbers, stand alone, or are the same"
+            "coordinates: no pixel shows a surface, because all are NaN, without a neighbour, or equal to it"
         )
     if there.all():
         return slopes
     from scipy.ndimage import distance_transform_edt
 
+    # Fill pixels without a valid Jacobian from the nearest pixel that has one.
     nearest = distance_transform_edt(~there, return_distances=False, return_indices=True)
     return np.asarray(slopes[tuple(nearest)], np.float64)
 
 
 def _measure_slope(values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """Return the steps along an axis: the mean of those to both neighbours, or the shorter one where the other jumps."""
+    """Return the mean of the steps to both neighbours along an axis, or the shorter step if the other one jumps."""
     steps = np.diff(values, axis=axis)
     edge = np.full_like(np.take(values, [0], axis), np.nan)
     before, after = np.concatenate([edge, steps], axis), np.concatenate([steps, edge], axis)

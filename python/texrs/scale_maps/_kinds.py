@@ -1,4 +1,4 @@
-"""What the numbers of a scale map are: widths, or square roots of areas."""
+"""The two kinds of scale maps: widths, and square roots of areas."""
 
 from __future__ import annotations
 
@@ -14,36 +14,38 @@ from texrs.scale_maps._maps import MIN_SCALE, as_map
 __all__ = ["AREAS", "Kind", "ScaleMap", "as_kind", "describe_kind", "find_kind", "keep_kind", "parse_kind"]
 
 Kind: TypeAlias = Literal["width", "area"]
-"""Widths across the slope of what is seen aslant, or square roots of areas, which are the power 3/2 of them."""
+"""Kind of a scale map: widths across the slope of an oblique plane, or square roots of areas (their power 3/2).
+"""
 
 KINDS: tuple[Kind, Kind] = ("width", "area")
 AREAS = 2 / 3
-"""Power of a map of areas that is one of widths."""
+"""Power that converts a map of areas to a map of widths."""
 KEEPS = frozenset({"multiply", "divide", "minimum", "maximum", "clip"})
-"""What leaves a map of widths one of widths, where everything else that goes in is one number."""
+"""Operations that keep the kind of a map if all other operands are scalars."""
 TITLE = "scale map: "
-"""Before the kind, in the description that a file has."""
+"""Prefix of the kind in the description field of a file."""
 
 
 class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
-    """A scale map that says what its numbers are: an array (H, W) of float32 with a `kind`.
+    """Scale map that records its kind: a float32 array (H, W) with an attribute `kind`.
 
-    What makes scale maps gives such arrays; they are used as any other. Views, copies and multiples keep the kind. Results of
-    any other arithmetic are plain arrays: a power of widths is no map of widths.
+    Functions that create scale maps return such arrays, and any function of NumPy accepts them. Views, copies and
+    multiples keep the kind. Results of other arithmetic are plain arrays, because a power of widths, for example, is
+    not a map of widths.
 
     Parameters
     ----------
     scale : (H, W) float array
-        How large elements are.
+        Scales of the elements; 1 is their normal size.
     kind : {"width", "area"}
-        "width": their widths across the slope, linear in the picture of a plane, as `from_angles` gives them. "area": square
-        roots of their areas, as `from_mask` counts them: on a plane seen aslant the power 3/2 of the widths, for along the
-        slope things are foreshortened besides.
+        Quantity in the map. "width": widths across the slope, as `from_angles` returns them; they are linear in the
+        image of a plane. "area": square roots of areas, as `from_mask` measures them. On an oblique plane they are the
+        power 3/2 of the widths, because elements are also foreshortened along the slope.
 
     Raises
     ------
     InvalidInput
-        Not a scale map, or another kind.
+        The array is not a scale map, or the kind is unknown.
 
     Examples
     --------
@@ -59,7 +61,7 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
     kind: Kind | None
 
     def __new__(cls, scale: object, kind: Kind) -> ScaleMap:
-        """Return a map of that kind."""
+        """Return a map of the given kind."""
         made = as_map(scale).view(cls)
         made.kind = as_kind(kind, "kind")
         return made
@@ -69,9 +71,9 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
         self.kind = getattr(other, "kind", None)
 
     def __array_ufunc__(self, ufunc: Any, method: Any, *inputs: Any, out: Any = (), **options: Any) -> Any:
-        """Return plain arrays, or a map of this kind where it stays one."""
+        """Return a map of the same kind if the operation keeps it, otherwise a plain array."""
         keeps = method == "__call__" and ufunc.__name__ in KEEPS and sum(np.ndim(i) > 0 for i in inputs) == 1
-        # One over a map is none.
+        # The reciprocal of a map is not a map of the same kind.
         keeps &= isinstance(inputs[0], ScaleMap) or ufunc.__name__ != "divide"
         if out:
             options["out"] = tuple(o.view(np.ndarray) if isinstance(o, ScaleMap) else o for o in out)
@@ -107,27 +109,27 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
         return make, given, (*state, self.kind)
 
     def __setstate__(self, state: Any, /) -> None:
-        """Take up what a pickle holds."""
+        """Restore the array and its kind from a pickle."""
         super().__setstate__(state[:-1])
         self.kind = state[-1]
 
     def as_kind(self, kind: Kind) -> ScaleMap:
-        """Return the map as one of another kind, of a plane seen aslant.
+        """Convert the map of an oblique plane to another kind.
 
         Parameters
         ----------
         kind : {"width", "area"}
-            What the map is to hold: widths across the slope, or square roots of areas.
+            Kind of the result: widths across the slope, or square roots of areas.
 
         Returns
         -------
         (H, W) ScaleMap
-            Float32; the same values where the kind was not known.
+            Float32. The values are unchanged if the map had no kind.
 
         Raises
         ------
         InvalidInput
-            No such kind.
+            The kind is unknown.
 
         Examples
         --------
@@ -144,28 +146,28 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
 
 
 def as_kind(value: object, name: str = "scale_kind") -> Kind:
-    """Check what a map is said to hold."""
+    """Check the name of a kind."""
     return cast("Kind", as_choice(value, name, KINDS))
 
 
 def find_kind(scale: object) -> Kind | None:
-    """Return what a map holds, if it says so."""
+    """Return the kind that a map records, or None."""
     found: Kind | None = getattr(scale, "kind", None)
     return found if found in KINDS else None
 
 
 def keep_kind(made: Floats, kind: Kind | None) -> Floats:
-    """Return a map that was made of another, of its kind if it says so."""
+    """Return a derived map with the kind of its original; None keeps a plain array."""
     return made if kind is None else ScaleMap(made, kind)
 
 
 def describe_kind(scale: object) -> str | None:
-    """Return what the file of a map is to say of it."""
+    """Return the description for the file of a map: its kind, or None."""
     kind = find_kind(scale)
     return None if kind is None else TITLE + kind
 
 
 def parse_kind(description: str | None) -> Kind | None:
-    """Return the kind that a file states."""
+    """Return the kind in a file's description, or None."""
     said = (description or "").removeprefix(TITLE).strip()
     return said if (description or "").startswith(TITLE) and said in KINDS else None

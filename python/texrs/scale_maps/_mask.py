@@ -1,4 +1,4 @@
-"""Scale maps measured from a feature mask (equations 1 and 2)."""
+"""Scale maps measured from a mask of features (equations 1 and 2)."""
 
 from __future__ import annotations
 
@@ -17,17 +17,20 @@ from texrs.scale_maps._trend import Trend, as_trend, follow_kind, gradient
 from texrs.scale_maps._windows import Lattice, smooth
 
 Measure: TypeAlias = Literal["boundary", "skeleton", "count", "area"]
-"""What of a mask is counted."""
+"""Quantity to measure in a mask."""
 
 _MEASURES = ("boundary", "skeleton", "count", "area")
 SMALLEST = 16
-"""Pixels across the smallest picture and the smallest window."""
+"""Minimum side of an image, and of a window, in pixels."""
 _PERIODS = 8
-"""Spacings of the features across a window: some sixty features, so that their number is known to a tenth."""
+"""Default side of a window, in spacings of the features.
+
+It then contains about 64 features, whose number is known to about 10 %.
+"""
 _FEWEST = 6
-"""Features without which a window says nothing."""
+"""Minimum number of features in a mask, as its area over the square of their spacing."""
 _WIDEST = 4.0
-"""A window may say that elements are so many times as large, or as small, as the middle one."""
+"""Largest ratio of the scale in a window to the typical scale, or of the typical scale to it."""
 _ROUNDS = 4
 _PAPER_WINDOW, _PAPER_SIZE = 32, 9
 
@@ -41,44 +44,45 @@ def from_mask(
     foreshortened: bool = False,
     known: object = None,
 ) -> ScaleMap:
-    """Return the scale map of a mask: the size of elements, by how densely the features of the mask lie.
+    """Measure a scale map from a mask of features: the denser the features, the smaller the elements.
 
-    Where elements are seen twice as large there are half as many outlines in a window (equation 1 of [1]_, which counts
-    the pixels of the mask and has it the other way round). What is measured so is smoothed (equation 2), on logarithms.
+    If elements appear twice as large, a window contains half the length of outlines. Equation 1 of [1]_ counts the
+    pixels of the mask instead, and has the relation reversed. The measured logarithms are smoothed (equation 2).
 
     Parameters
     ----------
     mask : array_like of bool
-        Shape (H, W): the features, as of `auto_mask`, or drawn.
+        Mask of the features, (H, W), from `auto_mask` or drawn by hand.
     measure : {"boundary", "skeleton", "count", "area"}
-        ``"boundary"``: the length of the outlines; it does not matter which side of them is marked. ``"skeleton"``: the
-        length of the features' middle lines, for curves. ``"count"``: how many features there are, for clean masks of
-        elements that do not touch. ``"area"``: the pixels of the mask, in windows of 32, larger where there are more of
-        them: the paper's equations as printed. They hold for none but drawn curves, and those they turn round; how
-        much of a window is covered by areas does not depend on their size.
+        Quantity to measure. ``"boundary"``: the length of the outlines. Features and gaps may be swapped.
+        ``"skeleton"``: the length of the features' centre lines, if they are curves. ``"count"``: the number of
+        features, if the mask is clean and elements do not touch. ``"area"``: the number of mask pixels in windows of
+        32 pixels, by the equations of the paper as printed. They suit only drawn curves, and give the reciprocal scale
+        there. For areas, the covered share of a window does not depend on their size. Default: "boundary".
     window : int, optional
-        Side of the windows in pixels, 16 or more. By default eight times the spacing of the features, up to a third of
-        the shorter side.
+        Side of the windows in pixels, at least 16. Default: eight times the spacing of the features, at most a third
+        of the shorter side.
     trend : {"none", "plane", "linear", "quadratic"}
-        What the map is brought to by a robust fit: ``"plane"``, a flat surface in perspective, on which widths are linear in
-        the picture; ``"linear"`` or ``"quadratic"``, log S is.
+        Model fitted robustly to the map. ``"none"``: no fit. ``"plane"``: a plane in perspective, whose widths vary
+        linearly in the image. ``"linear"``: log S varies linearly. ``"quadratic"``: log S varies quadratically.
+        Default: "none".
     foreshortened : bool
-        Whether the picture shows a plane aslant. A mask gives the size of elements as the square root of their area; in
-        perspective that is the 3/2 power of their width across the slope, which is what `from_angles` gives. With True
-        the map is that width.
+        If True, the image shows an oblique plane, and the map contains widths across the slope, as from `from_angles`.
+        If False, it contains the square roots of areas, which are the power 3/2 of the widths on such a plane.
+        Default: False.
     known : array_like of bool, optional
-        Shape (H, W): where the mask holds. What is not known is no part of any window; the map is continued into it
-        (`extend`).
+        Pixels where the mask is valid, (H, W). Other pixels do not count in any window, and the map is continued into
+        them (`extend`). Default: all.
 
     Returns
     -------
     ScaleMap
-        Float32, (H, W), with a geometric mean of 1; of areas, or if ``foreshortened`` of widths.
+        Float32, (H, W), with a geometric mean of 1. Its kind is "width" if ``foreshortened``, otherwise "area".
 
     Raises
     ------
     InvalidInput
-        A mask that is empty, full, or holds too few features to be counted; a picture smaller than 16 pixels.
+        The mask is empty or full, has too few features to measure, or has a side below 16 pixels.
 
     References
     ----------
@@ -106,6 +110,7 @@ def from_mask(
     _refuse_bare(given, there)
     side = None if window is None else as_int(window, "window", SMALLEST, max(SMALLEST, *size))
     logs = _measure_as_printed(given, there, side) if what == "area" else _measure(given, there, what, side)
+    # A mask measures areas. Convert them to widths before the fit, because only widths are linear on a plane.
     if as_bool(foreshortened, "foreshortened"):
         logs *= np.float32(AREAS)
     holds: Kind = "width" if foreshortened else "area"
@@ -120,17 +125,16 @@ def _refuse_bare(mask: Bools, known: Bools | None) -> None:
     marked = np.count_nonzero(mask if known is None else mask & known)
     total = _count_area(mask, known)
     if total == 0:
-        raise InvalidInput("known: no pixel of the mask is known; there must be some to measure")
+        raise InvalidInput("known: must mark at least one pixel, got none")
     if marked in (0, total):
         what = "marks nothing" if marked == 0 else "marks every pixel"
         raise InvalidInput(
-            f"mask: {what}, so there are no features to count; mark the elements or the gaps between them, or give the "
-            "scale by angles"
+            f"mask: {what}, so there are no features to count; mark the elements or the gaps between them, or use angles"
         )
 
 
 def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) -> Floats:
-    """Return log S as the mask has it."""
+    """Return log S measured from the features of a mask."""
     size = mask.shape[0], mask.shape[1]
     features, spacing, power = _find_features(mask, known, what)
     if window is None:
@@ -140,12 +144,13 @@ def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) ->
     typical = float(np.median(density[enough]))
     if typical <= 0 or _count_area(mask, known) < _FEWEST * spacing**2:
         raise InvalidInput(
-            f"mask: holds too few features to count them in windows of {window} pixels; a mask with more of them, a "
-            "larger window, or a scale by angles is needed"
+            f"mask: has too few features to count in windows of {window} pixels; use more features, a larger "
+            "window, or angles"
         )
     ratio = np.clip(density / typical, _WIDEST ** (-1 / power), _WIDEST ** (1 / power))
     logs = np.float32(-power) * log_single(ratio)
-    # What a window says holds at the middle of what it sees.
+    # The density of a window belongs to the centroid of its known part. Shift it to the centre of the cell by the
+    # overall gradient.
     cells = np.indices(logs.shape) * float(lattice.cell)
     down, across = gradient(logs, cells[0] - rows, cells[1] - columns, enough)
     logs += (down * rows + across * columns).astype(np.float32)
@@ -156,7 +161,7 @@ def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) ->
 
 
 def _find_features(mask: Bools, known: Bools | None, what: str) -> tuple[Array, float, float]:
-    """Return what is counted at each pixel, how far apart features are, and the power of S in their density's inverse."""
+    """Return the counts at each pixel, the spacing of the features, and the power p in S ~ density^-p."""
     if what == "skeleton":
         from skimage.morphology import skeletonize
 
@@ -167,7 +172,7 @@ def _find_features(mask: Bools, known: Bools | None, what: str) -> tuple[Array, 
         number = max(1, int(points.sum(dtype=np.int64))) / 2
         return points, float(np.sqrt(_count_area(mask, known) / number)), 0.5
     outlines = _count_outlines(mask, known)
-    # A line through a feature enters and leaves it, and there are lines along two axes.
+    # Divide by 4: a line through a feature crosses its outline twice, and differences are counted along two axes.
     return outlines, _measure_spacing(int(outlines.sum(dtype=np.int64)) / 4, mask, known), 1.0
 
 
@@ -180,7 +185,7 @@ def _count_area(mask: Bools, known: Bools | None) -> int:
 
 
 def _count_outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
-    """Count at each pixel how many of its neighbours, the next row's and the next column's, differ from it."""
+    """Count the neighbours below and to the right that differ from each pixel."""
     count = np.zeros(mask.shape, np.uint8)
     for part, first, second in (
         (count[:-1], (slice(None, -1), slice(None)), (slice(1, None), slice(None))),
@@ -194,7 +199,10 @@ def _count_outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
 
 
 def _mark_middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
-    """Put 2 at the middle of each feature; 1 if the border or a hole cuts it, for half of those have theirs beyond."""
+    """Put 2 at the centre of each feature, or 1 if the border or a hole cuts it.
+
+    A cut feature counts half, because about half of these features have their centre on the other side.
+    """
     from scipy import ndimage
 
     labels, number = ndimage.label(mask if known is None else mask & known, np.ones((3, 3)))
@@ -215,7 +223,7 @@ def _mark_middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
 
 
 def _measure_as_printed(mask: Bools, known: Bools | None, window: int | None) -> Floats:
-    """Equations 1 and 2 as printed: zeros beyond the border, and larger scales where more is marked."""
+    """Return log S from equations 1 and 2 as printed: zeros outside the image, and larger scales if more is marked."""
     from scipy import ndimage
 
     marked = (mask if known is None else mask & known).astype(np.float32)

@@ -1,4 +1,4 @@
-"""How a scale map is measured where nobody gives one: a mask that is found, and what is counted in it."""
+"""Measurement of a scale map without a user: detect a mask of features, then measure it."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from texrs.scale_maps._mask import from_mask
 from texrs.scale_maps._trend import Trend, as_trend
 
 LARGEST_DETAIL = 4096.0
-"""Pixels; a picture allows a quarter of its shorter side."""
+"""Largest size of the smallest feature, in pixels. Each image also limits it to a quarter of its shorter side."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measuring:
-    """How the scale map of a picture is measured in a mask of features that is found in it.
+    """Options for measuring the scale map of an image from a mask of features that is detected in it.
 
     Parameters
     ----------
     min_feature_size : float, optional
-        Measured in a mask of features, of which what is finer than so many pixels, where elements have their normal size, is
-        none (`auto_mask`). By default 1/400 of the picture's shorter side, at least 1.
+        Smallest feature, in pixels at scale 1, 0.5 to 4096. Finer detail is ignored in the mask (`auto_mask`).
+        Default: 1/400 of the shorter side, at least 1.
     trend : {"plane", "linear", "quadratic", "none"}
-        What a map that is measured so is brought to by a robust fit (`from_mask`).
+        Model fitted robustly to the measured map (`from_mask`). Default: "plane".
     foreshortened : bool
-        Whether a map that is measured so shows a plane aslant: widths then, which are the power 2/3 of the square roots of
-        areas that a mask gives.
+        If True, the image shows an oblique plane, and the map contains widths across the slope. They are the power 2/3
+        of the square roots of areas that a mask yields. Default: False.
 
     Raises
     ------
     InvalidInput
-        A value outside these.
+        A value is outside its range.
 
     Examples
     --------
@@ -56,14 +56,14 @@ class Measuring:
         as_bool(self.foreshortened, "foreshortened")
 
     def measure(self, image: object, known: Bools | None = None) -> Floats:
-        """Return the scale map of a picture, where it is known.
+        """Measure the scale map of an image.
 
         Parameters
         ----------
         image : (H, W) or (H, W, C) array_like
-            Each side at least 16.
+            Image, with sides of at least 16.
         known : (H, W) bool array, optional
-            Where it shows the texture.
+            Pixels that show the texture. Default: all.
 
         Returns
         -------
@@ -72,7 +72,7 @@ class Measuring:
         Raises
         ------
         InvalidInput
-            A picture without features, or too small for the detail.
+            The image has no features, or is too small for ``min_feature_size``.
 
         Examples
         --------

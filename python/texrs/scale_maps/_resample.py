@@ -1,4 +1,4 @@
-"""Scale maps for pictures of another size."""
+"""Scale maps for images of another size."""
 
 from __future__ import annotations
 
@@ -31,27 +31,28 @@ def resample(
     Parameters
     ----------
     scale : array_like
-        Shape (H, W): the map of the exemplar. ``"user"`` and ``"angles"`` do not look at it; it may be None there.
+        Scale map of the exemplar, (H, W). The modes ``"user"`` and ``"angles"`` ignore it, so it may be None.
     size : (int, int) or int
-        Size of the output in pixels (rows, columns); one number is a square.
+        Size of the output in pixels: (rows, columns), or one number for a square.
     mode : {"stretch", "extend", "user", "angles"}
-        ``"stretch"``: the same map, wider or narrower, linear in log S, with the borders on the borders.
-        ``"extend"``: the map in the middle as it is, and beyond it the plane that it follows (`extend`); what is smaller
-        is cut out of the middle. ``"user"``: ``pattern``, stretched. ``"angles"``: that of a plane (`from_angles`).
+        Method. ``"stretch"``: stretch the map so that its borders stay at the borders, linearly in log S.
+        ``"extend"``: put the map in the middle and continue it by the plane that fits it (`extend`); for a smaller
+        output, crop the middle. ``"user"``: stretch ``pattern``. ``"angles"``: the map of a plane with the given
+        angles (`from_angles`). Default: "stretch".
     pattern : array_like, optional
-        Scales of any shape (R, C), for ``"user"``.
+        Scales for the mode ``"user"``, of any shape (R, C).
     slant, tilt, fov : float, optional
-        For ``"angles"``, in degrees.
+        Angles of the plane for the mode ``"angles"``, in degrees.
 
     Returns
     -------
     ndarray
-        Float32, of that size; a `ScaleMap` if what it is made of is one.
+        Float32, of the given size. It is a `ScaleMap` if the map that it is derived from is one.
 
     Raises
     ------
     InvalidInput
-        Not a scale map, or an argument that the mode needs is missing.
+        The array is not a scale map, or an argument that the mode needs is missing.
 
     Examples
     --------
@@ -67,11 +68,11 @@ def resample(
     sides = as_size(size)
     if how == "angles":
         if slant is None or tilt is None:
-            raise InvalidInput(f"{'slant' if slant is None else 'tilt'}: the mode 'angles' needs a slant and a tilt")
+            raise InvalidInput(f"{'slant' if slant is None else 'tilt'}: the mode 'angles' requires a slant and a tilt")
         return from_angles(sides, slant, tilt, fov=fov)
     if how == "user":
         if pattern is None:
-            raise InvalidInput("pattern: the mode 'user' needs a pattern of scales")
+            raise InvalidInput("pattern: the mode 'user' requires an array of scales")
         return keep_kind(_stretch(as_map(pattern, "pattern"), sides), find_kind(pattern))
     given, kind = as_map(scale), find_kind(scale)
     if how == "stretch":
@@ -80,7 +81,7 @@ def resample(
 
 
 def stretch(values: Array, size: Sequence[int]) -> Array:
-    """Return values (rows, columns, ...) for another size, linear between them, with the borders on the borders."""
+    """Resize values (rows, columns, ...) linearly, so that borders stay at the borders."""
     for axis, sides in enumerate(size):
         at = np.clip((np.arange(sides) + 0.5) * (values.shape[axis] / sides) - 0.5, 0, values.shape[axis] - 1)
         first = np.floor(at).astype(np.intp)

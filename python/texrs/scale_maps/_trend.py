@@ -1,4 +1,4 @@
-"""Smooth surfaces laid through scale maps, whatever a part of the map says."""
+"""Smooth trends of scale maps, fitted robustly so that outliers have little influence."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from texrs._typing import Bools, Floats
 from texrs.scale_maps._kinds import AREAS, Kind
 
 Trend: TypeAlias = Literal["none", "plane", "linear", "quadratic"]
-"""What a map is brought to: itself; a flat surface in perspective, whose S is linear in the picture; or a linear or a
-quadratic function for log S."""
+"""Model of a map. none: no fit. plane: a plane in perspective, where S is linear in the image.
+
+linear, quadratic: log S is linear or quadratic in the image.
+"""
 
 TRENDS = ("none", "plane", "linear", "quadratic")
 _POINTS = 2**14
-"""A surface of at most six numbers needs no more."""
+"""Maximum number of samples in a fit. A surface of at most six coefficients does not need more."""
 _FEWEST = 256
 _ROUNDS = 30
 _DIGITS = 10
-"""Of a fit, after the point; where its terms are about 1."""
+"""Digits after the point of fitted coefficients, whose terms are about 1."""
 _TUNING = 1.345
-"""Of Huber's weights, in standard deviations: 95 % as good as least squares where nothing is amiss."""
+"""Threshold of Huber's weights, in standard deviations: 95 % as efficient as least squares on data without outliers."""
 
 
 def as_trend(value: object) -> str:
@@ -34,10 +36,10 @@ def as_trend(value: object) -> str:
 
 
 def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
-    """Return the logarithms of a trend that is fitted robustly where the map is known, at every pixel.
+    """Fit a trend robustly to the known logarithms of a map, and return its logarithms at every pixel.
 
-    What a fit would continue below a quarter of the least scale, or above four times the largest, is held there: nearer
-    to the horizon nothing can be seen.
+    The result is clipped to a quarter of the smallest and to four times the largest known scale. Closer to the
+    horizon, nothing is visible. The trend "none" is the median.
     """
     size = logs.shape
     places = _thin_out(np.ones(size, np.bool_) if known is None else known)
@@ -45,11 +47,12 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     if trend == "none":
         return np.full(size, np.median(values), np.float32)
     rows, columns = places
-    # From the middle of what is known: where that is a line or a point, the surface is flat in the other direction.
+    # Centre the terms on the known part. If this part is a line or a point, the surface is flat in the other
+    # direction.
     middle = float(rows.mean()), float(columns.mean())
     basis = np.stack(_list_terms(rows, columns, middle, size, trend), -1)
     if trend == "plane":
-        # Noise is that of the logarithm, so large scales have more of it.
+        # Weight by 1 / S: the noise is uniform in log S, so it grows with S.
         weights = np.exp(-values)
         found = _fit_robustly(basis * weights[:, np.newaxis], np.ones_like(values))
     else:
@@ -65,7 +68,7 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
 
 
 def follow_kind(logs: Floats, trend: str, kind: Kind | None, known: Bools | None = None) -> Floats:
-    """Return the logarithms of a trend as `follow` does, of a map of some kind: on a plane it is widths that are linear."""
+    """Fit a trend as `follow` does, but convert areas first, because only widths are linear on a plane."""
     if trend != "plane" or kind != "area":
         return follow(logs, trend, known)
     return follow(logs * np.float32(AREAS), trend, known) / np.float32(AREAS)
@@ -74,7 +77,7 @@ def follow_kind(logs: Floats, trend: str, kind: Kind | None, known: Bools | None
 def gradient(
     values: Floats, rows: NDArray[np.float64], columns: NDArray[np.float64], known: Bools
 ) -> tuple[float, float]:
-    """Return by how much values at places grow on the whole, down and to the right."""
+    """Return the overall growth of known values per unit of ``rows`` and ``columns``, from a robust fit."""
     places = _thin_out(known)
     rows, columns = rows[places], columns[places]
     middle, reach = (rows.mean(), columns.mean()), max(1.0, float(np.ptp(rows)), float(np.ptp(columns)))
@@ -84,7 +87,7 @@ def gradient(
 
 
 def _thin_out(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the rows and columns of a lattice of known places, or of a small known part those of all."""
+    """Return the rows and columns of known places on a coarse lattice, or of all if there are few."""
     step = max(1, isqrt(int(np.count_nonzero(known)) // _POINTS))
     thin = np.zeros_like(known)
     thin[::step, ::step] = known[::step, ::step]
@@ -95,23 +98,23 @@ def _thin_out(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def _list_terms(
     rows: NDArray[np.intp], columns: NDArray[np.intp], middle: tuple[float, float], size: tuple[int, ...], trend: str
 ) -> list[NDArray[np.float64]]:
-    """Return what a surface is the sum of, at the places of a lattice."""
+    """Return the terms of a surface at the given rows and columns."""
     y, x = ((at - m) / max(1, (n - 1) / 2) for at, m, n in zip((rows, columns), middle, size, strict=True))
     terms = [np.ones_like(y), y, x]
     return [*terms, y * y, y * x, x * x] if trend == "quadratic" else terms
 
 
 def _fit_robustly(basis: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Fit by Huber's weights. A direction in which nothing is known stays flat."""
+    """Fit coefficients with Huber's weights. A coefficient that the data do not determine is 0."""
     weights: NDArray[Any] = np.ones_like(values)
     found = np.zeros(basis.shape[1])
     for _ in range(_ROUNDS):
         ask()
         weighted = basis * weights[:, np.newaxis]
         before = found
-        # Sums in one order, whatever number of threads a matrix product would take.
+        # A matrix product would sum in an order that depends on the number of threads.
         normal, right = np.einsum("ni,nj->ij", weighted, basis), np.einsum("ni,n->i", weighted, values)
-        # The last bits of a least squares fit hang on the processor.
+        # Round, because the last bits of a least squares fit depend on the processor.
         found = np.linalg.lstsq(normal, right, rcond=1e-10)[0].round(_DIGITS)
         away = np.abs(values - np.einsum("ni,i->n", basis, found))
         spread = 1.4826 * np.median(away)

@@ -1,8 +1,8 @@
 """Densities of features in windows, on a lattice of cells.
 
-A window of n pixels says nothing finer than a part of n, so features are counted in cells of a ninth of it: sums of
-whole numbers, exact in any order. What lies outside the picture, or is not known, counts neither as features nor as
-area.
+A window cannot resolve detail much finer than itself. Features are therefore counted in cells of 1/9 of the window's
+side. The counts are integers, so their sums are exact in any order. Pixels outside the image, and unknown pixels,
+count neither as features nor as area.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from numpy.typing import NDArray
 from texrs._typing import Array, Bools, Floats
 
 _ACROSS = 9
-"""Cells across a window; odd, so that one is in the middle."""
+"""Cells across a window; odd, so that one cell is in the middle."""
 _LEAST_AREA = 1 / 6
-"""Share of a window that must be known; a corner of the picture has a quarter."""
+"""Minimum share of a window that must be known. Windows at the corners of the image are at least 1/4 inside."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """Cells that cover a picture, and the windows around them.
+    """Cells that cover an image, and the windows around the cells.
 
     Attributes
     ----------
     size : (int, int)
-        Rows and columns of the picture.
+        Rows and columns of the image.
     cell : int
         Side of a cell, in pixels.
     across : int
-        Cells across a window; odd.
+        Number of cells across a window; odd.
 
     """
 
@@ -41,36 +41,37 @@ class Lattice:
 
     @classmethod
     def of(cls, size: tuple[int, int], window: int) -> Lattice:
-        """Return the lattice for windows of about so many pixels."""
+        """Return the lattice for windows whose side is close to ``window`` pixels."""
         cell = max(1, round(window / _ACROSS))
         return cls(size, cell, max(1, round((window / cell - 1) / 2) * 2 + 1))
 
     def densities(
         self, features: Array, known: Bools | None
     ) -> tuple[NDArray[np.float64], Bools, NDArray[np.float64], NDArray[np.float64]]:
-        """Count features in windows.
+        """Measure the density of features in the window around each cell.
 
         Parameters
         ----------
         features : (H, W) array of small whole numbers
-            What is counted.
+            Features to count at each pixel.
         known : (H, W) array of bool, optional
-            What is area.
+            Pixels that count as area. Default: all.
 
         Returns
         -------
         densities : (R, C) array
-            Features in a pixel of the window around each cell.
+            Features per known pixel of the window around each cell.
         enough : (R, C) array of bool
-            Whether enough of the window is known to say so.
+            Cells whose windows are known well enough.
         rows, columns : (R, C) arrays
-            How far the middle of the cell lies from that of its window's known part, in pixels: at borders and beside
-            holes a window sees what is on one side alone.
+            Distance, in pixels, from the centroid of the window's known part to the centre of the cell. It is not 0
+            near borders and holes, where only one side of the window is known.
 
         """
         area = self._sum_cells(np.ones(self.size, np.uint8) if known is None else known.view(np.uint8))
         total = self._sum_windows(area)
         enough = total >= _LEAST_AREA * (self.across * self.cell) ** 2
+        # Accept any known area if no window is known well enough.
         if not enough.any():
             enough = total > 0
         shares = np.maximum(total, 1)
@@ -81,14 +82,14 @@ class Lattice:
         return self._sum_windows(self._sum_cells(features)) / shares, enough, rows, columns
 
     def _sum_cells(self, values: Array) -> NDArray[np.float64]:
-        """Return the sums over the cells."""
+        """Return the sums of values over each cell."""
         starts = [np.arange(0, n, self.cell) for n in self.size]
-        # Rows first: contiguous, and what is left of them is small.
+        # Sum rows first: they are contiguous in memory, and the result is small.
         rows = np.add.reduceat(values, starts[0], axis=0, dtype=np.int32)
         return np.add.reduceat(rows, starts[1], axis=1, dtype=np.int64).astype(np.float64)
 
     def _sum_windows(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the sums over the windows around the cells: whole numbers, so in float64 exact."""
+        """Return the sums over the windows around the cells. They are integers, so float64 is exact."""
         reach = self.across // 2
         for axis in (0, 1):
             total = np.cumsum(cells, axis=axis)
@@ -99,7 +100,7 @@ class Lattice:
         return cells
 
     def spread(self, cells: Floats) -> Floats:
-        """Interpolate what the cells say linearly, to every pixel."""
+        """Interpolate values of cells linearly to every pixel."""
         values = cells
         for axis, n in enumerate(self.size):
             last = cells.shape[axis] - 1
@@ -113,7 +114,7 @@ class Lattice:
 
 
 def smooth(logs: Floats, known: Bools, rounds: int, *, size: int = 3, share: float = 0.8) -> Floats:
-    """Bring values towards the mean and the median of those around them (equation 2), by ``share`` the mean."""
+    """Smooth known values: ``share`` times the mean of the neighbours plus the rest times their median (equation 2)."""
     from scipy import ndimage
 
     values = np.where(known, logs, 0)
