@@ -96,10 +96,10 @@ def test_colours_of_corners(here: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["-o", "a.png"], "a mesh is written to .glb"),
-        (["-o", "a.ply"], "with colours of corners to .ply"),
+        (["-o", "a.png"], "must be a .glb, .gltf or .obj file"),
+        (["-o", "a.ply"], ".ply is only for colours of vertices"),
         (["-o", "a.glb", "--along", "y"], "--along: needs --directions"),
-        (["-o", "a.glb", "--directions", "up"], "--directions: needs x, y, z"),
+        (["-o", "a.glb", "--directions", "up"], "--directions: must be x, y, z"),
         (["-o", "a.glb", "--directions", "x", "--field", "circular"], "one of them can be asked for"),
         (["-o", "a.glb", "--bits", "12"], "--bits: must be one of 8, 16"),
         (["-o", "a.glb", "--role", "a=height"], "--role: is for materials"),

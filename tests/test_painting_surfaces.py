@@ -114,9 +114,9 @@ def test_faces_that_lie_over_others_of_their_material_are_reported(here) -> None
     made, notices = bake(mirrored)
     assert made.sets == ("m1",)
     assert len(notices.ignored) == 1
-    assert "plate.obj: UVs of 2 faces lie over others" in notices.ignored[0]
+    assert "plate.obj: UVs of 2 faces overlap others" in notices.ignored[0]
     Path("plate.obj").write_text(mirrored)
-    with pytest.warns(InputWarning, match="lie over others"):
+    with pytest.warns(InputWarning, match="overlap others"):
         texture_mesh("plate.obj", TEXTURE, scale=20.0, atlas=32)
     pytest.importorskip("xatlas")
     apart, notices = bake(mirrored, unwrap=True)

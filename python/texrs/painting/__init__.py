@@ -1,4 +1,4 @@
-"""Meshes painted with a texture of space: each point of a surface shows the texture where it lies, as a carved block does.
+"""Texture a mesh from a solid texture: each point of the surface shows the texture there, as a carved block does.
 
 Needs the extra: ``pip install texrs[mesh]``.
 """
@@ -36,35 +36,36 @@ def __dir__() -> list[str]:
 
 
 FINEST = 4.0
-"""Maximum number of exemplars along the longest side of a mesh by default."""
+"""Default number of exemplars along the longest side of a mesh. It is lower if the atlas cannot show the detail."""
 _BAND = 1 << 20
 _BLOCK = 256.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TexturedMesh:
-    """A painted mesh.
+    """A textured mesh.
 
     Attributes
     ----------
     vertices : (N, 3) float64
-        Corners, as x, y, z.
+        Positions of the vertices, as x, y, z.
     faces : (M, 3) int64
-        Three corners each.
+        Three vertices of each face.
     maps : dict of str to array
-        Sampled maps, in the exemplar's dtype: (N[, C]) at the corners, or (size, size[, C]) over the atlas. Several texture
-        sets have (sets, size, size[, C]). A texture of an array has one map, "image".
+        Sampled maps, in the exemplar's dtype: (N[, C]) at the vertices, or (size, size[, C]) over the atlas. Several
+        texture sets have (sets, size, size[, C]). A texture of an array has one map, "image".
     uv : (N, 2) float64, optional
-        Place of each corner in the atlas, from its lower left; None if corners have colours.
+        Position of each vertex in the atlas, from the lower left. None if vertices have colours.
     roles : dict of str to Role
-        Roles of the maps of a material.
+        Roles of the maps, if the texture is a material.
     relief : (size, size, 3) float32, optional
-        Normals over the atlas, x to its right, y up, z out of the surface: those of a material, or else those of its heights.
-        Several texture sets have (sets, size, size, 3).
+        Normals over the atlas: x to the right, y up, z out of the surface. They are those of a material, or are
+        computed from its heights. Several texture sets have (sets, size, size, 3).
     sets : tuple of str
-        Names of the texture sets. There is one, unless UVs of materials or of parts overlap, or lie in several tiles.
+        Names of the texture sets. There is one, unless UVs of materials or of parts overlap, or UVs are in several
+        tiles.
     which : (M,) int64, optional
-        Texture set of each face; None if there is one.
+        Texture set of each face. None if there is one set.
 
     Examples
     --------
@@ -88,29 +89,31 @@ class TexturedMesh:
     _surface: Surface | None = field(default=None, repr=False)
 
     def save(self, path: Path, *, depth: Literal[8, 16] | None = None) -> list[FilePath]:
-        """Write the mesh with every map that its format has a place for.
+        """Write the mesh with every map that its format can store.
 
-        To .glb and .gltf go colours, opacity, roughness, metal, occlusion, light, and `relief`; to .obj the same beside it, by
-        its .mtl. Names of objects and materials stay, and so do normals. A mesh from an .obj goes to .obj with all its lines in
-        their order, unless an atlas was computed for it. Corners have their colours as light in 16 bit in .glb, with other maps
-        as attributes of their names (_HEIGHT), and as they are seen in .obj and .ply; without an atlas there is no relief.
+        A .glb or .gltf file gets colours, opacity, roughness, metalness, occlusion, emission and `relief`. An .obj
+        file gets the same by its .mtl file. Names of objects and materials are kept, and so are normals. A mesh from
+        an .obj file keeps all lines in their order in .obj, unless an atlas was computed for it. Colours of vertices
+        are linear 16-bit values in .glb, and sRGB in .obj and .ply. Other maps become attributes of their
+        names (_HEIGHT) in .glb. Without an atlas, there is no relief.
 
         Parameters
         ----------
         path : path_like
-            With the suffix .glb, .gltf or .obj; of corners also .ply. All files take their names when all are written.
+            Name of the file: .glb, .gltf or .obj. With colours of vertices, also .ply. All files get their names after
+            all are written.
         depth : {8, 16}, optional
-            Bits of pictures; 8 where all maps have these, else 16.
+            Bits of images. Default: 8 if all maps have 8 bits, else 16.
 
         Returns
         -------
         list of pathlib.Path
-            The files, that which is opened first.
+            Written files. The first one is the file to open.
 
         Raises
         ------
         FileError
-            Another suffix, or a file cannot be written.
+            The suffix is another one, or a file cannot be written.
 
         Examples
         --------
@@ -150,29 +153,31 @@ def texture_mesh(
     unwrap: bool = False,
     progress: Progress | bool | None = None,
 ) -> TexturedMesh:
-    """Sample a texture of space over the surface of a mesh.
+    """Sample a solid texture over the surface of a mesh.
 
     Parameters
     ----------
     mesh : path_like, trimesh.Trimesh, or (vertices, faces)
-        Triangles: a file (.obj, .ply, .stl, .glb), a mesh, or arrays (N, 3) and (M, 3). Its own UVs are kept; faces without
-        UVs are laid out by xatlas. x, y and z are those of columns, rows and planes. Materials share one atlas, unless their
-        UVs overlap; then each has its own atlas. Each tile of UVs beyond 0 to 1 (UDIM) has its own also.
+        Triangles: a file (.obj, .ply, .stl, .glb), a mesh, or arrays (N, 3) and (M, 3). Existing UVs are kept. Faces
+        without UVs are laid out by xatlas. x, y and z are the axes of columns, rows and planes. Materials share one
+        atlas, or have one atlas each if their UVs overlap. Each tile of UVs beyond 0 to 1 (UDIM)
+        also has its own atlas.
     texture : SolidTexture
-        Of an array, or of a material, of which all maps are sampled. Its normals say how its relief leans along columns and
-        rows, (0, 0, 1) not at all, and the surface leans as much wherever it cuts the texture.
+        Solid texture of an array, or of a material, all of whose maps are sampled. The normals of a material specify
+        the slope of its relief along columns and rows: (0, 0, 1) is flat. The surface gets this slope wherever it cuts
+        the texture.
     scale : float, optional
-        Number of voxels in a unit of the mesh, or of units of the texture's spacing. Default: the longest side shows the
-        exemplar four times, or fewer if a voxel would be smaller than a texel of the atlas.
+        Number of voxels in a unit of the mesh, or of units of the texture's spacing. Default: the longest side shows
+        the exemplar four times, or fewer times if a voxel would be smaller than a texel of the atlas.
     atlas : int, optional
-        Side of the atlas that is baked, 16 to 16384; None gives the corners colours instead.
+        Side of the atlas, 16 to 16384. If None, the vertices get colours instead. Default: 1024.
     padding : int
-        Texels by which each piece of the atlas goes on beyond its outline, 0 to 64, by where they would lie in space: so that
-        nothing is seen where pieces meet.
+        Width of the border that is painted around each chart of the atlas, in texels, 0 to 64. They show the texture
+        in the plane of the nearest triangle, so that seams between charts are not visible. Default: 4.
     unwrap : bool
-        If True, xatlas lays out the whole mesh again, and its own UVs are not used.
+        If True, xatlas lays out the whole mesh again, and existing UVs are not used. Default: False.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+        Function that is called as ``progress(stage, share)``. If it raises, the work stops. True shows a bar.
 
     Returns
     -------
@@ -181,7 +186,7 @@ def texture_mesh(
     Raises
     ------
     InvalidInput
-        No triangles, or an option out of its range.
+        The mesh has no triangles, or an option is out of its range.
     FileError
         The file cannot be read.
 
@@ -197,7 +202,7 @@ def texture_mesh(
     """
     watch = listen(progress)
     if not isinstance(texture, SolidTexture):
-        raise InvalidInput(f"texture: needs a texrs.SolidTexture, got {type(texture).__name__}")
+        raise InvalidInput(f"texture: must be a texrs.SolidTexture, got {type(texture).__name__}")
     surface = read_mesh(mesh)
     side = None if atlas is None else as_int(atlas, "atlas", 16, 16384)
     more, fresh = as_int(padding, "padding", 0, 64), as_bool(unwrap, "unwrap")
@@ -211,7 +216,7 @@ def texture_mesh(
         laid = lay_flat(surface, side, more, fresh=fresh)
         baked = [bake_points(*_take_set(laid, k), side, more) for k in range(len(laid.names))]
     if not all(there.any() for _, there in baked):
-        raise InvalidInput("mesh: its atlas has no area: it lies in one line, or beyond 0 to 1")
+        raise InvalidInput("mesh: UVs must cover an area within 0 to 1; pass unwrap (--unwrap) for another layout")
     if scale is None:
         size = _limit_scale(size, texture, laid.surface, side)
     points = np.concatenate([points[there] for points, there in baked])
@@ -233,7 +238,7 @@ def _make_relief(
     size: float,
     padding: int,
 ) -> Floats | None:
-    """Return normals over the atlas of each set: those of a material, else those of its heights, else none."""
+    """Return normals over the atlas of each set: from the normals of a material, else from its heights, else None."""
     material, surface, side = texture.material, laid.surface, len(baked[0][1])
     if material is None:
         return None
@@ -258,10 +263,10 @@ def _make_relief(
 
 
 def _take_set(laid: Laid, number: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return the vertices, faces and UVs in 0 to 1 of a texture set."""
+    """Return the vertices, faces and UVs (0 to 1) of a texture set."""
     surface, mine = laid.surface, laid.which == number
     assert surface.uv is not None
-    # All faces of a set are in one tile.
+    # All faces of a set are in the same tile.
     return surface.vertices, surface.faces[mine], surface.uv - laid.tile[mine][0]
 
 
@@ -270,14 +275,14 @@ def _stack(arrays: list[Array]) -> Array:
 
 
 def _spread(values: Array, there: NDArray[np.bool_]) -> Array:
-    """Return values of the texels of an atlas, with those of the nearest texel between its pieces."""
+    """Return an atlas (side, side[, C]) of texels' values. Other texels take the value of the nearest one."""
     empty = np.zeros((*there.shape, *values.shape[1:]), values.dtype)
     empty[there] = values
     return fill_between(empty, there)
 
 
 def choose_scale(vertices: NDArray[np.float64], texture: SolidTexture) -> float:
-    """Return the number of voxels in a unit of a mesh if its longest side shows `FINEST` exemplars."""
+    """Return the number of voxels in a unit of a mesh for which its longest side shows `FINEST` exemplars."""
     longest = float(np.ptp(vertices, axis=0).max())
     sides = [n * step for n, step in zip(texture.exemplar.shape, texture.spacing, strict=True)]
     return FINEST * max(sides) / max(longest, 1e-12)
@@ -295,7 +300,8 @@ def find_scale(
 
 
 def _limit_scale(size: float, texture: SolidTexture, surface: Surface, side: int) -> float:
-    """Return a scale, lowered if its voxels would be smaller than the texels: the atlas cannot show finer detail."""
+    """Return a scale, lowered if its voxels would be smaller than texels, because the atlas cannot show finer detail.
+    """
     assert surface.uv is not None
     edges = np.diff(surface.vertices[surface.faces], axis=1)
     flat = np.diff(surface.uv[surface.faces], axis=1)
@@ -306,7 +312,7 @@ def _limit_scale(size: float, texture: SolidTexture, surface: Surface, side: int
 
 
 def _sample_slopes(texture: SolidTexture, points: NDArray[np.float64], slopes: Floats) -> NDArray[np.float64]:
-    """Return how much a relief rises along x, y and z of space at points."""
+    """Return the slopes of a relief along x, y and z of space at points."""
     parts = []
     for start in range(0, len(points), _BAND):
         source = texture.trace(points[start : start + _BAND, ::-1] / texture.spacing)
@@ -317,7 +323,7 @@ def _sample_slopes(texture: SolidTexture, points: NDArray[np.float64], slopes: F
 
 def _sample(texture: SolidTexture, points: NDArray[np.float64], watch: Progress | None) -> dict[str, Array]:
     """Return the maps of a texture at points (x, y, z) in units of its spacing."""
-    # Neighbours together: what is made for one band of points is used up there.
+    # Sort the points by blocks, so that parts of the texture computed for one band are not needed by later bands.
     order = np.lexsort((points // _BLOCK).T)
     at = points[order, ::-1] / texture.spacing
     parts = []

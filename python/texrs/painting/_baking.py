@@ -1,4 +1,4 @@
-"""Atlases: which point of a surface each texel shows, how its relief leans there, and what lies between the pieces."""
+"""Bake an atlas: find the point of the surface that each texel shows, compute normals from heights, and fill gaps."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from texrs.painting._surface import Floats64
 __all__ = ["bake_points", "bake_values", "fill_between", "lean"]
 
 OFTEN = 256
-"""Triangles that are baked before anyone is asked whether to go on."""
+"""Number of triangles between two checks whether the call was cancelled."""
 STEEPNESS = 0.4
-"""Root mean square slope that heights are shown with, for nothing says in what units they are."""
+"""Root mean square slope of normals that are computed from heights, because the unit of heights is unknown."""
 
 
 def bake_points(
     vertices: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
 ) -> tuple[Floats64, NDArray[np.bool_]]:
-    """Return the point of the surface that each texel shows, (side, side, 3), and which show any.
+    """Return the point of the surface that each texel shows, (side, side, 3), and a mask of texels that show one.
 
-    Those beside a triangle lie in its plane; where several do, that of the nearest triangle counts.
+    A texel next to a triangle gets a point in the plane of the nearest triangle, up to `padding` texels away.
     """
     return bake_values(vertices, faces, uv, side, padding)
 
@@ -30,7 +30,7 @@ def bake_points(
 def bake_values(
     values: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
 ) -> tuple[Floats64, NDArray[np.bool_]]:
-    """Return what corners (N, K) have between them at each texel, and beside their triangles as it goes on there."""
+    """Interpolate values of vertices (N, K) at texels, and extrapolate them up to `padding` texels beyond triangles."""
     points = np.zeros((side, side, values.shape[1]))
     away = np.full((side, side), np.inf, np.float32)
     corners = np.stack([uv[..., 0] * side - 0.5, (1 - uv[..., 1]) * side - 0.5], axis=-1)[faces]
@@ -41,21 +41,25 @@ def bake_values(
         double = edge[0] * other[1] - edge[1] * other[0]
         if abs(double) < 1e-12:
             continue
+        # Look only at the texels around the triangle.
         low = np.maximum(np.floor(flat.min(axis=0)).astype(int) - padding, 0)
         high = np.minimum(np.ceil(flat.max(axis=0)).astype(int) + padding + 1, side)
         if (high <= low).any():
             continue
         x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
         right, down = x - flat[0, 0], y - flat[0, 1]
+        # b and c are the barycentric coordinates of the second and third corner.
         b = (right * other[1] - down * other[0]) / double
         c = (edge[0] * down - edge[1] * right) / double
-        # Distance beyond an edge: a share of the height on it.
+        # The distance beyond an edge is the negative barycentric coordinate times the height of the triangle on that
+        # edge.
         lengths = [np.hypot(*(flat[2] - flat[1])), np.hypot(*other), np.hypot(*edge)]
         beyond = np.max(
             [-w * abs(double) / max(n, 1e-12) for w, n in zip((1 - b - c, b, c), lengths, strict=True)], axis=0
         )
         beyond = np.maximum(beyond, 0).astype(np.float32)
         part = (slice(low[1], high[1]), slice(low[0], high[0]))
+        # Texels outside every triangle take the value of the nearest one.
         nearer = (beyond <= padding) & (beyond < away[part])
         found = (
             triangle[0]
@@ -68,7 +72,7 @@ def bake_values(
 
 
 def fill_between(values: Array, there: NDArray[np.bool_]) -> Array:
-    """Return an atlas whose texels between the pieces are those of the nearest piece, for what is shown small."""
+    """Fill texels between charts with the nearest chart's values, because mipmaps average across the gaps."""
     from scipy.ndimage import distance_transform_edt
 
     if there.all() or not there.any():
@@ -78,9 +82,9 @@ def fill_between(values: Array, there: NDArray[np.bool_]) -> Array:
 
 
 def lean(height: Floats, points: Floats64, there: NDArray[np.bool_], inside: NDArray[np.bool_]) -> Floats:
-    """Return normals (side, side, 3) of heights over an atlas: x to its right, y up, z out of the surface.
+    """Return normals (side, side, 3) of heights over an atlas: x to the right, y up, z out of the surface.
 
-    Slopes are by the lengths that texels have on the surface, and taken between neighbours of one piece alone.
+    Slopes use distances between texels on the surface, and only neighbours in the same chart.
     """
     slopes = []
     for axis, sign in ((1, 1.0), (0, -1.0)):
@@ -90,11 +94,12 @@ def lean(height: Floats, points: Floats64, there: NDArray[np.bool_], inside: NDA
             beside, far = np.roll(height, -step, axis), np.roll(points, -step, axis)
             apart = np.sqrt(((far - points) ** 2).sum(axis=-1))
             good = there & np.roll(there, -step, axis) & (apart > 0)
-            # What lies across a cut of the atlas is somewhere else on the surface.
+            # A neighbour across a cut of the atlas is far away on the surface, so skip it.
             good &= apart < 4 * np.median(apart[good]) if good.any() else good
             slope += np.where(good, sign * step * (beside - height) / np.where(good, apart, 1), 0)
             known += good
         slopes.append(slope / np.maximum(known, 1))
+    # Scale all slopes to a usual steepness, because the unit of heights is unknown.
     found = np.stack(slopes, axis=-1)
     steep = float(np.sqrt(np.mean(found[inside] ** 2))) if inside.any() else 0.0
     found = found * (STEEPNESS / steep) if steep > 0 else found

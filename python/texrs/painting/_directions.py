@@ -1,8 +1,8 @@
-"""Directions on a surface, as a field of space: along an axis or around it, by curvature, or as strokes were painted.
+"""Directions on a surface as a frame field of space: along or around an axis, by curvature, or by painted strokes.
 
-The surface is looked at in points, about as far from each other as cells of the field are wide. Each point is given a direction
-in the surface, and how much it counts; what counts for nothing takes the mean of its neighbours, again and again. Curvature
-is that of G. Taubin ("Estimating the tensor of curvature of a surface from a polyhedral approximation", ICCV 1995), over
+The surface is sampled at points whose distance is about the width of a cell of the field. Each point gets a direction
+in the surface and a weight. A point of weight 0 repeatedly takes the mean of its neighbours. The curvature is that of
+G. Taubin ("Estimating the tensor of curvature of a surface from a polyhedral approximation", ICCV 1995), over
 neighbouring points.
 """
 
@@ -29,47 +29,51 @@ from texrs.painting._surface import Floats64
 __all__ = ["field_on_surface"]
 
 NEAR = 12
-"""Neighbours of a point."""
+"""Number of neighbours of a point."""
 SAME_SIDE = 0.3
-"""Cosine between the normals of points beyond which they are on one side of something thin."""
+"""Least cosine between the normals of two points on the same side of a thin part."""
 ROUNDS = 300
+"""Number of rounds of averaging that fill points without a direction."""
 SMOOTHED = 6
-"""Rounds after which curvature is no longer that of single bumps."""
+"""Number of smoothing rounds of the curvature tensor, which remove the curvature of single bumps."""
 FINEST = 64
-"""Parts of a triangle's side at most."""
+"""Maximum number of parts of a triangle's side."""
 DIGITS = 6
+"""Digits of directions. Later digits depend on the processor."""
 
 
 def field_on_surface(
     mesh: Any, directions: str | Sequence[Any], *, scale: float, along: str = "x", resolution: int = 48
 ) -> Field:
-    """Return a field that turns a texture of space into directions on a surface, to paint the mesh with.
+    """Return a frame field that aligns a solid texture with directions on a surface, to texture the mesh with.
 
     Parameters
     ----------
     mesh : path_like, trimesh.Trimesh, or (vertices, faces)
-        As for `paint`.
+        Mesh, as for `texture_mesh`.
     directions : str, or sequence
-        ``"x"``, ``"y"``, ``"z"`` or three numbers such as ``"1,0,1"``: along an axis, as far as it lies in the surface.
-        ``"around:z"``: around it. ``"curvature"``: where the surface bends most, as around a cable; ``"curvature:least"``:
-        across that. Anything else is a file of strokes (.json), or strokes themselves: lists of at least two points
-        (x, y, z), in units of the mesh, each painted in one go; between strokes directions go over into each other.
+        Directions on the surface. ``"x"``, ``"y"``, ``"z"`` or three numbers such as ``"1,0,1"``: an axis, projected
+        onto the surface. ``"around:z"``: around an axis. ``"curvature"``: the direction of greatest curvature, as
+        around a cable. ``"curvature:least"``: perpendicular to that. Anything else is a file of strokes (.json), or
+        the strokes themselves. Each stroke is a list of at least two points (x, y, z), in units of the mesh.
+        Directions between strokes are interpolated.
     scale : float
-        Voxels of the texture in a unit of the mesh, as for `paint`.
+        Number of voxels in a unit of the mesh, as for `texture_mesh`.
     along : {"x", "y", "z"}
-        The axis of the exemplar that goes there. Its planes, or what is left, go up out of the surface.
+        Axis of the exemplar that follows the directions. Its axis of planes points out of the surface, or its axis of
+        rows if planes follow the directions.
     resolution : int
-        Cells of the field along the longest side of the mesh, 8 to 200.
+        Number of cells of the field along the longest side of the mesh, 8 to 200. Default: 48.
 
     Returns
     -------
     Field
-        For `texrs.SolidTexture`.
+        A field for `texrs.SolidTexture`.
 
     Raises
     ------
     InvalidInput
-        No such directions, or they lie nowhere in the surface.
+        The directions are invalid, or are perpendicular to the surface everywhere.
     FileError
         A file cannot be read.
 
@@ -87,7 +91,7 @@ def field_on_surface(
     size, count = as_float(scale, "scale", 1e-9, 1e9), as_int(resolution, "resolution", 8, 200)
     longest = float(np.ptp(vertices, axis=0).max())
     if not longest > 0:
-        raise InvalidInput("mesh: all of it lies in one point")
+        raise InvalidInput("mesh: must have an extent, but all vertices are at one point")
     points, normals = _scatter(vertices, faces, longest / count)
     near = _find_neighbours(points, normals)
     kind, _, rest = directions.partition(":") if isinstance(directions, str) else ("", "", "")
@@ -97,6 +101,7 @@ def field_on_surface(
                 f"directions: must be one of curvature, curvature:most, curvature:least; got {directions!r}"
             )
         found = _agree(points, near, *_bend(points, normals, near, least=rest == "least"))
+    # Words are axes. Texts that end in .json or start with a bracket are strokes.
     elif (
         isinstance(directions, str)
         and not directions.lower().endswith(".json")
@@ -109,18 +114,19 @@ def field_on_surface(
     else:
         found = _spread(*_paint(directions, points, normals), normals, near)
     if not np.abs(found).max() > 0:
-        raise InvalidInput("directions: lie nowhere in the surface")
+        raise InvalidInput("directions: must not be perpendicular to the surface everywhere")
     return _fill_space(points, normals, np.round(found, DIGITS), size, count, along)
 
 
 def _scatter(vertices: Floats64, faces: NDArray[np.int64], apart: float) -> tuple[Floats64, Floats64]:
-    """Return points all over a surface, and which way is out there."""
+    """Return points distributed over a surface, and their outward normals."""
     sides = vertices[faces]
-    # Each face with corners of its own, so that edges stay edges.
+    # Give each face its own corners, so that sharp edges stay sharp.
     out = find_normals(sides.reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)).reshape(-1, 3, 3)
     lengths = np.sqrt(((sides - np.roll(sides, 1, axis=1)) ** 2).sum(axis=2)).max(axis=1)
     parts = np.clip(np.ceil(lengths / apart).astype(int), 1, FINEST)
     points, normals = [], []
+    # Place a point in the middle of each part of a triangle. Triangles with equal numbers of parts are done at once.
     for n in np.unique(parts):
         i, j = np.mgrid[0:n, 0:n]
         inside = i + j < n
@@ -130,7 +136,7 @@ def _scatter(vertices: Floats64, faces: NDArray[np.int64], apart: float) -> tupl
         points.append(np.einsum("kc,fcd->fkd", weights, vertices[chosen]).reshape(-1, 3))
         normals.append(np.einsum("kc,fcd->fkd", weights, out[parts == n]).reshape(-1, 3))
     whole, up = np.concatenate(points), np.concatenate(normals)
-    # Fine meshes have many points in a cell: one is enough.
+    # A fine mesh has several points in a cell. Keep one of them.
     cells = np.floor((whole - whole.min(axis=0)) / (apart / 2) + 1e-9).astype(np.int64)
     first = np.sort(np.unique(cells, axis=0, return_index=True)[1])
     up = up[first] / np.maximum(np.sqrt((up[first] ** 2).sum(axis=1, keepdims=True)), 1e-300)
@@ -138,7 +144,7 @@ def _scatter(vertices: Floats64, faces: NDArray[np.int64], apart: float) -> tupl
 
 
 def _find_neighbours(points: Floats64, normals: Floats64) -> tuple[NDArray[np.intp], Floats64]:
-    """Return the neighbours of each point, (N, K), and how much they count: 0 on the other side of what is thin."""
+    """Return the neighbours of each point, (N, K), and their weights: 0 on the other side of a thin part, else 1."""
     from scipy.spatial import cKDTree
 
     count = min(NEAR + 1, len(points))
@@ -148,7 +154,7 @@ def _find_neighbours(points: Floats64, normals: Floats64) -> tuple[NDArray[np.in
 
 
 def _spread(given: Floats64, counts: Floats64, normals: Floats64, near: tuple[NDArray[np.intp], Floats64]) -> Floats64:
-    """Return arrows of unit length in the surface: those that count, and means of their neighbours elsewhere."""
+    """Return unit vectors in the surface. Points of weight 0 take the mean of their neighbours."""
     index, weight = near
     found = given * (counts > 0)[:, np.newaxis]
     total = counts + weight.sum(axis=1)
@@ -170,8 +176,9 @@ def _shorten(arrows: Floats64) -> Floats64:
 def _bend(
     points: Floats64, normals: Floats64, near: tuple[NDArray[np.intp], Floats64], *, least: bool
 ) -> tuple[Floats64, Floats64]:
-    """Return the lines along which a surface bends most or least, and how clearly."""
+    """Return the lines of greatest or least curvature of a surface, and the normals."""
     index, weight = near
+    # The normal curvature towards a neighbour follows from its distance and its height over the tangent plane.
     step = points[index] - points[:, np.newaxis]
     square = np.maximum((step**2).sum(axis=2), 1e-300)
     rise = np.einsum("nkd,nd->nk", step, normals)
@@ -182,10 +189,11 @@ def _bend(
     tensor = np.einsum("nk,nki,nkj->nij", share * bend, flat, flat)
     for _ in range(SMOOTHED):
         tensor = (tensor + np.einsum("nk,nkij->nij", share, tensor[index])) / 2
+    # Work in two dimensions, because the normal is always an eigenvector.
     first, second = _make_axes(normals)
     axes = np.stack([first, second], axis=1)
     small = np.einsum("nai,nij,nbj->nab", axes, tensor, axes)
-    # Eigenvalues of Taubin's matrix are 3/8 and 1/8 of the one curvature and the other.
+    # For curvatures k and l, Taubin's matrix has the eigenvalues 3/8 k + 1/8 l and 1/8 k + 3/8 l.
     values, vectors = np.linalg.eigh(small)
     curves = np.stack([3 * values[:, 0] - values[:, 1], 3 * values[:, 1] - values[:, 0]], axis=1)
     most = np.abs(curves).argmax(axis=1)
@@ -193,7 +201,7 @@ def _bend(
     line = np.einsum("na,nad->nd", vectors[np.arange(len(points)), :, chosen], axes)
     clear = np.abs(np.abs(curves[:, 0]) - np.abs(curves[:, 1]))
     clear = clear / max(float(np.quantile(clear, 0.9)), 1e-300)
-    # Where both curvatures are alike the lines of the neighbours go on.
+    # If both curvatures are similar, the line is unclear, so it follows the neighbours.
     count = np.minimum(clear, 1) ** 2
     own = count[:, np.newaxis, np.newaxis] * np.einsum("ni,nj->nij", line, line)
     found = own
@@ -205,7 +213,7 @@ def _bend(
 
 
 def _make_axes(normals: Floats64) -> tuple[Floats64, Floats64]:
-    """Return two directions in the surface, at right angles."""
+    """Return two perpendicular directions in the surface."""
     first = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first -= (first * normals).sum(axis=1, keepdims=True) * normals
     first /= np.maximum(np.sqrt((first**2).sum(axis=1, keepdims=True)), 1e-300)
@@ -213,7 +221,7 @@ def _make_axes(normals: Floats64) -> tuple[Floats64, Floats64]:
 
 
 def _agree(points: Floats64, near: tuple[NDArray[np.intp], Floats64], lines: Floats64, normals: Floats64) -> Floats64:
-    """Return lines as arrows: each agrees with the neighbour that it is most alike, along a spanning tree."""
+    """Turn lines into vectors that agree along a spanning tree of the most parallel neighbours."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import minimum_spanning_tree
 
@@ -222,11 +230,13 @@ def _agree(points: Floats64, near: tuple[NDArray[np.intp], Floats64], lines: Flo
     rows = np.repeat(np.arange(count), index.shape[1])
     columns, good = index.reshape(-1), weight.reshape(-1) > 0
     dots = (lines[rows] * lines[columns]).sum(axis=1)
+    # Parallel lines are close in the graph. Rounding makes the tree independent of the processor.
     cost = 1.001 - np.round(np.abs(dots), DIGITS)
     graph = coo_matrix((cost[good], (rows[good], columns[good])), shape=(count, count)).tocsr()
     tree = minimum_spanning_tree(graph.maximum(graph.T))
     both = (tree + tree.T).tocsr()
     out, seen = lines.copy(), np.zeros(count, bool)
+    # Walk each connected part of the tree, and flip vectors that point the other way.
     for root in range(count):
         if seen[root]:
             continue
@@ -251,8 +261,8 @@ def _read_axis(text: str, whole: str) -> Floats64:
         axis = np.zeros(0)
     if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
         raise InvalidInput(
-            "directions: needs x, y, z, three numbers as in 1,0,1, any of them after around:, curvature, curvature:least, or "
-            f"strokes in a .json; got {whole!r}"
+            "directions: must be x, y, z, three numbers such as 1,0,1, one of these after around:, curvature, curvature:least, "
+            f"or strokes in a .json file; got {whole!r}"
         )
     return np.asarray(axis / np.sqrt((axis**2).sum()))
 
@@ -282,15 +292,15 @@ def _read_strokes(given: Any) -> list[Floats64]:
         except (TypeError, ValueError):
             line = np.zeros(0)
         if line.ndim != 2 or line.shape[1] != 3 or len(line) < 2 or not np.isfinite(line).all():
-            raise InvalidInput(f"{where}: stroke {number} needs at least two points [x, y, z]")
+            raise InvalidInput(f"{where}: stroke {number} must have at least two points [x, y, z]")
         strokes.append(line)
     if not strokes:
-        raise InvalidInput(f"{where}: needs strokes, each a list of points [x, y, z]")
+        raise InvalidInput(f"{where}: must contain strokes, each a list of points [x, y, z]")
     return strokes
 
 
 def _paint(given: Any, points: Floats64, normals: Floats64) -> tuple[Floats64, Floats64]:
-    """Return arrows where strokes lie, and how much they count."""
+    """Return vectors along strokes at the points nearest to them, and their weights."""
     from scipy.spatial import cKDTree
 
     tree, arrows, counts = cKDTree(points), np.zeros_like(points), np.zeros(len(points))
@@ -300,6 +310,7 @@ def _paint(given: Any, points: Floats64, normals: Floats64) -> tuple[Floats64, F
             length = float(np.sqrt(((end - start) ** 2).sum()))
             if length == 0:
                 continue
+            # Sample the stroke twice as densely as the points, so that none is skipped.
             share = np.arange(max(1, int(np.ceil(length / max(apart, 1e-300)))) * 2) + 0.5
             spots = start + share[:, np.newaxis] / len(share) * (end - start)
             at = np.unique(tree.query(spots)[1])
@@ -310,7 +321,7 @@ def _paint(given: Any, points: Floats64, normals: Floats64) -> tuple[Floats64, F
 
 
 def _fill_space(points: Floats64, normals: Floats64, arrows: Floats64, scale: float, count: int, along: str) -> Field:
-    """Return the field of a box around the surface; each cell has the direction of the nearest point."""
+    """Return the field of a box around the surface. Each cell has the direction of the nearest point."""
     from scipy.spatial import cKDTree
 
     at = points[:, ::-1] * scale

@@ -1,6 +1,6 @@
-"""Painted meshes in files: glTF with every map of a material, OBJ with its MTL, PLY of corners.
+"""Files of textured meshes: glTF with all maps of a material, OBJ with its MTL, PLY with colours of vertices.
 
-All that belongs together is written to temporary names; what is opened first takes its name last.
+Files that belong together are written under temporary names. The file to open gets its name last.
 """
 
 from __future__ import annotations
@@ -32,21 +32,23 @@ __all__ = ["SUFFIXES", "check_suffix", "write_mesh"]
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 ROUGH = 0.8
-"""Of what has colours alone."""
+"""Roughness of a material that has only colours."""
 
 
 def check_suffix(path: Path, *, baked: bool) -> str:
-    """Return what a name says of its file.
+    """Return the suffix of a file of a mesh.
 
     Raises
     ------
     FileError
-        No such format, or .ply for an atlas.
+        The format is unknown, or is .ply for an atlas.
 
     """
     suffix = FilePath(path).suffix.lower()
     if suffix not in SUFFIXES or (suffix == ".ply" and baked):
-        raise FileError(f"{path}: a mesh is written to .glb, .gltf or .obj, and with colours of corners to .ply")
+        raise FileError(
+            f"{path}: must be a .glb, .gltf or .obj file; .ply is only for colours of vertices, without an atlas"
+        )
     return suffix
 
 
@@ -75,15 +77,18 @@ def write_mesh(
     for name, several, relief in zip(names, maps, reliefs, strict=True):
         seen = {key: each for key, each in several.items() if not each.role.normal}
         if relief is not None:
-            # As shares, for of numbers that happen to be positive nobody could tell.
+            # Store normals as fractions in [0, 1]: a reader could not recognise signed values that happen to be
+            # positive.
             seen["normal"] = Map((relief + np.float32(1)) / np.float32(2), Role.NORMAL, "linear")
         own, look = make_pictures(seen, bits, len(pictures))
+        # Without maps, glTF would assume a rough metal.
         rough = look["pbrMetallicRoughness"]
         if "metallicRoughnessTexture" not in rough:
             rough |= {"metallicFactor": 0.0, "roughnessFactor": ROUGH}
         prefix = f"{name}_" if len(names) > 1 else ""
         pictures |= {prefix + key: picture for key, picture in own.items()}
         looks.append((own, look))
+    # glTF contains everything. OBJ needs images, a file of materials and the mesh.
     if suffix != ".obj":
         said = [looks[k][1] | ({} if name == PAINTED else {"name": name}) for name, k in materials]
         return write_shapes(list(_divide(surface, normals, owner)), pictures, said, target)
@@ -98,6 +103,7 @@ def write_mesh(
     library = target.with_suffix(".mtl")
     files[library] = ("\n".join(lines) + "\n").encode()
     used = [materials[k][0] for k in owner.tolist()]
+    # Keep the lines of the OBJ file that the mesh was read from.
     if surface.text is not None:
         files[target] = paint_text(surface.text, library.name, used)
     else:
@@ -111,7 +117,7 @@ def _write_corners(
     """Write a mesh whose vertices have colours."""
     vertices, faces = surface.vertices, surface.faces
     if suffix == ".obj" and surface.text is not None and surface.origin is not None:
-        # The vertices are in the order of the file, those of one place in it side by side.
+        # Vertices are sorted by their number in the file, and several can share one number. Take the first of each.
         first = np.unique(surface.origin, return_index=True)[1]
         return _write_all({target: paint_text(surface.text, None, (), _show(maps)[first])})
     if suffix == ".obj":
@@ -129,9 +135,9 @@ def _write_corners(
 def _name_materials(
     surface: Surface, names: Sequence[str], which: NDArray[np.int64]
 ) -> tuple[list[tuple[str, int]], NDArray[np.int64]]:
-    """Return the materials, with the texture set of each, and the material of each face.
+    """Return the materials with their texture sets, and the material of each face.
 
-    Materials keep their names, unless one is in several sets.
+    A material keeps its name, unless it is in several sets.
     """
     labels = [*surface.materials]
     both = sorted({(labels[p], int(w)) for p, w in np.unique(np.column_stack([surface.part, which]), axis=0).tolist()})
@@ -142,7 +148,7 @@ def _name_materials(
 
 
 def _write_all(files: Mapping[FilePath, bytes]) -> list[FilePath]:
-    """Write files that belong together; the last one is what is opened."""
+    """Write files that belong together. The last one is the file to open."""
     order = list(files)[::-1]
     with ExitStack() as stack:
         for file in order:
@@ -156,16 +162,16 @@ def _write_all(files: Mapping[FilePath, bytes]) -> list[FilePath]:
 def _divide(
     surface: Surface, normals: Floats64, owner: NDArray[np.int64], more: Mapping[str, Array] | None = None
 ) -> Iterator[tuple[str, Mesh]]:
-    """Yield the shapes of a mesh: one for each part and material, with the name of its object."""
+    """Yield the shapes of a mesh, one for each part and material, with the name of its object."""
     uv = surface.uv
     tangents = None if uv is None else find_tangents(surface.vertices, surface.faces, uv, normals).astype(np.float32)
-    # Materials of an object are primitives of one mesh.
+    # The materials of an object become primitives of one mesh.
     keys, number = np.unique(np.column_stack([surface.part, owner]), axis=0, return_inverse=True)
     for k, (part, material) in enumerate(keys.tolist()):
         faces = surface.faces[number.reshape(-1) == k]
         used, local = np.unique(faces, return_inverse=True)
         if len(keys) == 1:
-            # Vertices that no face uses stay where they are.
+            # Keep vertices that no face uses.
             used, local = np.arange(len(surface.vertices)), faces
         kind = np.uint16 if len(used) < 2**16 - 1 else np.uint32
         yield (
@@ -174,7 +180,7 @@ def _divide(
                 positions=surface.vertices[used].astype(np.float32),
                 normals=normals[used].astype(np.float32),
                 tangents=None if tangents is None else tangents[used],
-                # From the upper left, as glTF has it.
+                # The origin of UVs in glTF is the upper left.
                 places=None if uv is None else np.stack([uv[used, 0], 1 - uv[used, 1]], axis=-1).astype(np.float32),
                 faces=local.reshape(-1, 3).astype(kind),
                 more={} if more is None else {key: values[used] for key, values in more.items()},
@@ -184,9 +190,9 @@ def _divide(
 
 
 def _colour_corners(maps: Mapping[str, Map]) -> dict[str, Array]:
-    """Return the colours of corners as light in 16 bit, and all other maps as attributes of their own."""
+    """Return colours of vertices as linear 16-bit values, and all other maps as separate attributes."""
     base = find_map(maps, Role.COLOUR) or next(iter(maps.values()))
-    # As a picture of one row.
+    # Treat the vertices as an image of one row.
     row = {name: Map(each.pixels[np.newaxis], each.role, each.space) for name, each in maps.items()}
     shown = Map(base.pixels[np.newaxis], Role.COLOUR, base.space)
     light = take_colour(shown, shown.pixels.shape[:2])[0]
@@ -206,7 +212,7 @@ def _colour_corners(maps: Mapping[str, Map]) -> dict[str, Array]:
 
 
 def _show(maps: Mapping[str, Map]) -> NDArray[np.uint8]:
-    """Return colours of corners as they are seen, (N, 3)."""
+    """Return the colours of vertices in sRGB, (N, 3)."""
     base = find_map(maps, Role.COLOUR) or next(iter(maps.values()))
     light = take_colour(Map(base.pixels[np.newaxis], Role.COLOUR, base.space), (1, len(base.pixels)))[0]
     return np.rint(np.clip(encode_srgb(light), 0, 1) * np.float64(255)).astype(np.uint8)
@@ -215,7 +221,7 @@ def _show(maps: Mapping[str, Map]) -> NDArray[np.uint8]:
 def _spell_mtl(
     target: FilePath, prefix: str, pictures: Mapping[str, Array], height: Map | None, bits: int
 ) -> tuple[dict[FilePath, bytes], list[str]]:
-    """Return pictures, and the lines of the material that names them, with the usual words for maps that OBJ lacks."""
+    """Return images, and the lines of a material that names them. Maps that OBJ lacks have their usual keywords."""
     parts: dict[str, tuple[str, Array]] = {}
     for name, picture in pictures.items():
         if name == "basecolor":

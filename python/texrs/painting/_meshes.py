@@ -1,4 +1,4 @@
-"""Meshes laid flat in pieces, and shaded."""
+"""UVs of a mesh by xatlas, and its normals and tangents."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from texrs.painting._surface import Floats64, Surface
 __all__ = ["find_normals", "find_tangents", "shade", "unwrap"]
 
 CREASE = 0.5
-"""Cosine of the angle between faces beyond which an edge is one: 60 degrees."""
+"""Cosine of the angle between faces above which their common edge is sharp: 60 degrees."""
 
 
 def unwrap(
     vertices: Floats64, faces: NDArray[np.int64], side: int, padding: int
 ) -> tuple[Floats64, NDArray[np.int64], Floats64, NDArray[np.int64]]:
-    """Return a surface that is laid flat in pieces, and which vertex each of its vertices was.
+    """Lay out a surface in charts, and return it with the number that each vertex had.
 
     Raises
     ------
     InvalidInput
-        There is no xatlas.
+        xatlas is not installed.
 
     """
     try:
         import xatlas
     except ImportError:
-        raise InvalidInput("mesh: has no atlas; one is made with the extra: pip install texrs[mesh]") from None
+        raise InvalidInput("mesh: has no UVs; computing them needs the extra: pip install texrs[mesh]") from None
     maker, how = xatlas.Atlas(), xatlas.PackOptions()
     flat: Floats = vertices.astype(np.float32)
     maker.add_mesh(flat, faces.astype(np.uint32))
@@ -40,7 +40,7 @@ def unwrap(
 
 
 def shade(surface: Surface) -> Floats64:
-    """Return which way is out at each vertex: as the file says, and else as its faces say."""
+    """Return the outward normal of each vertex: from the file, or from the faces."""
     found = find_normals(surface.vertices, surface.faces)
     if surface.normals is None:
         return found
@@ -50,9 +50,9 @@ def shade(surface: Surface) -> Floats64:
 
 
 def find_normals(vertices: Floats64, faces: NDArray[np.int64]) -> Floats64:
-    """Return which way is out at each corner: the mean of the faces around its place, but for those beyond an edge.
+    """Return the outward normal of each vertex: the mean of the faces there, except those beyond a sharp edge.
 
-    Corners in one place count as one: where an atlas is cut the surface is as smooth as elsewhere.
+    Vertices at the same position count as one, so the surface stays smooth where the atlas is cut.
     """
     sides = vertices[faces]
     across = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
@@ -62,7 +62,7 @@ def find_normals(vertices: Floats64, faces: NDArray[np.int64]) -> Floats64:
     np.add.at(own, faces.reshape(-1), np.repeat(across, 3, axis=0))
     own /= np.maximum(np.sqrt((own**2).sum(axis=1, keepdims=True)), 1e-300)
     place = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)
-    # Each corner of a face counts at each vertex in the same place.
+    # Each corner of a face counts for all vertices at the same position.
     spot, face = place[faces].reshape(-1), np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(spot, kind="stable")
     spot, face = spot[order], face[order]
@@ -78,12 +78,12 @@ def find_normals(vertices: Floats64, faces: NDArray[np.int64]) -> Floats64:
 
 
 def find_tangents(vertices: Floats64, faces: NDArray[np.int64], uv: Floats64, normals: Floats64) -> Floats64:
-    """Return where the atlas's columns go at each corner, and 1 or -1: whether its rows go up to the left of that, (N, 4)."""
+    """Return tangents (N, 4): the direction of the atlas's columns, and 1, or -1 if the atlas is mirrored."""
     one, two = (vertices[faces[:, k]] - vertices[faces[:, 0]] for k in (1, 2))
     flat, other = (uv[faces[:, k]] - uv[faces[:, 0]] for k in (1, 2))
     double = flat[:, 0] * other[:, 1] - flat[:, 1] * other[:, 0]
     sign = np.sign(double)[:, np.newaxis]
-    # Weighted by the area in the atlas: what has none says nothing.
+    # Weight by the area in the atlas, so that faces without area do not count.
     right = (one * other[:, 1:] - two * flat[:, 1:]) * sign
     upward = (two * flat[:, :1] - one * other[:, :1]) * sign
     along, up = np.zeros_like(vertices), np.zeros_like(vertices)

@@ -1,7 +1,7 @@
-"""Wavefront OBJ: read with the indices that the file gives, and written again with other materials.
+"""Wavefront OBJ files: reading with the file's own indices, and writing with other materials.
 
-Trimesh reorders vertices, drops the UVs of a material if one of its faces has none, and packs materials into one atlas. The
-geometry of a file goes through as text, so vertices, quads, groups, objects and normals stay as they are.
+Trimesh reorders vertices, drops the UVs of a material if one of its faces has none, and packs materials into one
+atlas. Here, the geometry of a file is kept as text, so vertices, quads, groups, objects and normals do not change.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from texrs.painting._surface import MESH, PAINTED, Floats64, Surface
 __all__ = ["paint_text", "read_obj", "spell_obj"]
 
 KNOWN = {"v", "vt", "vn", "f", "o", "g", "s", "usemtl", "mtllib", "mg"}
-"""Words whose lines are read, or go through as they are."""
+"""Keywords whose lines are read, or copied unchanged."""
 
 
 def read_obj(name: str, text: str) -> Surface:
-    """Return the surface in the text of a file.
+    """Return the surface in the text of an OBJ file.
 
     Raises
     ------
@@ -41,10 +41,11 @@ def read_obj(name: str, text: str) -> Surface:
         try:
             if word in rows:
                 coloured |= word == "v" and len(rest) >= 6
-                # A place along a line has no second coordinate.
+                # A one-dimensional UV has no second coordinate.
                 width, rest = (2, [*rest, "0"]) if word == "vt" else (3, rest)
                 rows[word].append([float(rest[k]) for k in range(width)])
             elif word == "f":
+                # Cut a polygon into triangles around its first corner.
                 ends = [_read_corner(end, rows) for end in rest]
                 for k in range(1, len(ends) - 1):
                     corners += [ends[0], ends[k], ends[k + 1]]
@@ -68,7 +69,7 @@ def read_obj(name: str, text: str) -> Surface:
 
 
 def _read_corner(end: str, rows: Mapping[str, Sequence[object]]) -> tuple[int, int, int]:
-    """Return the places of a corner in the lists of vertices, UVs and normals; -1 for none."""
+    """Return the positions of a corner in the lists of vertices, UVs and normals; -1 for none."""
     found = []
     for key, index in zip(("v", "vt", "vn"), [*end.split("/"), "", ""][:3], strict=True):
         place = int(index or 0)
@@ -86,12 +87,12 @@ def _join(
     parts: list[tuple[str, str]],
     text: str,
 ) -> Surface:
-    """Return a surface whose vertices are the corners that differ, in the order of the file."""
+    """Return a surface with one vertex for each distinct corner, in the order of the file."""
     vertices, uv, normals = (
         np.array(rows[key], np.float64).reshape(-1, width) for key, width in (("v", 3), ("vt", 2), ("vn", 3))
     )
     each = np.array(corners, np.int64).reshape(-1, 3)
-    # Vertices that no face uses keep their places too.
+    # Keep vertices that no face uses.
     spare = np.setdiff1d(np.arange(len(vertices)), each[:, 0])
     every = np.concatenate([each, np.stack([spare, spare * 0 - 1, spare * 0 - 1], axis=1)])
     known, place = np.unique(every, axis=0, return_inverse=True)
@@ -121,9 +122,9 @@ def paint_text(text: str, library: str | None, names: Sequence[str], colours: ND
     text : str
         Text of the file.
     library : str, optional
-        Name of the file of the materials.
+        Name of the file of materials.
     names : sequence of str
-        Material of each triangle that faces are cut into.
+        Material of each triangle. Faces are cut into triangles.
     colours : (N, 3) uint8, optional
         Colour of each vertex.
 
@@ -154,7 +155,7 @@ def spell_obj(
     library: str | None,
     names: Sequence[str] = (),
 ) -> bytes:
-    """Return the text of a mesh that does not come from such a file: one name of a material for each face."""
+    """Return OBJ text for a mesh that was not read from such a file, with one material name for each face."""
     lines = ["# texrs"] + ([] if library is None else [f"mtllib {library}"])
     if colours is None:
         lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices.tolist()]
@@ -165,6 +166,7 @@ def spell_obj(
     corner = "{0}//{0}" if uv is None else "{0}/{0}/{0}"
     if uv is not None:
         lines += [f"vt {u:.9g} {v:.9g}" for u, v in uv.tolist()]
+    # Write a line for the material only where it changes.
     used = ""
     for number, row in enumerate((faces + 1).tolist()):
         if library is not None and names[number] != used:

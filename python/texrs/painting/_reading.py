@@ -1,4 +1,4 @@
-"""Meshes are read from files, from trimesh, and from arrays."""
+"""Read meshes from files, from trimesh, and from arrays."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PLACES = {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "tex
 
 
 def read_mesh(mesh: Any) -> Surface:
-    """Return a mesh with all that is known of it; report the parts of a file that are not used.
+    """Return a mesh as a surface with UVs, normals and materials. Report the parts of a file that are not used.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def read_mesh(mesh: Any) -> Surface:
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         return _check(_take(mesh, normals=None))
     if not isinstance(mesh, tuple | list) or len(mesh) != 2:
-        raise InvalidInput(f"mesh: needs a file, a trimesh.Trimesh or (vertices, faces), got {type(mesh).__name__}")
+        raise InvalidInput(f"mesh: must be a file, a trimesh.Trimesh or (vertices, faces), got {type(mesh).__name__}")
     vertices, faces = try_array(mesh[0], np.float64), try_array(mesh[1])
     return _check(Surface(vertices, faces, None, None, np.zeros(faces.shape[:1], np.int64), (PAINTED,), (MESH,)))
 
@@ -49,11 +49,13 @@ def read_mesh(mesh: Any) -> Surface:
 def _check(surface: Surface) -> Surface:
     vertices, faces = surface.vertices, surface.faces
     if vertices.ndim != 2 or vertices.shape[1:] != (3,) or not np.isfinite(vertices).all():
-        raise InvalidInput(f"mesh: needs finite vertices (N, 3), got shape {vertices.shape}")
+        raise InvalidInput(f"mesh: vertices must be finite numbers of shape (N, 3), got shape {vertices.shape}")
     if faces.ndim != 2 or faces.shape[1:] != (3,) or not len(faces) or faces.dtype.kind not in "ui":
-        raise InvalidInput(f"mesh: needs triangles (M, 3) of integers, got {faces.dtype} of {faces.shape}")
+        raise InvalidInput(f"mesh: faces must be integers of shape (M, 3), got {faces.dtype} of shape {faces.shape}")
     if int(faces.min()) < 0 or int(faces.max()) >= len(vertices):
-        raise InvalidInput(f"mesh: has {len(vertices)} vertices, but faces reach {int(faces.max())}")
+        raise InvalidInput(
+            f"mesh: faces must be indices below {len(vertices)}, got {int(faces.min())} to {int(faces.max())}"
+        )
     return surface._replace(faces=faces.astype(np.int64))
 
 
@@ -68,7 +70,7 @@ def _read_file(path: FilePath) -> Surface:
     try:
         import trimesh
     except ImportError:
-        raise InvalidInput("mesh: a file needs the extra: pip install texrs[mesh]") from None
+        raise InvalidInput("mesh: reading a file needs the extra: pip install texrs[mesh]") from None
     try:
         if suffix in (".glb", ".gltf"):
             scene = trimesh.load_scene(
@@ -77,6 +79,7 @@ def _read_file(path: FilePath) -> Surface:
         else:
             scene = trimesh.load_scene(path, process=False)
         parts, flat = [], 0
+        # Keep the order of the file. Each geometry can be in the scene several times.
         order = {name: k for k, name in enumerate(scene.geometry)}
         placed = [scene.graph[node] for node in scene.graph.nodes_geometry]
         for place, name in sorted(placed, key=lambda each: order[each[1]]):
@@ -84,6 +87,7 @@ def _read_file(path: FilePath) -> Surface:
             if not hasattr(each, "faces"):
                 flat += 1
                 continue
+            # Trimesh computes normals on demand, so only those in its cache are from the file.
             given = getattr(each, "_cache", None)
             normals = np.asarray(each.vertex_normals, np.float64) if given and "vertex_normals" in given else None
             _report(path.name, each)
@@ -98,7 +102,7 @@ def _read_file(path: FilePath) -> Surface:
 
 
 def _take(mesh: Any, *, normals: Floats64 | None, name: str = MESH) -> Surface:
-    """Return a mesh of trimesh."""
+    """Convert a mesh of trimesh."""
     vertices, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
     uv = getattr(mesh.visual, "uv", None)
     material = getattr(getattr(mesh.visual, "material", None), "name", None)
@@ -114,7 +118,7 @@ def _take(mesh: Any, *, normals: Floats64 | None, name: str = MESH) -> Surface:
 
 
 def _move(surface: Surface, place: Floats64) -> Surface:
-    """Return a mesh where its scene has it."""
+    """Return a mesh transformed to its position in the scene."""
     if np.array_equal(place, np.eye(4)):
         return surface
     turn = place[:3, :3]
@@ -130,7 +134,7 @@ def _move(surface: Surface, place: Floats64) -> Surface:
 
 
 def _join(parts: list[Surface]) -> Surface:
-    """Return meshes as one, whose parts they are."""
+    """Return one surface whose parts are the given meshes."""
     first = np.cumsum([0, *(len(each.vertices) for each in parts)])
 
     def stack(arrays: list[Floats64 | None], width: int) -> Floats64 | None:
@@ -153,7 +157,7 @@ def _join(parts: list[Surface]) -> Surface:
 
 
 def _report(name: str, mesh: Any) -> None:
-    """Report what a mesh of trimesh has that is not used."""
+    """Report the properties of a mesh of trimesh that are not used."""
     raw = mesh.metadata.get("_ply_raw")
     if raw is not None and "face" in raw and raw["face"]["length"] < len(mesh.faces):
         assume(f"{name}: faces of more than three corners are cut into triangles")
@@ -167,7 +171,7 @@ def _report(name: str, mesh: Any) -> None:
 
 
 def _give_materials(path: FilePath) -> BytesIO:
-    """Return a glTF file whose primitives all have a material: trimesh drops the UVs of those that have none."""
+    """Return a glTF file whose primitives all have a material, because trimesh drops the UVs of primitives without one."""
     data = path.read_bytes()
     binary = data[:4] == b"glTF"
     size = int.from_bytes(data[12:16], "little") if binary else 0

@@ -1,9 +1,10 @@
-"""The relief of a texture of space on a surface, as the normals that viewers take.
+"""The relief of a solid texture on a surface, as a normal map over the atlas.
 
-Normals of a volume say how its relief leans along columns and rows; through the frames of the texture they are slopes in
-space. What of these lies in the surface tilts its normal: n - (g - (g n) n), which is that of the surface moved out by a height
-with the gradient g (J. F. Blinn, "Simulation of wrinkled surfaces", SIGGRAPH 1978). Viewers want it in the frame of the
-atlas: along its columns, up its rows, and out, as they interpolate these between corners.
+The normals of a volume specify the slopes of its relief along columns and rows. The frames of the texture turn these
+into slopes g in space. The part of g in the surface tilts the surface's normal n to n - (g - (g n) n). This is the
+normal of the surface after it is moved out by a height with the gradient g (J. F. Blinn, "Simulation of wrinkled
+surfaces", SIGGRAPH 1978). Viewers need it in the frame of the atlas (along its columns, up its rows, and out), which
+they interpolate between vertices.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from texrs.painting._surface import Floats64
 __all__ = ["bake_frames", "carve", "read_slopes"]
 
 FLATTEST = 0.05
-"""Least z of a normal: the steepest relief is that of 87 degrees."""
+"""Least z of a normal. The steepest slope is thus 87 degrees."""
 
 
 def read_slopes(normals: Map) -> Floats:
-    """Return how much the relief rises along columns, rows and planes, (..., 3), of normals in any encoding."""
+    """Return the slopes along columns, rows and planes, (..., 3), of normals in any encoding."""
     pixels = normals.pixels[..., :3]
     values = pixels.astype(np.float64)
     if pixels.dtype.kind in "ui":
@@ -31,7 +32,7 @@ def read_slopes(normals: Map) -> Floats:
     if not (values < 0).any():
         values = 2 * values - 1
     up = np.maximum(values[..., 2], FLATTEST)
-    # Rows go down, and y up unless it is said to be otherwise.
+    # Rows go down, but y goes up, unless the role of the map specifies otherwise.
     side = -1.0 if normals.role.down else 1.0
     slopes = np.stack([-values[..., 0] / up, side * values[..., 1] / up, np.zeros(up.shape)], axis=-1)
     return np.asarray(slopes, np.float32)
@@ -40,7 +41,7 @@ def read_slopes(normals: Map) -> Floats:
 def bake_frames(
     normals: Floats64, tangents: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
 ) -> NDArray[np.float64]:
-    """Return where each texel's columns go on the surface, where its rows go up, and the way out, (side, side, 3, 3)."""
+    """Return each texel's frame on the surface, (side, side, 3, 3): along its columns, up its rows, and out."""
     values = bake_values(np.concatenate([normals, tangents], axis=1), faces, uv, side, padding)[0]
     out, along = _scale(values[..., :3]), _scale(values[..., 3:6])
     up = _scale(np.cross(out, along)) * np.where(values[..., 6:] < 0, -1.0, 1.0)
@@ -48,10 +49,10 @@ def bake_frames(
 
 
 def carve(slopes: NDArray[np.float64], frames: NDArray[np.float64]) -> Floats:
-    """Return normals (N, 3) in frames (N, 3, 3) of a surface with slopes (N, 3) in space."""
+    """Return normals (N, 3), in frames (N, 3, 3) of a surface, for slopes (N, 3) in space."""
     out = frames[:, 2]
     tilted = _scale(out - (slopes - (slopes * out).sum(axis=1, keepdims=True) * out))
-    # The frame need not be square: what it makes of the answer is to be the normal.
+    # The interpolated frame need not be orthogonal, so solve for the components that give the normal.
     along, up = frames[:, 0], frames[:, 1]
     volume = (along * np.cross(up, out)).sum(axis=1, keepdims=True)
     parts = [(tilted * np.cross(a, b)).sum(axis=1) for a, b in ((up, out), (out, along), (along, up))]

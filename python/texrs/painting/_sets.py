@@ -1,4 +1,4 @@
-"""Texture sets: which faces of a mesh share an atlas, as the UVs that came say."""
+"""Texture sets: decide by the UVs of a mesh which faces share an atlas."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from texrs.painting._surface import PAINTED, Floats64, Surface
 __all__ = ["Laid", "lay_flat"]
 
 OFTEN = 256
-"""Triangles that are looked at before anyone is asked whether to go on."""
+"""Number of triangles between two checks whether the call was cancelled."""
 COARSE = 512
 """Side of the atlas that is searched for overlaps."""
 EDGE = 1e-6
-"""Distance of a UV beyond the border of its tile that is taken for rounding."""
+"""Largest distance of a UV beyond its tile that counts as a rounding error."""
 SHARED = 0.02
-"""Least share of the smaller part's texels for an overlap: edges that touch share a few texels."""
+"""Least overlap, as a fraction of the smaller part's texels. Touching edges share a few texels."""
 MOST = 64
+"""Maximum number of texture sets."""
 
 
 class Laid(NamedTuple):
-    """A mesh whose faces all have a place in an atlas.
+    """A mesh whose faces all have a position in an atlas.
 
     Attributes
     ----------
@@ -50,7 +51,7 @@ class Laid(NamedTuple):
 
 
 def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Laid:
-    """Return a mesh with its texture sets: one, or one for each material, part and tile that would lie over others.
+    """Return a mesh with its texture sets: one, or one for each material, part and tile that would overlap.
 
     Raises
     ------
@@ -63,13 +64,13 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Laid:
         bare = np.asarray(np.isnan(surface.uv[surface.faces]).any(axis=(1, 2)), bool)
     if bare.all():
         vertices, faces, uv, kept = unwrap(surface.vertices, surface.faces, side, padding)
-        # Text of a file has other corners now.
+        # The text of a file has other corners than the new layout.
         whole = surface._replace(vertices=vertices, faces=faces, uv=uv, text=None, origin=None)
         whole = whole._replace(normals=None if surface.normals is None else surface.normals[kept])
         return Laid(whole, (PAINTED,), np.zeros(len(faces), np.int64), np.zeros((len(faces), 2)))
     if bare.any():
         assume(
-            f"{surface.name}: {bare.sum()} of {len(bare)} faces have no UVs, and are laid out in a texture set of their own"
+            f"{surface.name}: {bare.sum()} of {len(bare)} faces have no UVs, and are laid out in a separate texture set"
         )
         surface = _unwrap_part(surface, bare, side, padding)
     tile = _find_tiles(surface)
@@ -79,13 +80,13 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Laid:
             f"mesh: its UVs need {len(names)} texture sets, more than {MOST}; lay it out with unwrap (--unwrap)"
         )
     if len(names) > 1:
-        why = "its UVs lie over each other" if not tile.any() else "its UVs lie in several tiles"
+        why = "its UVs overlap" if not tile.any() else "its UVs are in several tiles"
         assume(f"{surface.name}: read as {len(names)} texture sets, {', '.join(names)}, because {why}")
     return Laid(surface, names, which, tile)
 
 
 def _unwrap_part(surface: Surface, bare: NDArray[np.bool_], side: int, padding: int) -> Surface:
-    """Return a mesh whose faces without UVs have some, with vertices of their own behind all others."""
+    """Return a mesh whose faces without UVs got UVs. They have their own vertices, which follow all others."""
     assert surface.uv is not None
     used, local = np.unique(surface.faces[bare], return_inverse=True)
     vertices, faces, uv, kept = unwrap(surface.vertices[used], local.reshape(-1, 3), side, padding)
@@ -119,7 +120,7 @@ def _find_tiles(surface: Surface) -> Floats64:
 
 def _choose(surface: Surface, bare: NDArray[np.bool_], tile: Floats64) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Return the texture set of each face, and the names of the sets."""
-    # Faces that xatlas laid out are a part of their own.
+    # Faces that xatlas laid out are a separate part.
     labels = [*surface.materials, "unwrapped"]
     part = np.where(bare, len(surface.materials), surface.part)
     keys, number = np.unique(np.column_stack([tile, part]), axis=0, return_inverse=True)
@@ -127,10 +128,10 @@ def _choose(surface: Surface, bare: NDArray[np.bool_], tile: Floats64) -> tuple[
     over, own, none = _find_overlaps(surface, number, tile)
     if own:
         ignore(
-            f"{surface.name}: UVs of {own} faces lie over others, whose texels they show; unwrap (--unwrap) lays them apart"
+            f"{surface.name}: UVs of {own} faces overlap others and show the same texels; unwrap (--unwrap) separates them"
         )
     if none:
-        ignore(f"{surface.name}: {none} faces have no area in the atlas, and show one texel")
+        ignore(f"{surface.name}: {none} faces have no area in the atlas, and show a single texel")
     materials = {name: k for k, name in enumerate(dict.fromkeys(labels))}
     material = np.array([materials[labels[int(key[2])]] for key in keys])
     tiles = np.unique(keys[:, :2], axis=0, return_inverse=True)[1].reshape(-1)
@@ -145,6 +146,7 @@ def _choose(surface: Surface, bare: NDArray[np.bool_], tile: Floats64) -> tuple[
         mine = np.flatnonzero(which == k)
         u, v = (int(x) for x in keys[mine[0], :2])
         words = list(dict.fromkeys(labels[int(keys[m, 2])] for m in mine))
+        # Name the set after its material, and the tile by its UDIM number.
         name = words[0] if group.any() or len(words) == 1 else PAINTED
         if len(np.unique(tiles)) > 1:
             name += f"_{1001 + u + 10 * v}" if 0 <= u < 10 and v >= 0 else f"_u{u}v{v}"
@@ -156,7 +158,7 @@ def _choose(surface: Surface, bare: NDArray[np.bool_], tile: Floats64) -> tuple[
 def _find_overlaps(
     surface: Surface, number: NDArray[np.int64], tile: Floats64
 ) -> tuple[list[tuple[int, int]], int, int]:
-    """Return the parts that lie over each other, how many faces lie over others of their part, and how many have no area."""
+    """Return the parts that overlap, the number of faces that overlap their own part, and the number without area."""
     assert surface.uv is not None
     uv = surface.uv[surface.faces] - tile[:, np.newaxis]
     seen: dict[tuple[int, int], NDArray[np.int64]] = {}
@@ -169,6 +171,7 @@ def _find_overlaps(
             continue
         size[mine] += len(texels)
         here = (int(tile[face, 0]), int(tile[face, 1]))
+        # Texels belong to the first part that covers them.
         owner = seen.setdefault(here, np.full(COARSE * COARSE, -1, np.int64))
         met, counts = np.unique(owner[texels], return_counts=True)
         for other, count in zip(met.tolist(), counts.tolist(), strict=True):
@@ -183,7 +186,7 @@ def _find_overlaps(
 
 
 def _cover(uv: Floats64) -> Iterator[NDArray[np.int64] | None]:
-    """Yield the texels whose middles lie in each triangle, of a coarse atlas; None if it has no area."""
+    """Yield the texels of a coarse atlas whose centres are in each triangle; None for a triangle without area."""
     for number, flat in enumerate(uv * COARSE - 0.5):
         if number % OFTEN == 0:
             ask()

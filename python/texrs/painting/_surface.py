@@ -1,4 +1,4 @@
-"""A mesh with all that is known of it."""
+"""The internal form of a mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["MESH", "PAINTED", "Floats64", "Surface"]
 
 Floats64 = NDArray[np.float64]
 PAINTED, MESH = "painted", "mesh"
-"""Names of a material and of an object that have none."""
+"""Names of a material and of an object without a name."""
 
 
 class Surface(NamedTuple):
@@ -24,17 +24,17 @@ class Surface(NamedTuple):
     faces : (M, 3) int64
         Three vertices each.
     uv : (N, 2) float64, optional
-        Place of each vertex in an atlas, from its lower left; NaN if the file has none for it.
+        Position of each vertex in an atlas, from the lower left; NaN if the file has none.
     normals : (N, 3) float64, optional
-        Normals that a file gives; NaN if it gives none for a vertex.
+        Normals from a file; NaN for vertices without one.
     part : (M,) int64
-        Part of each face: a mesh of a scene, or an object's faces of one material.
+        Part of each face. A part is a mesh of a scene, or the faces of an object that have the same material.
     materials, objects : tuple of str
-        Names of each part's material and of its object.
+        Names of the material and of the object of each part.
     text : str, optional
-        Text of an OBJ file.
+        Text of the OBJ file.
     origin : (N,) int64, optional
-        Number of each vertex in that file.
+        Number of each vertex in the OBJ file.
     name : str
         Name of the file, for notices.
 

@@ -44,7 +44,7 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     -------
     Sample
         It has `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is the image of the disc's centre on
-        the plane, which is near the centroid of the visible disc, but not equal to it.
+        the plane. It is near the centroid of the visible disc, but not equal to it.
 
     Raises
     ------

@@ -18,8 +18,8 @@ _COURSE, _BRICK, _JOINT = 34, 80, 5.0
 def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Generate a wall of bricks in running bond, whose mortar is a rigid, connected background.
 
-    Exactly 21 vertical joints are wholly inside the image for every seed. There are three in each
-    of the seven courses that the border does not cut. The layout is "jointed".
+    An image of the default size has exactly 21 vertical joints wholly inside, for every seed. There are three in each of
+    the seven courses that the border does not cut. The layout is "jointed".
 
     Parameters
     ----------
@@ -234,8 +234,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
             knot = knots[row, k]
             cells.append((knot[0] + tall, knot[1]))
             for side in (0, 1):
-                # In the next row, the ropes of knot k lead to knots k and k + 1 if its row is odd, else to k - 1 and
-                # k.
+                # The ropes of knot k lead to knots k and k + 1 of the next row if its row is odd, else to k - 1, k.
                 other = knots[(row + 1) % rows_of, (k + side - 1 + row % 2) % across]
                 regular = np.array([tall, (side - 0.5) * wide])
                 turn = np.array(scene.period)

@@ -37,8 +37,8 @@ class Sample:
         the image cuts it. The tilted samples give the image of the centroid on the plane instead.
     labels : int32 array, (H, W) or (D, H, W), or None
         Label of each pixel: 0 for background, ``i + 1`` for the element of ``centres[i]``. A visible element whose
-        centre is outside the image has a label above N, so ``labels > N`` selects the elements that only enter across
-        the border. With `wrap` there are none: an element that crosses the border continues on the opposite side with
+        centre is outside the image has a label above N, so ``labels > N`` selects the elements that are mostly outside.
+        With `wrap` there are none: an element that crosses the border continues on the opposite side with
         the same label.
     mask : bool array, (H, W) or (D, H, W), or None
         The foreground. It is ``labels > 0``, unless the generator documents another rule.
