@@ -256,9 +256,9 @@ def workers_of(how: str) -> Iterator[list[str]]:
 
 def test_who_shares_the_work_is_checked(here: Path, capsys: Capture) -> None:
     for words, message in (
-        (["--workers", "0"], "--workers: needs an integer"),
+        (["--workers", "0"], "--workers: must be an integer"),
         (["--workers", "2", "--scheduler", "tcp://a"], "one of them can be asked for"),
-        (["--scheduler", "nobody"], "--scheduler: none answers at 'nobody'"),
+        (["--scheduler", "nobody"], "--scheduler: no scheduler answers at 'nobody'"),
     ):
         before = files(here)
         assert main(["batch", "all.toml", *words]) == 2

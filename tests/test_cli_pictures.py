@@ -139,13 +139,13 @@ REFUSED = {
     "tile no.png": "no.png",
     "tile in.png --wrap z": "--wrap: must be one of",
     "tile in.png --overlap 0": "--overlap: each side must be at least 1",
-    "tile in.png --overlap 33": "--overlap: needs an integer from 1 to 32, got 33: at most half of the 64 rows",
-    "tile in.png --overlap 41x10": "from 1 to 40, got 41: at most half of the 80 columns",
+    "tile in.png --overlap 33": "--overlap: must be an integer between 1 and 32, got 33: at most half of the 64 rows",
+    "tile in.png --overlap 41x10": "between 1 and 40, got 41: at most half of the 80 columns",
     "tile in.png --overlap a": "--overlap: needs WIDTHxHEIGHT",
     "tile in.png --source-map s.png": "--source-map: needs a name that ends in .npz",
     "tile in.png --stages in.png": "in.png: is not a folder",
     "tile in.png --stages out.png": "--stages: out.png is already the file of --out",
-    "tile in.png --threads 0": "--threads: needs",
+    "tile in.png --threads 0": "--threads: must be",
     "tile in.png hole.png": "--help",
     "tile": "--help",
     "inpaint in.png": "MASK: must be a mask",
@@ -154,10 +154,10 @@ REFUSED = {
     "inpaint in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
     "inpaint in.png white.png": "white.png: covers the whole image",
     "inpaint in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
-    "inpaint in.png hole.png --patch-size 65": "--patch-size: needs an integer from 4 to 64, got 65",
+    "inpaint in.png hole.png --patch-size 65": "--patch-size: must be an integer between 4 and 64, got 65",
     "inpaint in.png hole.png --patch-size 60": "--patch-size: 60 has no place",
-    "inpaint in.png hole.png --boundary-width -1": "--boundary-width: needs",
-    "inpaint in.png hole.png --seed -1": "--seed: needs",
+    "inpaint in.png hole.png --boundary-width -1": "--boundary-width: must be",
+    "inpaint in.png hole.png --seed -1": "--seed: must be",
     "inpaint in.png hole.png --wrap yes": "--wrap: must be one of",
     "inpaint in.png hole.png --exemplar hole.png": "hole.png: needs the dtype and channels of the image",
     "inpaint in.png hole.png --exemplar no.png": "no.png",
@@ -169,7 +169,7 @@ REFUSED = {
 def test_the_width_of_a_correction_is_checked_before_maps_are_read(here: Path, capsys: Capture) -> None:
     SourceMap.identity((64, 80)).save("map.npz")
     assert main(["apply", "map.npz", "no.png", "-o", "out.png", "--band", "-5"]) == 2
-    assert "--band: needs an integer from 1" in capsys.readouterr().err
+    assert "--band: must be an integer between 1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", REFUSED)

@@ -122,7 +122,7 @@ SIZES = {
     "extend in.png --slant 0 --size 10x5000": "--size: needs 96 x 64 pixels, and what the sides add, at least",
     "inpaint in.png small-mask.png": "small-mask.png: needs shape 96 x 64, got 30 x 40",
     "remove in.png small-mask.png --slant 0": "small-mask.png: needs shape 96 x 64, got 30 x 40",
-    "apply map.npz small.png": "small.png: number 0 needs size 96 x 64, got 30 x 40",
+    "apply map.npz small.png": "small.png: number 0 must have size 96 x 64, got 30 x 40",
     "design tiny.png": "tiny.png: each side must be at least 16, got shape 12 x 8",
     "splice tiny.png sample:dots": "tiny.png: each side must be at least 16, got shape 12 x 8",
     "design in.png --element-labels small-mask.png": "small-mask.png: must be integers of shape 96 x 64, got uint8 30 x 40",

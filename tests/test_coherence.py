@@ -90,8 +90,8 @@ def test_flat_exemplars_take_no_time():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"k": 0}, "k: needs an integer from 1 to 16"),
-        ({"k": 17}, "k: needs an integer from 1 to 16"),
+        ({"k": 0}, "k: must be an integer between 1 and 16"),
+        ({"k": 17}, "k: must be an integer between 1 and 16"),
         ({"n": 6}, "n: needs an odd number"),
         ({"n": 51}, "n: an exemplar of .* has no 3 samples 51 apart"),
         ({"k": 16, "n": 11}, "n: an exemplar of .* has no 16 samples 11 apart"),

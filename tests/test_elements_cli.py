@@ -149,7 +149,7 @@ def test_database(here: Path, capsys: Capture) -> None:
         ("analyse in.png -o before.npz --points none.csv", "none.csv: cannot be read"),
         ("analyse in.png -o before.npz --scales large", "--scales: needs numbers"),
         ("analyse in.png -o before.npz --method letter", "--method: must be one of default, paper"),
-        ("analyse in.png -o before.npz --rotations 0", "--rotations: needs an integer from 1 to 72"),
+        ("analyse in.png -o before.npz --rotations 0", "--rotations: must be an integer between 1 and 72"),
         ("analyse in.png -o before.png", "--out: needs a name that ends in .npz"),
         ("analyse none.png -o before.npz", "none.png: there is no such file"),
         ("database db rename", "add\\|list\\|remove\\|splice\\|matrix: must be one of"),

@@ -126,8 +126,8 @@ def test_numbers_are_seen_on_their_elements(found: ElementAnalysis) -> None:
         ([{"op": "paint"}], "step 0: 'op' must be one of drop, add"),
         ([{"op": "drop"}], "step 0, drop, needs elements"),
         ([{"op": "drop", "elements": [1], "points": []}], "step 0, drop, has no option points"),
-        ([{"op": "drop", "elements": [999]}], "step 0, drop: elements: needs an integer from 0"),
-        ([{"op": "drop", "elements": [0.5]}], "elements: needs an integer"),
+        ([{"op": "drop", "elements": [999]}], "step 0, drop: elements: must be an integer between 0"),
+        ([{"op": "drop", "elements": [0.5]}], "elements: must be an integer"),
         ([{"op": "drop", "elements": [object()]}], "step 0: must contain only"),
         ([{"op": "drop", "elements": float("nan")}], "step 0: must contain only"),
         ([{"op": "add", "points": [[500, 3]]}], "step 0, add: points: point 0, .* outside"),
@@ -135,7 +135,7 @@ def test_numbers_are_seen_on_their_elements(found: ElementAnalysis) -> None:
         ([{"op": "move", "element": 0, "to": [[1, 2], [3, 4]]}], "to: must be one place"),
         ([{"op": "layout", "layout": "net"}], "layout: must be one of disjoint"),
         ([{"op": "background", "points": [[48, 48]], "radius": 1000}], "leaves no foreground"),
-        ([{"op": "foreground", "points": [[48, 48]], "radius": -1}], "radius: needs a number"),
+        ([{"op": "foreground", "points": [[48, 48]], "radius": -1}], "radius: must be a number"),
     ],
 )
 def test_bad_corrections(found: ElementAnalysis, steps: object, message: str) -> None:

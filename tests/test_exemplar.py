@@ -105,9 +105,9 @@ def test_damaged_files_are_refused(tmp_path):
     ("image", "options", "says"),
     [
         (WEAVE[0, 0], {}, "image: needs shape (rows, columns)"),
-        (WEAVE, {"axes": 4}, "axes: needs an integer from 2 to 3"),
+        (WEAVE, {"axes": 4}, "axes: must be an integer between 2 and 3"),
         (WEAVE, {"labels": True}, "labels: must have one channel, got 3"),
-        (WEAVE, {"repeat": "xyz"}, "repeat: needs True, False or 2"),
+        (WEAVE, {"repeat": "xyz"}, "repeat: must be True, False or 2"),
         (np.full((20, 20), np.nan), {}, "image: 400 of 400 values are NaN"),
     ],
 )

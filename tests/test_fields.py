@@ -236,7 +236,7 @@ def narrowing(points):
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: fields.identity(4), "axes: needs 2 or 3"),
+        (lambda: fields.identity(4), "axes: must be 2 or 3"),
         (lambda: fields.identity(True), "axes"),
         (lambda: fields.constant([[1, 0], [0, 0]]), r"matrix: .* determinant is 0, at least 0\.001"),
         (lambda: fields.constant([[200, 0], [0, 1]]), "100 times"),
@@ -247,7 +247,7 @@ def narrowing(points):
         (lambda: fields.rotation(1e9), "angle"),
         (lambda: fields.rotation(30, "xx"), "plane: must be one of xy"),
         (lambda: fields.rotation(30, "xz", axes=2), "plane: must be one of xy, yx"),
-        (lambda: fields.rotation("steep"), "angle: needs a number"),
+        (lambda: fields.rotation("steep"), "angle: must be a number"),
         (lambda: fields.circular("w"), "axis: must be one of x, y, z"),
         (lambda: fields.circular("x", axes=2), "round 'z' alone"),
         (lambda: fields.circular("z", radial="z"), "radial: round z it is x or y"),
@@ -351,7 +351,7 @@ def test_fields_in_words():
         ("zigzag:period=", 2, "zigzag takes"),
         ("zigzag:period=wide", 2, "period needs a number, got 'wide'"),
         ("zigzag:period=3,period=4", 2, "given twice"),
-        ("zigzag:period=nan", 2, "zigzag: period: needs a number"),
+        ("zigzag:period=nan", 2, "zigzag: period: must be a number"),
         ("identity:axes=3", 2, "identity takes nothing"),
         ("circular:centre=a", 2, "centre needs numbers"),
         ("circular:centre=1x2x3", 2, "circular: centre"),

@@ -382,7 +382,7 @@ def test_paths_are_checked(path):
 
 @pytest.mark.parametrize("limit", [0, -1, 1.5, "many", True])
 def test_the_limit_is_checked(tmp_path, limit):
-    with pytest.raises(InvalidInput, match="limit: needs an integer"):
+    with pytest.raises(InvalidInput, match="limit: must be an integer"):
         tio.read(tmp_path / "a.png", limit=limit)
 
 

@@ -54,7 +54,7 @@ def test_every_verb_that_makes_something_is_here():
 def test_every_verb_compares_what_it_needs_before_it_begins(verb, said, monkeypatch):
     if said.get("pixels") and verb == "analyse":
         pytest.skip("makes no pixels but those it is given")
-    with limits.context(**said), pytest.raises(LimitExceeded, match="limit of|may be taken") as told:
+    with limits.context(**said), pytest.raises(LimitExceeded, match="limit of") as told:
         VERBS[verb]()
     assert ":" in str(told.value)
 
@@ -93,11 +93,11 @@ def test_the_least_of_what_is_said_holds(monkeypatch):
 @pytest.mark.parametrize("value", [0, -1, True, "2", float("nan"), float("inf"), 10**400, 1j, [1]])
 def test_what_is_no_limit_is_refused(name, value, monkeypatch):
     for call in (limits.context(**{name: value}).__enter__, lambda: limits.set(**{name: value})):
-        with pytest.raises(InvalidInput, match=f"^{name}: needs a number of"):
+        with pytest.raises(InvalidInput, match=f"^{name}: must be a number of"):
             call()
     if isinstance(value, float | int) and not isinstance(value, bool):
         monkeypatch.setenv(f"TEXRS_{name.upper()}", str(value))
-        with pytest.raises(InvalidInput, match=f"^TEXRS_{name.upper()}: needs a number of"):
+        with pytest.raises(InvalidInput, match=f"^TEXRS_{name.upper()}: must be a number of"):
             limits.current()
 
 
@@ -132,7 +132,7 @@ def test_seconds_of_the_environment_are_those_of_each_call(monkeypatch):
         heed = listen(None)
         heed("begin", 0.0)
         time.sleep(0.06)
-        with pytest.raises(LimitExceeded, match="0.05 s was reached in the stage 'end', at 50% of it"):
+        with pytest.raises(LimitExceeded, match="0.05 s was reached in the stage 'end', at 50% of its work"):
             heed("end", 0.5)
 
 
@@ -192,8 +192,8 @@ def test_what_has_no_estimate_is_refused(wrong):
         ("--pixel-limit 9000", "--size: 96 x 96 has 9216 pixels, more than the limit of 9000"),
         ("--memory-limit 1M", "--size: needs"),
         ("--time-limit 1e-9", "the limit of 1e-09 s was reached"),
-        ("--time-limit 0", "--time-limit: needs a number of seconds above 0, got 0"),
-        ("--pixel-limit 0", "--pixel-limit: needs a number of pixels"),
+        ("--time-limit 0", "--time-limit: must be a number of seconds above 0, got 0"),
+        ("--pixel-limit 0", "--pixel-limit: must be a number of pixels"),
         ("--memory-limit some", "--memory-limit: needs a number of bytes"),
     ],
 )

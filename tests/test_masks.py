@@ -159,10 +159,10 @@ def test_grow_goes_across_cyclic_borders() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Mask(WHITE, threshold=1.5), "threshold: needs a number from 0 to 1"),
-        (lambda: Mask(WHITE, grow=9999), "grow: needs an integer"),
-        (lambda: Mask(WHITE, feather=-1), "feather: needs an integer"),
-        (lambda: Mask(WHITE, invert="no"), "invert: needs True or False"),
+        (lambda: Mask(WHITE, threshold=1.5), "threshold: must be a number between 0 and 1"),
+        (lambda: Mask(WHITE, grow=9999), "grow: must be an integer"),
+        (lambda: Mask(WHITE, feather=-1), "feather: must be an integer"),
+        (lambda: Mask(WHITE, invert="no"), "invert: must be True or False"),
         (lambda: read(WHITE[:40]), r"mask: needs shape \(96, 112\), got \(40, 112\); a mask has the size of the image"),
         (lambda: read(np.full(SIZE, np.nan)), "mask: must be finite"),
         (lambda: read(np.dstack([WHITE] * 5)), "mask: needs shape"),

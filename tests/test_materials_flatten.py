@@ -151,8 +151,8 @@ def test_materials_are_flattened_by_their_roles() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"amount": 2}, "amount: needs a number from 0 to 1"),
-        ({"size": 1}, "size: needs a number from 4"),
+        ({"amount": 2}, "amount: must be a number between 0 and 1"),
+        ({"size": 1}, "size: must be a number between 4"),
         ({"space": "lab"}, "must be one of srgb, linear"),
         ({"wrap": 3}, "wrap"),
     ],

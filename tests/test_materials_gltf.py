@@ -272,7 +272,7 @@ def test_pictures_of_16_bit(tmp_path: Path) -> None:
         ("a.glb", {"shapes": []}, InvalidInput, "shapes: needs plane, sphere or both"),
         ("a.glb", {"shapes": ["plane", "plane"]}, InvalidInput, "shapes: needs plane, sphere or both"),
         ("a.glb", {"shapes": ["cube"]}, InvalidInput, "must be one of plane, sphere"),
-        ("a.glb", {"repeat": 0}, InvalidInput, "repeat: needs an integer from 1"),
+        ("a.glb", {"repeat": 0}, InvalidInput, "repeat: must be an integer between 1"),
         ("a.glb", {"depth": 32}, InvalidInput, "depth: must be one of 8, 16"),
     ],
 )

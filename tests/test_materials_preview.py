@@ -157,8 +157,8 @@ def test_shrunk_values_are_means_of_areas() -> None:
     ("options", "words"),
     [
         ({"tiles": 2}, "tiles"),
-        ({"tiles": (0, 2)}, "tiles: needs an integer from 1"),
-        ({"light": (0, 0)}, r"light\[1\]: needs a number from 1 to 90"),
+        ({"tiles": (0, 2)}, "tiles: must be an integer between 1"),
+        ({"light": (0, 0)}, r"light\[1\]: must be a number between 1 and 90"),
         ({"light": (0, 45, 3)}, "light"),
         ({"side": 0}, "side"),
         ({"side": 2, "tiles": (1, 3)}, "side: 2 pixels do not hold 3 tiles"),

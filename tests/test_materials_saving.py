@@ -169,7 +169,7 @@ def test_bad_ways_to_save_are_refused(tmp_path: Path) -> None:
     stones = Material({"albedo": STONES})
     with pytest.raises(InvalidInput, match="pack: must be one of 'orm', 'none'; got 'rma'"):
         stones.save(tmp_path, pack="rma")  # type: ignore[arg-type]
-    with pytest.raises(InvalidInput, match="mipmaps: needs True or False"):
+    with pytest.raises(InvalidInput, match="mipmaps: must be True or False"):
         stones.save(tmp_path, mipmaps=3)  # type: ignore[arg-type]
     (tmp_path / "mipmaps").write_text("mine")
     with pytest.raises(FileError, match="is not a folder"):

@@ -40,7 +40,7 @@ def test_a_limit_in_the_environment(monkeypatch):
     monkeypatch.setenv("TEXRS_MEMORY", "2e6")
     assert limits.current().memory == 2_000_000
     check_memory(2_000_000)
-    with pytest.raises(LimitExceeded, match=r"size: needs 2.0 MB of memory, 2.0 MB may be taken; smaller"):
+    with pytest.raises(LimitExceeded, match=r"size: needs 2.0 MB of memory, more than the limit of 2.0 MB; smaller"):
         check_memory(2_000_001, way="smaller")
     with pytest.raises(LimitExceeded, match="size"):
         texrs.perspective(np.zeros((32, 32), np.uint8), np.ones((32, 32)), (400, 400))

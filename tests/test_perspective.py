@@ -175,7 +175,7 @@ BAD = [
     ),
     (
         {"scale_map": "auto", "scale_measurement": texrs.scale_maps.Measuring(min_feature_size=9)},
-        "min_feature_size: needs a number from 0.5 to 8",
+        "min_feature_size: must be a number between 0.5 and 8",
     ),
     ({"size": 0}, "size: "),
     ({"size": "large"}, "size: "),

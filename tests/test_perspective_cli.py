@@ -93,9 +93,9 @@ def test_holes_are_filled_by_scale(files):
         ("perspective @floor.png --scale-map @scale.npy -o @out.png --wrap xy", "wrap"),
         (
             "perspective @floor.png --scale-map @scale.npy -o @out.png --scale-weight 99",
-            "--scale-weight: needs a number",
+            "--scale-weight: must be a number",
         ),
-        ("perspective @floor.png --min-feature-size 0 -o @out.png", "--min-feature-size: needs a number from 0.5"),
+        ("perspective @floor.png --min-feature-size 0 -o @out.png", "--min-feature-size: must be a number between 0.5"),
         ("perspective @floor.png --trend steep -o @out.png", "--trend: must be one of none, plane, linear, quadratic"),
         (
             "perspective @floor.png --scale-map @scale.npy --min-feature-size 3 --foreshortened -o @out.png",

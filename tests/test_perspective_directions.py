@@ -123,7 +123,7 @@ def test_same_bytes_for_any_number_of_threads(lines, count):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"direction": np.nan}, "direction: needs a number"),
+        ({"direction": np.nan}, "direction: must be a number"),
         ({"direction": np.full((4, 4), np.inf)}, "direction: needs finite degrees"),
         ({"direction": np.zeros((4, 4, 2))}, "direction: needs degrees"),
         ({"direction": "up"}, "field"),

@@ -207,7 +207,7 @@ def test_an_output_that_wraps(floor):
             {"mask": np.ones((64, 64), bool), "scale_map": "auto", "exemplar": np.zeros((40, 40), np.uint8)},
             "scale_map: 'auto' needs known pixels",
         ),
-        ({"screening": "soft"}, "screening: needs a number"),
+        ({"screening": "soft"}, "screening: must be a number"),
         ({"mask": "alpha"}, "mask: 'alpha' needs an image with an alpha channel"),
         ({"method": "optimise", "patch_size": 12}, "patch_size: method 'optimise' has no patches"),
         ({"method": "optimise", "mask": np.ones((64, 64), bool)}, "mask: covers the whole image"),

@@ -139,7 +139,7 @@ def test_only_the_ground_is_used() -> None:
     [
         (lambda: texrs.rectify(FLOOR, view=Plane((9, 9), 0)), "plane: needs one of a picture of 240 x 288"),
         (lambda: texrs.rectify(FLOOR, view=[PLANE, PLANE]), "view: one plane is made flat"),
-        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: needs a number"),
+        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: must be a number"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=7.9), "resolution: at most|hardly anything"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, size=8), "size"),
         (lambda: texrs.rectify(FLOOR, view=PlaneView(slant=88, fov=10)), "sharp|before its horizon|are sharp"),

@@ -71,13 +71,13 @@ def test_one_pixel_has_a_scale() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"slant": 86}, r"^slant: needs a number from 0 to 85.0, got 86$"),
+        ({"slant": 86}, r"^slant: must be a number between 0 and 85.0, got 86$"),
         ({"slant": -1}, r"^slant: .* got -1$"),
         ({"slant": np.nan}, r"^slant: .* got nan$"),
         ({"tilt": np.inf}, r"^tilt: .* got inf$"),
-        ({"tilt": "up"}, r"^tilt: needs a number .* got 'up'$"),
-        ({"fov": 180}, r"^fov: needs a number from 1 to 170, got 180$"),
-        ({"slant": 80, "fov": 90}, r"^slant: at 80 degrees the plane's horizon is inside an image with a fov of 90"),
+        ({"tilt": "up"}, r"^tilt: must be a number .* got 'up'$"),
+        ({"fov": 180}, r"^fov: must be a number between 1 and 170, got 180$"),
+        ({"slant": 80, "fov": 90}, r"^slant: at 80 degrees the plane's horizon lies inside a picture that spans 90"),
         ({"shape": (0, 5)}, r"^shape: each side must be at least 1"),
         ({"shape": (2**20, 2**20)}, r"^shape: .* more than the limit"),
     ],
@@ -88,7 +88,7 @@ def test_angles_refuse(options: dict, message: str) -> None:
 
 
 def test_ratios_below_one_are_refused() -> None:
-    with pytest.raises(InvalidInput, match=r"^ratio: needs a number from 1 to 131, got 0.5$"):
+    with pytest.raises(InvalidInput, match=r"^ratio: must be a number between 1 and 131, got 0.5$"):
         scale_maps.slant_for_ratio(0.5)
 
 
@@ -286,5 +286,5 @@ def test_red_is_large_and_blue_is_small() -> None:
 
 
 def test_pictures_refuse_a_bar_without_a_span() -> None:
-    with pytest.raises(InvalidInput, match=r"^largest: needs a number from 1.1 to 64, got 1$"):
+    with pytest.raises(InvalidInput, match=r"^largest: must be a number between 1.1 and 64, got 1$"):
         scale_maps.picture(FLOOR, largest=1)

@@ -315,8 +315,8 @@ def test_no_overlap_and_no_b_only_pixel():
         ({"penalty": np.full((4, 4), 3e38)}, "penalty: .*infinite"),
         ({"penalty": ["much"]}, "penalty: needs real numbers"),
         ({"cost": "l2"}, "cost: must be one of gradient, paper"),
-        ({"wrap": "yes"}, "wrap: needs"),
-        ({"old": seam.OldSeams([], [], [])}, r"old\.kept: needs 2 arrays"),
+        ({"wrap": "yes"}, "wrap: must be"),
+        ({"old": seam.OldSeams([], [], [])}, r"old\.kept: must be 2 arrays"),
         ({"old": seam.OldSeams(*[[np.full((4, 4), -1.0)] * 2] * 3)}, "old: .*-1"),
     ],
 )
@@ -331,7 +331,7 @@ def test_bad_input_to_cut(change, message):
     ("a", "options", "message"),
     [
         (np.zeros((4, 1)), {}, "pixels along axis 1"),
-        (np.zeros((4, 4)), {"axis": 2}, "axis: needs an integer from 0 to 1"),
+        (np.zeros((4, 4)), {"axis": 2}, "axis: must be an integer between 0 and 1"),
         (np.zeros((4, 4)), {"penalty": np.ones((3, 4))}, "penalty: needs shape"),
         (np.full((4, 4), np.inf), {}, "NaN or infinite"),
     ],
@@ -359,7 +359,7 @@ def test_many_strips_are_cut_as_each_by_itself():
         (seam.Strip(np.zeros((4, 4)), np.zeros((4, 4)), 1), "strips: a: needs shape"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 3, 1)), 1), "strips: b: needs shape"),
         (seam.Strip(np.zeros((4, 4, 1)), np.full((4, 4, 1), np.nan), 1), "a, b: .*finite"),
-        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 2), "axis: needs an integer from 0 to 1"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 2), "axis: must be an integer between 0 and 1"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 0, np.ones((3, 4))), "penalty: needs shape"),
     ],
 )
@@ -372,7 +372,7 @@ def test_bad_input_to_strips(strip, message):
     ("unary", "pairwise", "message"),
     [
         (np.zeros((3, 2)), 1.0, "unary: needs shape"),
-        (np.zeros((3, 3, 2)), [1.0], "pairwise: needs a number or 2 entries"),
+        (np.zeros((3, 3, 2)), [1.0], "pairwise: must be a number or 2 entries"),
         (np.zeros((3, 3, 2)), -1.0, "pairwise: .*-1"),
         (np.zeros((3, 3, 2)), [np.zeros((2, 3)), 1.0], "pairwise: needs shape"),
         (np.full((3, 3, 2), np.inf), 1.0, "unary: "),

@@ -148,7 +148,7 @@ def test_wrong_maps_get_a_sentence(more, says):
         ),
         (texrs.Guide, {"exemplar": "up", "output": 0}, "guide: the map of the exemplar needs finite numbers"),
         (texrs.Guide, {"exemplar": 0, "output": [[1], [1, 2]]}, "guide: the map of the output needs finite numbers"),
-        (texrs.Guide, {"exemplar": 0, "output": 0, "weight": -1}, "weight: needs a number from 0 to 100"),
+        (texrs.Guide, {"exemplar": 0, "output": 0, "weight": -1}, "weight: must be a number between 0 and 100"),
         (texrs.Constraints, {"mask": MAP > 0}, "constraints: needs either values or coordinates"),
         (
             texrs.Constraints,

@@ -192,5 +192,5 @@ def test_directions_of_volumes_turn_in_space(green):
         if length is not None:
             wanted = wanted * length / np.linalg.norm(wanted, axis=1, keepdims=True)
         np.testing.assert_allclose(found[:, ::-1] * [1, side, 1], wanted, rtol=1e-4, atol=1e-5)
-    with pytest.raises(InvalidInput, match=r"needs shape \(planes, rows, columns, 3\)"):
+    with pytest.raises(InvalidInput, match=r"must have shape \(planes, rows, columns, 3\)"):
         source.render(exemplar[..., :2], map_type="vector")

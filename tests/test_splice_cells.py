@@ -174,8 +174,8 @@ def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"use_cells": 1}, "use_cells: needs True or False"),
-        ({"allow_rotation": "no"}, "allow_rotation: needs True or False"),
+        ({"use_cells": 1}, "use_cells: must be True or False"),
+        ({"allow_rotation": "no"}, "allow_rotation: must be True or False"),
         ({"strength": 1.5}, "strength"),
         ({"strength": "half"}, "strength"),
         ({"use_cells": True, "method": "paper"}, "bends"),

@@ -135,5 +135,5 @@ def test_what_is_kept_of_a_texture_changes_nothing() -> None:
 
 @pytest.mark.parametrize("screening", [-1.0, float("nan"), "soft"])
 def test_bad_weights(screening: object) -> None:
-    with pytest.raises(texrs.errors.InvalidInput, match="screening: needs a number"):
+    with pytest.raises(texrs.errors.InvalidInput, match="screening: must be a number"):
         texrs.splice(make_discs(), LAYOUT, screening=screening)  # type: ignore[arg-type]

@@ -229,7 +229,7 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
 
 @pytest.mark.parametrize("screening", [-1.0, float("inf"), "soft"])
 def test_bad_weights(screening: Any) -> None:
-    with pytest.raises(InvalidInput, match="screening: needs a number"):
+    with pytest.raises(InvalidInput, match="screening: must be a number"):
         texrs.self_splice(BUTTONS, "regularise", screening=screening)
 
 

@@ -109,9 +109,9 @@ def test_a_smaller_one_is_the_middle(name: str) -> None:
     ("size", "error", "words"),
     [
         (8, InvalidInput, "size: each side"),
-        ("big", InvalidInput, "size: needs"),
-        ((64,), InvalidInput, "size: needs"),
-        ((64.5, 64), InvalidInput, "size: needs"),
+        ("big", InvalidInput, "size: must be"),
+        ((64,), InvalidInput, "size: must be"),
+        ((64.5, 64), InvalidInput, "size: must be"),
         ((-3, 64), InvalidInput, "size: each side"),
         ((10**6, 10**6), LimitExceeded, "size:"),
     ],

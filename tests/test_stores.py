@@ -75,7 +75,7 @@ def test_blocks_are_windows(how: str) -> None:
 
 
 def test_the_texture_is_one_key_of_the_graph_and_the_names_tell_parts_apart() -> None:
-    with pytest.raises(InvalidInput, match="blocks, a graph of Dask holds"):
+    with pytest.raises(InvalidInput, match="must give at most 1048576 blocks"):
         PLANE.to_dask(10_000_000, 512)
     few = PLANE.to_dask(200, 64)
     assert len(few.__dask_graph__()) == 16 + 1
@@ -94,7 +94,7 @@ def test_volumes_and_maps_of_materials() -> None:
         made = stones.to_dask((50, 40), 32, origin=(5, 6), map=name)
         assert np.array_equal(made.compute(scheduler="synchronous"), wanted[name].pixels)
     assert np.array_equal(stones.to_dask((50, 40), 32, origin=(5, 6)).compute(), wanted["albedo"].pixels)
-    with pytest.raises(InvalidInput, match="map: there is no 'normal'"):
+    with pytest.raises(InvalidInput, match="map: must be one of .* got 'normal'"):
         stones.to_dask(8, map="normal")
 
 
@@ -115,7 +115,7 @@ def test_source_maps_are_looked_up_lazily() -> None:
     assert np.array_equal(turned.compute(), made.source_map.render(normals, map_type="normal", interpolation="nearest"))
     plain = texrs.design(WEAVE, 96, seed=2)
     assert np.array_equal(plain.source_map.to_dask(WEAVE, 50).compute(), plain.stages["before_blending"])
-    with pytest.raises(InvalidInput, match="exemplars: number 0 needs size"):
+    with pytest.raises(InvalidInput, match="exemplars: number 0 must have size"):
         made.source_map.to_dask(WEAVE[:-1])
 
 
@@ -130,7 +130,7 @@ def test_source_maps_are_looked_up_into_a_store(tmp_path: Path, scheduler: int |
         assert (done.shape, done.made) == ((70, 90, 3), done.chunks)
         assert np.array_equal(texrs.io.read(store), made.source_map.render(other, **options))
         assert made.source_map.to_zarr(store, other, 32, **options).made == 0
-    with pytest.raises(FileError, match="holds something else"):
+    with pytest.raises(FileError, match="contains other data"):
         made.source_map.to_zarr(store, other + 1, 32)
     solid = texrs.solid(STRIPES, 32, seed=1)
     solid.source_map.to_zarr(tmp_path / "solid.zarr", STRIPES, 20, levels=1, spacing=(2, 1, 1))
@@ -168,9 +168,9 @@ def test_materials_are_a_group_each_and_classes_are_not_mixed(tmp_path: Path) ->
     for name in MATERIAL:
         assert np.array_equal(stores.open_store(done.path, name).compute(), wanted[name].pixels)
     assert stores.open_store(done.path, "labels", level=1).dtype == np.bool_
-    with pytest.raises(InvalidInput, match="name: there are albedo, height, labels"):
+    with pytest.raises(InvalidInput, match="name: must be given because .* contains albedo, height, labels"):
         stores.open_store(done.path)
-    with pytest.raises(FileError, match="has no 'gloss'"):
+    with pytest.raises(FileError, match="does not contain 'gloss'"):
         stores.open_store(done.path, "gloss")
 
 
@@ -262,7 +262,7 @@ def test_another_thing_is_not_written_over(tmp_path: Path) -> None:
     assert digest(tmp_path / "a.zarr") == before
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
-    with pytest.raises(FileError, match="is no Zarr store"):
+    with pytest.raises(FileError, match="is not a Zarr store"):
         PLANE.to_zarr(tmp_path / "mine", 40, 32)
     assert other.to_zarr(tmp_path / "a.zarr", 40, 32, overwrite=True).made == 5
     assert digest(tmp_path / "a.zarr") != before
@@ -314,7 +314,7 @@ def test_a_disk_that_was_full_is_gone_on_with(how: int | None, tmp_path: Path, s
         PLANE.to_zarr(small_disk / "a.zarr", 256, 32, levels=1, scheduler=how)
     there = len(list((small_disk / "a.zarr" / "0" / "c").rglob("*")))
     assert there > 9
-    with pytest.raises(FileError, match=r"no room for its 0.00 GiB; nothing was begun"):
+    with pytest.raises(FileError, match=r"too little space for 0.00 GiB; nothing was written"):
         PLANE.to_file(small_disk / "a.npy", 256, 32, scheduler=how)
     subprocess.run([*_mount("remount,size=4m"), small_disk], check=True)
     made = PLANE.to_zarr(small_disk / "a.zarr", 256, 32, levels=1, scheduler=how).made
@@ -376,9 +376,9 @@ def test_a_matrix_of_several_maps_and_one_that_fails(tmp_path: Path) -> None:
 
 
 def test_results_of_other_shapes_are_named(tmp_path: Path) -> None:
-    with pytest.raises(stores.Failed, match=r"2 \(function: gave float64 of shape \(3,\)"):
+    with pytest.raises(stores.Failed, match=r"2 \(function: must return float64 \(2,\) for all items"):
         stores.map_to_zarr(np.zeros, [2, 2, 3], tmp_path / "m.zarr")
-    with pytest.raises(FileError, match="holds something else"):
+    with pytest.raises(FileError, match="contains other data"):
         stores.map_to_zarr(np.zeros, [2, 2], tmp_path / "m.zarr")
     stores.map_to_zarr(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)  # Sent by cloudpickle.
     assert stores.open_store(tmp_path / "l.zarr").compute().tolist() == [[1, 1], [2, 2]]
@@ -445,7 +445,9 @@ def test_a_scheduler_that_does_not_answer_is_named(error: Exception, monkeypatch
             """Nothing began."""
 
     monkeypatch.setattr("distributed.Client", Deaf)
-    with pytest.raises(texrs.errors.InvalidInput, match="scheduler: none answers at '-5' \\((Asser|timed|no port)"):
+    with pytest.raises(
+        texrs.errors.InvalidInput, match="scheduler: no scheduler answers at '-5' \\((Asser|timed|no port)"
+    ):
         list(workers.run(read_limits, [0], "-5"))
 
 
@@ -467,23 +469,23 @@ def test_workers_go_by_the_limits_of_who_asks(scheduler: int | str | None, reque
 
 def test_wrong_arguments(tmp_path: Path) -> None:
     for call, message in (
-        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", (0, 4)), "shape: needs an integer or 2"),
-        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, (4, 4, 4)), "chunks: needs an integer or 2"),
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", (0, 4)), "shape: must be an integer or 2"),
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, (4, 4, 4)), "chunks: must be an integer or 2"),
         (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, levels=0), "levels"),
         (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, origin=10**9), "origin, shape: need to lie within"),
-        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, scheduler=1.5), "scheduler: needs None"),
-        (lambda: PLANE.to_zarr(tmp_path / "y.zarr", 40, scheduler=0), "scheduler: needs an integer"),
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, scheduler=1.5), "scheduler: must be None"),
+        (lambda: PLANE.to_zarr(tmp_path / "y.zarr", 40, scheduler=0), "scheduler: must be an integer"),
         (lambda: PLANE.to_dask(2**41), "shape"),
-        (lambda: stores.map_to_zarr(7, [1], tmp_path / "x.zarr"), "function: needs"),  # type: ignore[arg-type]
-        (lambda: stores.map_to_zarr(np.zeros, [], tmp_path / "x.zarr"), "items: needs at least one"),
+        (lambda: stores.map_to_zarr(7, [1], tmp_path / "x.zarr"), "function: must be"),  # type: ignore[arg-type]
+        (lambda: stores.map_to_zarr(np.zeros, [], tmp_path / "x.zarr"), "items: must have at least one entry"),
         (
             lambda: stores.map_to_zarr(np.zeros, [1, 2], tmp_path / "x.zarr", shape=(2, 2)),
-            "shape: .* holds 4 items, got 2",
+            "shape: must have 2 entries",
         ),
     ):
         with pytest.raises(InvalidInput, match=message):
             call()
-    with pytest.raises(FileError, match="is no Zarr store"):
+    with pytest.raises(FileError, match="is not a Zarr store"):
         stores.open_store(tmp_path / "none.zarr")
 
 

@@ -330,19 +330,19 @@ def test_smallest_pictures(shape):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"overlap": 0}, "overlap: needs an integer from 1 to 20, got 0"),
-        ({"overlap": 21}, "from 1 to 20, got 21: at most half of the 40 rows"),
-        ({"overlap": (4, 26)}, "from 1 to 25, got 26: at most half of the 50 columns"),
-        ({"overlap": 2.5}, "overlap: needs an integer"),
+        ({"overlap": 0}, "overlap: must be an integer between 1 and 20, got 0"),
+        ({"overlap": 21}, "between 1 and 20, got 21: at most half of the 40 rows"),
+        ({"overlap": (4, 26)}, "between 1 and 25, got 26: at most half of the 50 columns"),
+        ({"overlap": 2.5}, "overlap: must be an integer"),
         ({"overlap": (3, 4, 5)}, "overlap: needs one number or"),
-        ({"overlap": "8"}, "overlap: needs an integer"),
-        ({"overlap": True}, "overlap: needs an integer"),
+        ({"overlap": "8"}, "overlap: must be an integer"),
+        ({"overlap": True}, "overlap: must be an integer"),
         ({"size": 30, "overlap": 4}, "overlap: cannot be combined with size"),
         ({"size": (1, 30)}, "size: must have at least 2 rows to wrap them, got 1"),
-        ({"size": (30, 40, 3)}, "size: needs (rows, columns)"),
+        ({"size": (30, 40, 3)}, "size: must be (rows, columns)"),
         ({"size": 0}, "size: each side must be at least 1"),
-        ({"wrap": "xy"}, "wrap: needs"),
-        ({"wrap": (True,)}, "wrap: needs"),
+        ({"wrap": "xy"}, "wrap: must be"),
+        ({"wrap": (True,)}, "wrap: must be"),
     ],
 )
 def test_arguments_are_checked(options, words):

@@ -182,7 +182,7 @@ def test_what_cannot_be_taken_is_said():
         AUGMENT(IMAGE, boxes=[[1, 2, 3]])
     with pytest.raises(InvalidInput, match="image: each side must be at least 16"):
         AUGMENT(IMAGE[:12])
-    with pytest.raises(InvalidInput, match="min_visible: needs a number from 0 to 1"):
+    with pytest.raises(InvalidInput, match="min_visible: must be a number between 0 and 1"):
         TextureAugment(1.5)
 
 

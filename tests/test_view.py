@@ -45,8 +45,8 @@ def test_each_way_to_say_it_settles_the_plane() -> None:
         (lambda: PlaneView(plane=40), "plane: needs a texrs.Plane, got 40"),  # type: ignore[arg-type]
         (lambda: PlaneView(tilt=40), "tilt: needs slant"),
         (lambda: PlaneView(plane=PLANE, fov=50), "fov: the plane has one already"),
-        (lambda: PlaneView(slant=89), "slant: needs a number"),
-        (lambda: PlaneView(fov=0.5), "fov: needs a number"),
+        (lambda: PlaneView(slant=89), "slant: must be a number"),
+        (lambda: PlaneView(fov=0.5), "fov: must be a number"),
         (lambda: PlaneView(corners=[[1, 2], [3, 4]]), "corners: needs shape"),
         (lambda: PlaneView(corners=CORNERS[[0, 2, 1, 3]]).settle(SHAPE), "corners: needs the four of a convex shape"),
         (lambda: PlaneView.of(PLANE).settle((9, 9)), "plane: needs one of a picture of 9 x 9"),

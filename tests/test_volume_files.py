@@ -355,7 +355,7 @@ def test_pictures_are_not_volumes(tmp_path, suffix):
         (lambda p: tio.write_volume(p / "a.tif", np.zeros((2, 2, 2)), spacing=(1, 1, 1)), r"\.tif keeps it for uint8"),
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing=(1, 1)), "three numbers"),
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing=3), "three numbers"),
-        (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing=(1, 0, 1)), "spacing: needs a number"),
+        (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing=(1, 0, 1)), "spacing: must be a number"),
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2)), spacing="abc"), "spacing"),
         (lambda p: tio.write_volume(p / "a.nii", np.zeros((1, 1, 40_000), np.uint8)), "32767"),
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2, 65))), "65 channels"),

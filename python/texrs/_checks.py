@@ -53,7 +53,7 @@ def as_size(
     else:
         sides = as_tuple(value, name, axes, f"{order} as integers")
     if not all(isinstance(s, numbers.Integral) and not isinstance(s, bool) for s in sides):
-        raise InvalidInput(f"{name}: needs {order} as integers, got {value!r}")
+        raise InvalidInput(f"{name}: must be {order} as integers, got {value!r}")
     result = tuple(int(s) for s in sides)
     if min(result) < minimum:
         raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
@@ -82,8 +82,8 @@ def check_memory(needed: int, name: str = "size", *, limit: int | None = None, w
 
     Raises
     ------
-    If more bytes are needed than are known to be available.
-        More bytes than there are, where anything tells.
+    LimitExceeded
+        If more bytes are needed than are allowed or known to be available.
 
     """
     if needed <= FREE and limit is None:
@@ -91,7 +91,9 @@ def check_memory(needed: int, name: str = "size", *, limit: int | None = None, w
     both = [most for most in (limit, find("memory")) if most is not None]
     if both and needed > min(both):
         more = f"; {way}" if way else ""
-        raise LimitExceeded(f"{name}: needs {_spell(needed)} of memory, {_spell(min(both))} may be taken{more}")
+        raise LimitExceeded(
+            f"{name}: needs {_spell(needed)} of memory, more than the limit of {_spell(min(both))}{more}"
+        )
 
 
 def _spell(count: int) -> str:
@@ -140,7 +142,7 @@ def as_instance(value: object, name: str, *kinds: type) -> Any:
     """Check that a value is an instance of one of some classes."""
     if not isinstance(value, kinds):
         needed = " or a ".join(kind.__name__ for kind in kinds)
-        raise InvalidInput(f"{name}: needs a {needed}, got {type(value).__name__}")
+        raise InvalidInput(f"{name}: must be a {needed}, got {type(value).__name__}")
     return value
 
 
@@ -152,7 +154,7 @@ def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...
                 return tuple(value)
         except (TypeError, OverflowError, MemoryError):  # An array without axes, or a range too long for memory.
             pass
-    raise InvalidInput(f"{name}: needs {what}, got {value!r}")
+    raise InvalidInput(f"{name}: must be {what}, got {value!r}")
 
 
 def as_items(value: object, name: str) -> Iterator[Any]:
@@ -160,7 +162,7 @@ def as_items(value: object, name: str) -> Iterator[Any]:
     if isinstance(value, Iterable) and not isinstance(value, str | bytes):
         with suppress(TypeError):  # An array without axes.
             return iter(value)
-    raise InvalidInput(f"{name}: needs a sequence, got {value!r}")
+    raise InvalidInput(f"{name}: must be a sequence, got {value!r}")
 
 
 def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | None = None) -> tuple[bool, ...]:
@@ -169,17 +171,17 @@ def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | N
         return (usual,) * axes
     if isinstance(value, bool | np.bool_):
         return (bool(value),) * axes
-    what = f"True, False or {axes} of them, one an axis"
+    what = f"True, False or {axes} bools, one for each axis"
     sides = as_tuple(value, name, axes, what)
     if not all(isinstance(side, bool | np.bool_) for side in sides):
-        raise InvalidInput(f"{name}: needs {what}; got {value!r}")
+        raise InvalidInput(f"{name}: must be {what}; got {value!r}")
     return tuple(map(bool, sides))
 
 
 def as_bool(value: object, name: str) -> bool:
     """Check a bool."""
     if not isinstance(value, bool | np.bool_):
-        raise InvalidInput(f"{name}: needs True or False, got {value!r}")
+        raise InvalidInput(f"{name}: must be True or False, got {value!r}")
     return bool(value)
 
 
@@ -202,7 +204,7 @@ def as_one(value: Any, name: str, *allowed: str | int | None) -> Any:
 def as_axes(value: object, name: str = "axes") -> int:
     """Check a number of axes, 2 or 3."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value not in (2, 3):
-        raise InvalidInput(f"{name}: needs 2 or 3, got {value!r}")
+        raise InvalidInput(f"{name}: must be 2 or 3, got {value!r}")
     return int(value)
 
 
@@ -218,7 +220,7 @@ def as_progress(value: object, name: str = "progress", *, stages: bool = False) 
     if value is None:
         return None
     if not callable(value):
-        raise InvalidInput(f"{name}: needs a function to call, or None; got {value!r}")
+        raise InvalidInput(f"{name}: must be a function or None, got {value!r}")
     check_call(value, name, *(("stage", "share") if stages else ("share",)))
     return value
 
@@ -226,7 +228,7 @@ def as_progress(value: object, name: str = "progress", *, stages: bool = False) 
 def as_int(value: object, name: str, low: int, high: int) -> int:
     """Check an integer in [low, high]."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:
-        raise InvalidInput(f"{name}: needs an integer from {low} to {high}, got {value!r}")
+        raise InvalidInput(f"{name}: must be an integer between {low} and {high}, got {value!r}")
     return int(value)
 
 
@@ -237,7 +239,7 @@ def as_float(value: object, name: str, low: float, high: float) -> float:
         with suppress(OverflowError):
             number = float(value)
     if not low <= number <= high:
-        raise InvalidInput(f"{name}: needs a number from {low} to {high}, got {value!r}")
+        raise InvalidInput(f"{name}: must be a number between {low} and {high}, got {value!r}")
     return number
 
 

@@ -1,9 +1,9 @@
-"""Work beyond one process: many results in a store, computed by any workers, each once.
+"""Compute many results with any workers, and store each once in a Zarr store.
 
-Needs the extra: ``pip install texrs[dask]``. The caller chooses the scheduler: this process, several processes of this
-machine, or a cluster of Dask. Only the exemplar's pixels, the options and their digest travel to workers. Each worker
-analyses the exemplar once, and has one pool of threads. `texrs.SolidTexture.estimate_memory` gives the memory of a
-worker in advance.
+Requires the extra: ``pip install texrs[dask]``. The caller chooses the scheduler: this process, several processes of
+this machine, or a Dask cluster. Only the exemplar's pixels, the options and their digest are sent to workers. Each
+worker analyses the exemplar once, and has one pool of threads. `texrs.SolidTexture.estimate_memory` gives the memory
+of a worker in advance.
 
 Notes
 -----
@@ -68,20 +68,21 @@ def map_to_zarr(
     Parameters
     ----------
     function : callable
-        A function such as ``functools.partial(texrs.design, image, 256)``. It returns a `texrs.Synthesis` (its image
-        is stored, or all maps of a material), an array, or a mapping of arrays by name. The arrays of all items have
-        one shape.
+        Function to compute, such as ``functools.partial(texrs.design, image, 256)``. It returns a `texrs.Synthesis`
+        (its image is stored, or all maps of a material), an array, or a mapping of arrays by name. The arrays of all
+        items must have the same shape.
     items : sequence
-        Arguments of each call: a tuple of arguments, a mapping of named ones, or a single argument.
+        Arguments of each call: a tuple of positional arguments, a mapping of keyword arguments, or a single argument.
     path : path_like
-        A folder that the workers can also access. Each map is an array in it, whose leading axes are the items.
+        Path of the store. The workers must also have access to it. Each map is an array, whose leading axes are the
+        items.
     shape : int or sequence of int, optional
-        Arrangement of the items: (20, 20) for a matrix of sources and targets, row by row. By default one row.
+        Arrangement of the items, such as (20, 20) for a matrix of sources and targets, row by row. Default: one row.
     key : str, optional
-        Identifier of the computation. By default a digest of the function and the items. A store with another key is
-        refused.
+        Identifier of the computation. A store with another key is refused. Default: a digest of the function and the
+        items.
     scheduler : None, int, str or distributed.Client
-        Scheduler of the work. {scheduler}
+        {scheduler}
     threads : int, optional
         {threads}
     overwrite : bool
@@ -132,16 +133,16 @@ def map_to_zarr(
 
 
 def open_store(path: Path, name: str | None = None, *, level: int = 0) -> Any:
-    """Open a stored result as an array of Dask, with channels last.
+    """Open a stored result as a Dask array, with channels last.
 
     Parameters
     ----------
     path : path_like
         A store that `map_to_zarr` or ``to_zarr`` wrote, or any OME-Zarr image.
     name : str, optional
-        Name of the map, if there are several.
+        Name of the map. Required if there are several.
     level : int
-        Level of an image. 0 is the finest.
+        Resolution level of an image. Default: 0, the finest.
 
     Returns
     -------
@@ -171,7 +172,7 @@ def open_store(path: Path, name: str | None = None, *, level: int = 0) -> Any:
     try:
         group = zarr.open_group(where, mode="r")
     except Exception as error:
-        raise FileError(f"{where}: is no Zarr store ({error})") from None
+        raise FileError(f"{where}: is not a Zarr store ({error})") from None
     with translate_errors(as_path(path), "opening the store"):
         return _find_array(group, array, where, name, level)
 
@@ -181,9 +182,9 @@ def _find_array(group: Any, array: Any, where: str, name: str | None, level: int
     names = [*group.group_keys(), *group.array_keys()]
     if "ome" not in group.attrs and "multiscales" not in group.attrs:
         if name is None and len(names) != 1:
-            raise InvalidInput(f"name: there are {', '.join(sorted(names)) or 'no maps'} in {where}; say which")
+            raise InvalidInput(f"name: must be given because {where} contains {', '.join(sorted(names)) or 'no maps'}")
         if (name or names[0]) not in names:
-            raise FileError(f"{where}: has no {name!r}; there are {', '.join(sorted(names))}")
+            raise FileError(f"{where}: does not contain {name!r}; it contains {', '.join(sorted(names))}")
         group = group[name or names[0]]
         if not hasattr(group, "array_keys"):
             return array.from_array(group, chunks=group.chunks)

@@ -1,1 +1,1 @@
-"""What is too large for one call, in chunks: which there are, who makes them, and where they are kept."""
+"""Compute and store arrays larger than memory in chunks: grids of chunks, workers, Zarr stores and plain files."""

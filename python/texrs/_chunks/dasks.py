@@ -1,4 +1,4 @@
-"""Arrays of Dask whose blocks are made when they are asked for."""
+"""Dask arrays whose blocks are computed on demand."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 __all__ = ["import_dask", "make_dask"]
 
 MOST = 2**20
-"""Blocks of an array: Dask lists them all."""
+"""Maximum number of blocks of an array, because Dask keeps a list of all."""
 
 
 def import_dask() -> Any:
@@ -22,20 +22,21 @@ def import_dask() -> Any:
     Raises
     ------
     InvalidInput
-        It is not installed.
+        If Dask is not installed.
 
     """
     try:
         import dask.array
     except ImportError:
-        raise InvalidInput("to_dask: needs the extra: pip install texrs[dask]") from None
+        raise InvalidInput("to_dask: requires Dask; install it with pip install texrs[dask]") from None
     return dask.array
 
 
 def make_dask(reader: Reader, shape: object, chunks: object, axes: int, name: str) -> Any:
-    """Return a map of a reader as an array of Dask, channels last in one chunk.
+    """Return a map of a reader as a Dask array, with all channels in one chunk of the last axis.
 
-    The reader is one key of the graph: it is sent to a worker once, and its blocks share what it keeps.
+    The reader is one key of the Dask graph. Dask sends it to each worker once, and its blocks share the reader's
+    caches.
     """
     from dask.base import tokenize
     from dask.delayed import delayed
@@ -44,11 +45,12 @@ def make_dask(reader: Reader, shape: object, chunks: object, axes: int, name: st
     grid, channel = Grid.of(shape, chunks, axes), reader.maps[name]
     if len(grid) > MOST:
         raise InvalidInput(
-            f"chunks: {grid.chunks} would be {len(grid)} blocks, a graph of Dask holds {MOST}; take larger ones"
+            f"chunks: must give at most {MOST} blocks, got {len(grid)} of {grid.chunks}; use larger chunks"
         )
     sides = tuple(
         tuple(min(c, n - start) for start in range(0, n, c)) for n, c in zip(grid.shape, grid.chunks, strict=True)
     )
+    # Without a key, Dask chooses random names, because equal results cannot be recognised.
     token = tokenize(reader.key, grid.shape, grid.chunks, name) if reader.key else None
     shared = delayed(reader, name=None if token is None else f"texrs-reader-{token}", pure=True, traverse=False)
     return array.map_blocks(

@@ -1,8 +1,8 @@
-"""Files of one array, filled chunk by chunk by any workers: what an interrupted run has left is gone on with.
+"""Write a file of one array chunk by chunk, with any workers, so that an interrupted run can be continued.
 
-Beside the file that is to be made lies its part file, ``.NAME.texrs-part``: all samples, at their places, whose room on
-the disk is taken before the work; and a journal of the chunks that are there. When all are, the part file takes the name, or is
-turned into the format that is asked for, plane by plane.
+The samples are written to a part file next to the target, ``.NAME.texrs-part``, at their final positions. Its disk
+space is allocated before the work begins. A journal lists the finished chunks. When all are finished, the part file is
+renamed, or converted plane by plane to the requested format.
 """
 
 from __future__ import annotations
@@ -37,31 +37,31 @@ from texrs.io._formats import FORMATS, RAW, check
 __all__ = ["HEADER", "RAW", "Filled", "check_suffix", "fill"]
 
 HEADER = ".nhdr"
-"""Of the file beside raw samples, which says what they are."""
+"""Suffix of the NRRD header next to a file of raw samples, which describes them."""
 BLOCK = 2**24
-"""Bytes that are written at once where a system cannot take room beforehand."""
+"""Bytes per write if the system cannot allocate disk space in advance."""
 LARGEST = 2**63 - 1
-"""Bytes of a file, for whatever system."""
+"""Maximum number of bytes of a file on any system."""
 
 
 @dataclass(frozen=True, slots=True)
 class Filled:
-    """A part file with all of its samples.
+    """A complete part file.
 
     Attributes
     ----------
     part : pathlib.Path
-        Where it lies.
+        Path of the part file.
     start : int
-        Bytes before the samples.
+        Bytes of the header before the samples.
     shape : tuple of int
-        Of the array, channels last.
+        Shape of the array, channels last.
     dtype : numpy.dtype
-        Of the samples, little-endian.
+        Dtype of the samples, little-endian.
     axes : int
-        Without channels.
+        Number of axes without the channels: 2 or 3.
     stored : Stored
-        How many chunks there are, and were made.
+        Number of chunks, and number of chunks computed in this call.
 
     """
 
@@ -73,11 +73,11 @@ class Filled:
     stored: Stored
 
     def open(self) -> Array:
-        """Return the array, which stays on the disk."""
+        """Return the array as a memory map of the part file."""
         return np.memmap(self.part, self.dtype, "r", self.start, self.shape)
 
     def finish(self, temporary: FilePath, spacing: Sequence[float] | None = None) -> None:
-        """Write what was asked for to a temporary name, with the distances of voxels, and remove the part file."""
+        """Write the requested format to a temporary path, with the spacing of voxels, and remove the part file."""
         suffix = temporary.suffix.lower()
         if suffix in (".npy", RAW):
             os.replace(self.part, temporary)
@@ -94,11 +94,11 @@ class Filled:
             _name_journal(self.part).unlink(missing_ok=True)
 
     def describe(self, name: str, spacing: Sequence[float] | None = None) -> str:
-        """Return the header of raw samples that lie in a file of a name, as NRRD has it: axes from the fastest on."""
+        """Return the NRRD header of raw samples in a file ``name``. The fastest axis is listed first."""
         channels, sides = self.shape[self.axes :], self.shape[: self.axes]
         kinds = [{3: "RGB-color", 4: "RGBA-color"}.get(n, "vector") for n in channels] + ["domain"] * 3
         kind = {"float32": "float", "float64": "double", "bool": "uint8"}.get(self.dtype.name, self.dtype.name)
-        # A picture is a volume of one plane.
+        # Describe an image as a volume of one plane.
         apart = reversed((*(1.0,) * (3 - self.axes), *map(float, spacing or ())))
         sizes = [*channels, *reversed((*(1,) * (3 - self.axes), *sides))]
         lines = [
@@ -121,25 +121,25 @@ class Filled:
 
 
 def check_suffix(path: Path, axes: int, channel: Channel, chunk: Sequence[int]) -> None:
-    """Check that a file of a name can hold such an array.
+    """Check that the format of a file name can store such an array.
 
     Raises
     ------
     FileError
-        No such format.
+        If the format is unknown, or ``.raw`` cannot describe the dtype.
     InvalidInput
-        One that cannot hold the dtype or the channels.
+        If the format cannot store the dtype or the channels.
 
     """
     place = FilePath(os.fspath(path))
     suffix = find_suffix(place).lower()
     if suffix == RAW:
         if channel.dtype == np.float16:
-            raise FileError(f"{path}: the header of .raw has no word for float16; .npy and .tif have")
+            raise FileError(f"{path}: the header of .raw has no name for float16; write .npy or .tif")
         return
     if suffix not in FORMATS:
         known = ", ".join([*sorted(s for s, f in FORMATS.items() if (f.images if axes == 2 else f.volumes)), RAW])
-        raise FileError(f"{path}: the suffix {place.suffix!r} is not one that is written: {known}, .zarr")
+        raise FileError(f"{path}: the suffix must be one of {known}, .zarr; got {place.suffix!r}")
     try:
         check(np.zeros((*(1 for _ in chunk), *channel.channels), channel.dtype), suffix, axes)
     except InvalidInput as error:
@@ -156,30 +156,30 @@ def fill(
     threads: int | None = None,
     progress: Progress | bool | None = None,
 ) -> Filled:
-    """Make all chunks of a map into the part file of a path.
+    """Compute all chunks of a map and write them to the part file of ``path``.
 
     Parameters
     ----------
     reader : Reader
-        Makes them.
+        Source of the chunks.
     name : str
-        Of the map.
+        Name of the map.
     grid : Grid
-        The chunks.
+        Division of the array into chunks.
     path : path_like
-        The file that is to be made in the end.
+        Path of the final file.
     scheduler, threads, progress
         As for `texrs._chunks.store.write_image`.
 
     Returns
     -------
     Filled
-        What is to be finished.
+        The complete part file, which `Filled.finish` converts.
 
     Raises
     ------
     FileError
-        There is no room, or the folder cannot be written to.
+        If the disk has too little space, or the folder cannot be written to.
 
     """
     begun, watch, target = time.monotonic(), listen(progress), as_path(path)
@@ -192,8 +192,9 @@ def fill(
         said = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(stream, said)
         header = stream.getvalue()
-    # What cannot be told apart is begun anew.
+    # A reader without a key cannot be compared with an earlier run, so always begin again.
     of = reader.key or f"unknown {time.time_ns()}"
+    # The record identifies the work in the first line of the journal.
     record: dict[str, Any] = {
         "version": __version__,
         "of": of,
@@ -202,6 +203,7 @@ def fill(
         "chunks": list(grid.chunks),
     }
     record |= {"dtype": dtype.str, "start": len(header)}
+    # Follow links, so that the part file is on the same disk as the target.
     real = FilePath(os.path.realpath(target))
     part = real.with_name(f".{real.name[:200]}.texrs-part")
     line = json.dumps(record)
@@ -210,14 +212,16 @@ def fill(
         if done is None:
             done = set()
             _take_room(part, header, prod(shape) * dtype.itemsize)
-        # Anew, for its last line may be cut off.
+        # Rewrite the journal, because the last line of an interrupted run may be cut off.
         with io.atomic(_name_journal(part)) as temporary:
             temporary.write_text("\n".join([line, *map(str, sorted(done)), ""]), encoding="utf-8")
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EFBIG):
             part.unlink(missing_ok=True)
             size = prod(shape) * dtype.itemsize / 2**30
-            raise FileError(f"{target}: the disk has no room for its {size:.2f} GiB; nothing was begun") from None
+            raise FileError(
+                f"{target}: the disk has too little space for {size:.2f} GiB; nothing was written"
+            ) from None
         raise FileError(f"{target}: cannot be written ({error.strerror or error})") from None
     work = _Place(reader, name, grid, str(part), len(header), shape, dtype.str)
     todo = grid.sort(number for number in range(len(grid)) if number not in done)
@@ -230,6 +234,7 @@ def fill(
     try:
         with _name_journal(part).open("a", encoding="utf-8") as journal, answering(say):
             for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
+                # Force the line to the disk, so that a chunk counts only once it is recorded.
                 journal.write(f"{number}\n")
                 journal.flush()
                 os.fsync(journal.fileno())
@@ -237,7 +242,8 @@ def fill(
                 say()
     except InvalidInput:
         if not done and not made:
-            # Refused before anything was made, as workers that do not answer are: there is nothing to go on with.
+            # The work was refused before the first chunk, for example because no scheduler answers. There is nothing
+            # to continue.
             part.unlink(missing_ok=True)
             _name_journal(part).unlink(missing_ok=True)
         raise
@@ -247,7 +253,7 @@ def fill(
 
 @dataclass(frozen=True)
 class _Place:
-    """Makes a chunk and puts it where it belongs."""
+    """Task that computes a chunk and writes it to its position in the part file."""
 
     reader: Reader
     name: str
@@ -273,7 +279,7 @@ def _name_journal(part: FilePath) -> FilePath:
 
 
 def _read_journal(part: FilePath, line: str, count: int) -> set[int] | None:
-    """Return the chunks that are there; None where nothing is, or something else."""
+    """Return the numbers of the finished chunks, or None without a part file of the same work."""
     if not part.is_file():
         return None
     try:
@@ -282,13 +288,13 @@ def _read_journal(part: FilePath, line: str, count: int) -> set[int] | None:
         return None
     if first != line:
         return None
-    # The last line may be cut off: what follows the last end of a line does not count.
+    # The last line may be cut off, so ignore the text after the last line break.
     found = {int(text) for text in lines[:-1] if text.isdigit()}
     return {number for number in found if number < count}
 
 
 def _take_room(part: FilePath, header: bytes, size: int) -> None:
-    """Make a file of a header and so many bytes, which are on the disk: later nothing fails for want of room."""
+    """Create a file of a header and ``size`` bytes, allocated on the disk. Later writes cannot run out of space."""
     _name_journal(part).unlink(missing_ok=True)
     whole = len(header) + size
     if whole > LARGEST:

@@ -1,4 +1,4 @@
-"""How an array is divided into chunks."""
+"""Divide arrays into chunks."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from texrs.errors import InvalidInput
 __all__ = ["Box", "Grid", "as_sides"]
 
 MOST = 2**40
-"""A side may have as many samples."""
+"""Exclusive limit of the samples along an axis."""
 CHUNK = {2: 512, 3: 128}
-"""Sides of chunks, unless others are asked for."""
+"""Default side of a chunk in samples, by the number of axes."""
 
 Box = tuple[slice, ...]
-"""A part of an array, by its axes without channels."""
+"""Range of samples along each axis, without the channels."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """The chunks of an array, without its channels.
+    """Division of an array into chunks. The channels are not divided.
 
     Attributes
     ----------
     shape : tuple of int
         Samples along each axis.
     chunks : tuple of int
-        Of a chunk; the last along an axis may be shorter.
+        Samples of a chunk along each axis. The last chunk along an axis may be shorter.
 
     Examples
     --------
@@ -47,12 +47,12 @@ class Grid:
 
     @classmethod
     def of(cls, shape: object, chunks: object = None, axes: int = 2) -> Grid:
-        """Check a shape, and how it is to be divided: by default into chunks of 512^2 or 128^3.
+        """Check a shape and a chunk size. Default chunks: 512^2 for images and 128^3 for volumes.
 
         Raises
         ------
         InvalidInput
-            Not so many integers of at least 1.
+            If a size is not an integer, or one integer for each axis, of at least 1.
 
         """
         sides = as_sides(shape, "shape", axes)
@@ -61,15 +61,15 @@ class Grid:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Chunks along each axis."""
+        """Number of chunks along each axis."""
         return tuple(-(-n // c) for n, c in zip(self.shape, self.chunks, strict=True))
 
     def __len__(self) -> int:
-        """Return how many chunks there are."""
+        """Return the number of chunks."""
         return math.prod(self.counts)
 
     def index(self, number: int) -> tuple[int, ...]:
-        """Return where a chunk lies among the others."""
+        """Return the index of a chunk along each axis."""
         found = []
         for count in reversed(self.counts):
             number, rest = divmod(number, count)
@@ -77,9 +77,10 @@ class Grid:
         return tuple(reversed(found))
 
     def sort(self, numbers: Iterable[int]) -> list[int]:
-        """Return chunks in the order of a Z-curve: those that follow each other lie together, however many of them are taken.
+        """Sort chunks along a Z-curve, so that any run of successive chunks is compact.
 
-        So workers repeat less along the sides of what they make than by rows, and what they keep is used sooner.
+        In this order, workers compute less twice along the borders of their parts than row by row, and use their
+        caches sooner.
         """
         given = np.array(list(numbers), np.int64)
         index, key, place = np.unravel_index(given, self.counts), np.zeros(len(given), np.uint64), 0
@@ -91,7 +92,7 @@ class Grid:
         return [int(number) for number in given[np.argsort(key, kind="stable")]]
 
     def __getitem__(self, number: int) -> Box:
-        """Return the part of the array that a chunk holds."""
+        """Return the box of the array that a chunk covers."""
         if not 0 <= number < len(self):
             raise IndexError(number)
         return tuple(
@@ -100,18 +101,18 @@ class Grid:
         )
 
     def halved(self) -> Grid:
-        """Return the grid of half the resolution, with chunks as large."""
+        """Return the grid at half the resolution, with chunks of the same size."""
         shape = tuple(-(-n // 2) for n in self.shape)
         return Grid(shape, tuple(min(c, n) for c, n in zip(self.chunks, shape, strict=True)))
 
 
 def as_sides(value: object, name: str, axes: int) -> tuple[int, ...]:
-    """Check a size that need not fit in memory: one integer, or one an axis."""
-    what = f"an integer or {axes} of them, each at least 1"
+    """Check a size that may exceed memory: one integer, or one for each axis."""
+    what = f"an integer or {axes} integers, each at least 1"
     given: Sequence[object] = (
         (value,) * axes if isinstance(value, numbers.Integral) else as_tuple(value, name, axes, what)
     )
     for side in given:
         if isinstance(side, bool) or not isinstance(side, numbers.Integral) or not 1 <= int(side) < MOST:
-            raise InvalidInput(f"{name}: needs {what}, got {value!r}")
+            raise InvalidInput(f"{name}: must be {what}, got {value!r}")
     return tuple(int(side) for side in given if isinstance(side, numbers.Integral))

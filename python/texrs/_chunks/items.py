@@ -1,4 +1,4 @@
-"""Many results of one function in a Zarr store: each item computed once, whoever computes it."""
+"""Compute a function for many items with any workers, and store each result once in a Zarr store."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ Item = Any
 
 
 class Failed(TexrsError):
-    """Some items failed; the others are there, and the same call tries again those that are not.
+    """Some items failed. The results of the others are stored, and the same call tries only the failed items again.
 
     Attributes
     ----------
     reasons : dict of int to str
-        Why, by the number of the item.
+        Reason of each failure, by the number of the item.
 
     """
 
     def __init__(self, reasons: dict[int, str]) -> None:
         first = ", ".join(f"{number} ({reason})" for number, reason in list(reasons.items())[:3])
         more = f" and {len(reasons) - 3} more" if len(reasons) > 3 else ""
-        super().__init__(f"items: {len(reasons)} failed: {first}{more}; the others are there")
+        super().__init__(f"items: {len(reasons)} failed: {first}{more}; the others are stored")
         self.reasons = reasons
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel with the reasons."""
+        """Pickle the error with its reasons."""
         return Failed, (self.reasons,)
 
 
@@ -66,7 +66,7 @@ def map_items(
     """Compute a function for each item, and stream the results to a Zarr store (see `texrs.stores.map_to_zarr`)."""
     begun, watch = time.monotonic(), listen(progress)
     if not callable(function):
-        raise InvalidInput(f"function: needs a function, got {type(function).__name__}")
+        raise InvalidInput(f"function: must be a function, got {type(function).__name__}")
     as_instance(items, "items", Sequence, np.ndarray)
     if isinstance(items, range):
         check_memory(8 * len(items), "items")
@@ -74,7 +74,8 @@ def map_items(
     if key is not None:
         as_instance(key, "key", str)
     if not given:
-        raise InvalidInput("items: needs at least one, got none")
+        raise InvalidInput("items: must have at least one entry, got none")
+    # Continue an existing store only if the function, the items and the version are the same.
     lattice = (len(given),) if shape is None else _as_lattice(shape, len(given))
     record = {"version": __version__, "of": key or _digest(function, given), "items": list(lattice)}
     group = open_group(path, record, {}, overwrite=overwrite)
@@ -94,7 +95,7 @@ def map_items(
     def count(number: int, reason: str | None) -> None:
         nonlocal made
         if stopped:
-            # It was no item that failed.
+            # The progress function raised an exception. It is not the failure of an item.
             raise stopped[0]
         if reason is None:
             made += 1
@@ -104,11 +105,12 @@ def map_items(
 
     with answering(say):
         while todo and not list(group.array_keys()):
-            # The first result says what the arrays are like, before several workers write to them.
+            # Compute the first result here, because it defines the arrays that the workers then write to.
             number = todo.pop(0)
             count(number, work(number, group))
         for number, reason in workers.run(work, todo, scheduler, threads_each=threads):
             count(number, reason)
+    # Fail only at the end, when all other items are stored.
     if reasons:
         raise Failed(dict(sorted(reasons.items())))
     return Stored(store, lattice, total, made, time.monotonic() - begun)
@@ -118,17 +120,17 @@ def _as_lattice(shape: object, count: int) -> tuple[int, ...]:
     axes = len(shape) if isinstance(shape, Sequence) else 1
     sides = as_sides(shape, "shape", max(axes, 1))
     if math.prod(sides) != count:
-        raise InvalidInput(f"shape: {sides} holds {math.prod(sides)} items, got {count}")
+        raise InvalidInput(f"shape: must have {count} entries, one for each item, got {sides}")
     return sides
 
 
 def _digest(function: Function, items: list[Item]) -> str:
-    """Return a digest of what is to be computed: what is there of something else is not gone on with."""
+    """Return a digest of the function and the items, so that a store of other work is not continued."""
     return content_hash(workers.pack(function), *(pickle.dumps(item) for item in items)).hex()
 
 
 def _as_arrays(result: Any) -> dict[str, Array]:
-    """Return the arrays of a result: of a synthesis the image, of its material all maps."""
+    """Return the arrays of a result by name: all maps of a material, or the image of another synthesis."""
     material, image = getattr(result, "material", None), getattr(result, "image", None)
     if material is not None:
         return {name: np.asarray(each.pixels) for name, each in material.items()}
@@ -144,7 +146,7 @@ def _arrange(group: Any, lattice: tuple[int, ...], first: Mapping[str, Array]) -
 
 
 def _find_missing(group: Any, lattice: tuple[int, ...]) -> list[int]:
-    """Return the items of which some array is not there."""
+    """Return the numbers of the items that are missing in at least one array."""
     count = math.prod(lattice)
     names = list(group.array_keys())
     if not names:
@@ -156,7 +158,7 @@ def _find_missing(group: Any, lattice: tuple[int, ...]) -> list[int]:
 
 @dataclass(frozen=True)
 class _Item:
-    """Computes and writes an item; returns why it failed, if it did."""
+    """Task that computes and writes an item. It returns the reason of a failure, or None."""
 
     function: Function
     items: list[Item]
@@ -178,7 +180,7 @@ class _Item:
                 self._write(number, name, array)
         except (FileError, MemoryError):
             raise
-        except Exception as error:  # One that is broken does not stop the others.
+        except Exception as error:  # A failed item does not stop the others.
             return f"{type(error).__name__}: {error}" if not isinstance(error, TexrsError) else str(error)
         return None
 
@@ -186,11 +188,13 @@ class _Item:
         try:
             whole = open_array(self.store, name)
         except (FileNotFoundError, KeyError):
-            raise InvalidInput(f"function: gave a map {name!r}, which the first item does not have") from None
+            raise InvalidInput(
+                f"function: must return the same maps for all items; the first has no {name!r}"
+            ) from None
         wanted = whole.shape[len(self.lattice) :]
         if array.shape != wanted or array.dtype != whole.dtype:
             raise InvalidInput(
-                f"function: gave {array.dtype} of shape {array.shape}, for the first item {whole.dtype} of {wanted}"
+                f"function: must return {whole.dtype} {wanted} for all items, got {array.dtype} {array.shape}"
             )
         try:
             whole[tuple(map(int, np.unravel_index(number, self.lattice)))] = array

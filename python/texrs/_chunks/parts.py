@@ -1,4 +1,4 @@
-"""What is larger than memory, as arrays in chunks: for Dask, into Zarr, and into files of one array."""
+"""Arrays larger than memory, computed in chunks: as Dask arrays, in Zarr stores, and in files of one array."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ __all__ = ["InParts", "Part"]
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What is read chunk by chunk.
+    """A source of chunks, and its position in an unbounded texture.
 
     Attributes
     ----------
     reader : Reader
-        Gives any part of it.
+        Source of any box of the part.
     origin : tuple of int
-        Where in the world its first sample lies.
+        Position of the first sample in the coordinates of the unbounded texture.
     base : str
-        The map that shows it.
+        Name of the map that shows the texture, such as the base colour.
 
     """
 
@@ -43,20 +43,20 @@ class Part:
     base: str
 
     def name(self, map: str | None) -> str:
-        """Check the name of a map; None is the one that shows what it is."""
+        """Check the name of a map. None is the map that shows the texture."""
         if map is not None and (not isinstance(map, str) or map not in self.reader.maps):
-            raise InvalidInput(f"map: there is no {map!r}; there are {', '.join(self.reader.maps)}")
+            raise InvalidInput(f"map: must be one of {', '.join(self.reader.maps)}; got {map!r}")
         return map or self.base
 
 
 class InParts(ABC):
-    """Something without borders, of which parts of any size can be had, chunk by chunk."""
+    """Base class of unbounded textures. Parts of any size can be computed chunk by chunk."""
 
     axes: ClassVar[int]
 
     @abstractmethod
     def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
-        """Check where a part begins, and that it lies within the world; return what reads it."""
+        """Check that a part is within the allowed coordinates, and return its source."""
 
     @share_words
     def to_dask(
@@ -67,31 +67,31 @@ class InParts(ABC):
         origin: int | Sequence[int] = 0,
         map: str | None = None,
     ) -> Any:
-        """Return a part as an array of Dask, of any size: a block is made when it is asked for.
+        """Return a part of any size as a Dask array, whose blocks are computed on demand.
 
-        The texture is one key of the graph: it is sent to each worker once, and its blocks share what it keeps.
+        The texture is one key of the Dask graph. Dask sends it to each worker once, and its blocks share its caches.
 
         Parameters
         ----------
-        shape : int, or one an axis
-            Voxels along each axis.
-        chunks : int, or one an axis, optional
-            Of a block; 512 each in pictures and 128 in volumes by default. Larger ones take more memory and repeat less work
-            along their sides.
-        origin : int, or one an axis
-            First voxel, of the world.
+        shape : int or sequence of int
+            Samples along each axis.
+        chunks : int or sequence of int, optional
+            Samples of a block along each axis. Larger blocks take more memory, and compute less twice along their
+            borders. Default: 512 for images, 128 for volumes.
+        origin : int or sequence of int
+            First sample, in the coordinates of the unbounded texture. Default: 0.
         map : str, optional
             {map}
 
         Returns
         -------
         dask.array.Array
-            In the exemplar's dtype, channels last; equal to the windows.
+            The part in the exemplar's dtype, channels last. Its values are equal to those of windows.
 
         Raises
         ------
         InvalidInput
-            Not such sizes, no such map, or there is no Dask (``pip install texrs[dask]``).
+            If a size is wrong, the map does not exist, or Dask is not installed (``pip install texrs[dask]``).
 
         Examples
         --------
@@ -123,30 +123,29 @@ class InParts(ABC):
         overwrite: bool = False,
         progress: Progress | bool | None = None,
     ) -> Stored:
-        """Write a part of any size to an OME-Zarr store, with its coarser levels, by any workers.
+        """Write a part of any size to an OME-Zarr store with coarser levels, with any workers.
 
-        A chunk is there whole or not at all. What a run that was stopped has left, whatever stopped it, is gone on with when
-        the same is asked for again: no chunk is made twice. napari and neuroglancer open the store.
+        A chunk is written completely or not at all. The same call continues a run that was stopped for any reason, and
+        computes no chunk twice. napari and neuroglancer open the store.
 
         Parameters
         ----------
         path : path_like
-            A folder, which workers see too; a material's maps are a group each. Axes are (c, z, y, x) there, as OME-Zarr
-            wants it; `texrs.stores.open_store` brings them back.
-        shape : int, or one an axis
-            Voxels along each axis.
-        chunks : int, or one an axis, optional
+            Folder of the store. The workers must also have access to it. Each map of a material is a group. The axes
+            are (c, z, y, x), as OME-Zarr requires. `texrs.stores.open_store` returns them with channels last.
+        shape : int or sequence of int
+            Samples along each axis.
+        chunks : int or sequence of int, optional
             {chunks}
-        origin : int, or one an axis
-            First voxel, of the world.
+        origin : int or sequence of int
+            First sample, in the coordinates of the unbounded texture. Default: 0.
         levels : int, optional
             {levels}
         spacing : sequence of float, optional
-            Of voxels along each axis, 1 by default.
+            Distance of samples along each axis. Default: 1.
         unit : str, optional
             {unit}
         scheduler : None, int, str or distributed.Client
-            Who makes the chunks.
             {scheduler}
         threads : int, optional
             {threads}
@@ -158,14 +157,14 @@ class InParts(ABC):
         Returns
         -------
         texrs.stores.Stored
-            How many chunks there are, and were made.
+            Number of chunks, and number of chunks computed in this call.
 
         Raises
         ------
         InvalidInput
-            Not such sizes, no such scheduler, or there is no zarr (``pip install texrs[dask]``).
+            If a size is wrong, the scheduler does not exist, or zarr is not installed (``pip install texrs[dask]``).
         FileError
-            The store holds something else, or cannot be written.
+            If the store contains other data, or cannot be written.
 
         Examples
         --------
@@ -210,28 +209,29 @@ class InParts(ABC):
         threads: int | None = None,
         progress: Progress | bool | None = None,
     ) -> Stored:
-        """Write a part of any size to one file, chunk by chunk, by any workers.
+        """Write a part of any size to one file, chunk by chunk, with any workers.
 
-        The room on the disk is taken before the work. What a run that was stopped has left, ``.NAME.texrs-part``, is gone on
-        with when the same is asked for again; at the end it takes the name.
+        The disk space is allocated before the work begins. The same call continues a run that was stopped, from its
+        part file ``.NAME.texrs-part``. At the end, the part file gets the final name.
 
         Parameters
         ----------
         path : path_like
-            ``.npy``, ``.tif``, and ``.raw`` with its header ``.nhdr`` beside it, which NRRD readers open, take any size;
-            what else `texrs.io.write` or `texrs.io.write_volume` knows is in memory once, at the end.
-        shape : int, or one an axis
-            Voxels along each axis.
-        chunks : int, or one an axis, optional
+            Path of the file. ``.npy``, ``.tif`` and ``.raw`` can have any size; ``.raw`` has a header ``.nhdr``, which
+            NRRD readers open. Other formats of `texrs.io.write` or `texrs.io.write_volume` are in memory once, at the
+            end.
+        shape : int or sequence of int
+            Samples along each axis.
+        chunks : int or sequence of int, optional
             {chunks}
-        origin : int, or one an axis
-            First voxel, of the world.
+        origin : int or sequence of int
+            First sample, in the coordinates of the unbounded texture. Default: 0.
         map : str, optional
             {map}
         spacing : sequence of float, optional
-            Of voxels along each axis, in formats of volumes that keep it, as .raw and .vti do.
+            Distance of voxels along each axis, for formats of volumes that store it, such as ``.raw`` and ``.vti``.
+            Default: not stored.
         scheduler : None, int, str or distributed.Client
-            Who makes the chunks.
             {scheduler}
         threads : int, optional
             {threads}
@@ -241,14 +241,14 @@ class InParts(ABC):
         Returns
         -------
         texrs.stores.Stored
-            How many chunks there are, and were made.
+            Number of chunks, and number of chunks computed in this call.
 
         Raises
         ------
         InvalidInput
-            Not such sizes, no such map or scheduler, or a dtype that the format cannot hold.
+            If a size is wrong, the map or the scheduler does not exist, or the format cannot store the dtype.
         FileError
-            No such format, no room, or the file cannot be written.
+            If the format is unknown, the disk has too little space, or the file cannot be written.
 
         Examples
         --------
@@ -270,17 +270,17 @@ class InParts(ABC):
 
 
 def check_spacing(path: Path, spacing: Sequence[float] | None, axes: int) -> Sequence[float] | None:
-    """Check distances of voxels, and that a file of a name keeps them."""
+    """Check the spacing of voxels, and that the format of the file stores it."""
     if spacing is None:
         return None
     suffix = find_suffix(FilePath(path)).lower()
     if axes != 3:
-        raise InvalidInput("spacing: is of volumes; no format of pictures keeps it")
+        raise InvalidInput("spacing: only volumes have a spacing; image formats do not store it")
     return as_spacing(spacing, ".nrrd" if suffix == RAW else suffix)
 
 
 def write_filled(filled: Filled, path: Path, spacing: Sequence[float] | None = None) -> None:
-    """Write a file of what is filled, and of raw samples the header."""
+    """Write the requested file of a complete part file, and the header of raw samples."""
     target = FilePath(path)
     if target.suffix.lower() == RAW:
         with atomic(target.with_suffix(HEADER)) as temporary:

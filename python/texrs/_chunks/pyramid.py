@@ -1,4 +1,4 @@
-"""Coarser levels of what is stored, for viewers: each half of the one before."""
+"""Compute the coarser levels of a stored image for viewers. Each level has half the resolution of the previous one."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ __all__ = ["count_levels", "halve_block"]
 
 
 def count_levels(grid: Grid) -> int:
-    """Return how many levels there are until one chunk holds all."""
+    """Return the number of levels until the coarsest fits in one chunk."""
     return 1 + max(0, math.ceil(math.log2(max(n / c for n, c in zip(grid.shape, grid.chunks, strict=True)))))
 
 
 def halve_block(block: Array, axes: int, *, labelled: bool) -> Array:
-    """Return a part at half the resolution: means of 2^A samples, of the one or two that there are at odd ends.
+    """Halve the resolution of a block: each sample becomes the mean of 2^A samples, where A is ``axes``.
 
-    Whole numbers are rounded, halves upwards. Of classes the most frequent is taken, of several the least.
+    The last samples of an odd side count twice. Integers of up to 32 bits are rounded to the nearest, halves upwards.
+    Larger integers round halves to even. Classes are not averaged: the most frequent class is taken, and the smallest
+    if several are equally frequent.
 
     Examples
     --------
@@ -32,7 +34,7 @@ def halve_block(block: Array, axes: int, *, labelled: bool) -> Array:
     array([[2, 9]], dtype=uint8)
 
     """
-    # The last sample counts twice where it has no neighbour.
+    # Repeat the last sample along an odd side, because it has no neighbour.
     pads = [(0, n % 2) for n in block.shape[:axes]] + [(0, 0)] * (block.ndim - axes)
     whole = np.pad(block, pads, mode="edge") if any(pad[1] for pad in pads) else block
     parts = [whole[tuple(slice(s, None, 2) for s in corner)] for corner in product((0, 1), repeat=axes)]

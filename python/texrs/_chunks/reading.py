@@ -1,4 +1,4 @@
-"""What arrays in chunks are read from: anything that gives any part of its maps, in any process."""
+"""Interface of the sources of chunked arrays: objects that return any box of their maps, in any process."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["Channel", "Reader"]
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """What is known of a map before any of it is made.
+    """Dtype and channels of a map, which are known before any chunk is computed.
 
     Attributes
     ----------
     dtype : numpy.dtype
-        Of its values.
+        Dtype of the values.
     channels : tuple of int
-        Their number, or nothing where there is no such axis.
+        Number of channels, or an empty tuple without a channel axis.
     labelled : bool
-        Whether the values are classes, of which there is no mean.
+        If True, the values are classes, which cannot be averaged.
 
     """
 
@@ -35,20 +35,20 @@ class Channel:
 
     @classmethod
     def of(cls, image: Array, axes: int, *, labelled: bool = False) -> Channel:
-        """Return what is known of a map that is like an image."""
+        """Return the description of a map that has the dtype and channels of an image. A bool image is labelled."""
         return cls(image.dtype, image.shape[axes:], labelled or image.dtype == np.bool_)
 
 
 class Reader(Protocol):
-    """Gives parts of maps that are in register; it can be pickled."""
+    """Source of several maps of the same size. It can be pickled."""
 
     @property
     def maps(self) -> Mapping[str, Channel]:
-        """What there is, by name."""
+        """Description of each map, by name."""
 
     @property
     def key(self) -> str | None:
-        """Digest of all that decides the values; None where that cannot be known."""
+        """Digest of everything that determines the values, or None if it cannot be computed."""
 
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
-        """Return a part of some maps."""
+        """Return a box of the maps with the given names."""

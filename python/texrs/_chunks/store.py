@@ -1,4 +1,4 @@
-"""Zarr: images in chunks, each written whole or not at all, so that what is there need not be made again."""
+"""Write images to Zarr stores in chunks. Each chunk is written completely or not at all, so a run can be continued."""
 
 from __future__ import annotations
 
@@ -27,29 +27,30 @@ from texrs.io._ome import describe_image
 __all__ = ["Stored", "import_zarr", "list_done", "open_group", "write_image"]
 
 RECORD = "texrs"
-"""The attribute that says what a store holds."""
+"""Name of the attribute that records the work a store belongs to."""
 BEGINNING = 0.5
-"""Seconds in which a folder that is there becomes a store, where another process is making it."""
+"""Seconds to wait until a folder becomes a store, because another process may be creating it."""
 IMAGE = "image"
-"""Name of the map of what has one alone: it lies at the root."""
+"""Name of a single map. It is stored at the root."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """What was stored.
+    """Report about a stored result.
 
     Attributes
     ----------
     path : str
-        The store.
+        Path of the store or file.
     shape : tuple of int
-        Of the array, channels last, without them where there are several maps.
+        Shape of the array, channels last. Without channels if there are several maps. For `texrs.stores.map_to_zarr`,
+        the arrangement of the items.
     chunks : int
-        How many there are, of all maps and levels.
+        Number of chunks of all maps and levels, or number of items.
     made : int
-        Number of those that were made now; the others were there.
+        Number of chunks or items computed in this call. The others were already stored.
     seconds : float
-        How long it took, in seconds.
+        Duration of the call, in seconds.
 
     Examples
     --------
@@ -67,34 +68,34 @@ class Stored:
 
 
 def import_zarr() -> Any:
-    """Return the library.
+    """Return the module `zarr`.
 
     Raises
     ------
     InvalidInput
-        It is not installed, or an old one is.
+        If zarr is not installed, or is older than version 3.
 
     """
     try:
         import zarr
     except ImportError:
-        raise InvalidInput("path: a Zarr store needs the extra: pip install texrs[dask]") from None
+        raise InvalidInput("path: a Zarr store requires zarr; install it with pip install texrs[dask]") from None
     if int(zarr.__version__.split(".")[0]) < 3:
-        raise InvalidInput(f"path: a Zarr store needs zarr 3, got {zarr.__version__}")
+        raise InvalidInput(f"path: a Zarr store requires zarr 3 or newer, got {zarr.__version__}")
     return zarr
 
 
 def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, Any], *, overwrite: bool) -> Any:
-    """Return the group of a store: the one that is there, if it is of the same, or a new one.
+    """Return the group of a store: the existing one if its record is the same, or a new one.
 
     Raises
     ------
     FileError
-        Something else is there, and is not to be replaced.
+        If the path contains other data and ``overwrite`` is False, or the store cannot be opened.
 
     """
     zarr, name = import_zarr(), os.fspath(as_path(path))
-    # As it comes back from JSON.
+    # Convert the record as a round trip through JSON does, so that it can be compared with a stored one.
     said = json.loads(json.dumps(dict(record)))
     try:
         if overwrite and os.path.isfile(name):
@@ -105,10 +106,12 @@ def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, A
                 return zarr.create_group(
                     name, zarr_format=3, overwrite=overwrite, attributes={**attributes, RECORD: said}
                 )
-            except zarr.errors.ContainsGroupError:  # Another process was faster.
+            except zarr.errors.ContainsGroupError:  # Another process created the group first.
                 group = zarr.open_group(name, mode="r+")
         if group.attrs.get(RECORD) != said:
-            raise FileError(f"{name}: holds something else, or was made with other options; overwrite=True replaces it")
+            raise FileError(
+                f"{name}: contains other data, or was written with other options; overwrite=True replaces it"
+            )
         return group
     except FileError:
         raise
@@ -117,7 +120,7 @@ def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, A
 
 
 def _open_if_there(name: str) -> Any:
-    """Return the group of a store, or None where there is nothing yet."""
+    """Return the group of a store, or None if the path is empty."""
     end = time.monotonic() + BEGINNING
     while True:
         try:
@@ -126,7 +129,7 @@ def _open_if_there(name: str) -> Any:
             if not os.path.lexists(name) or (os.path.isdir(name) and not os.listdir(name)):
                 return None
         if time.monotonic() > end:
-            raise FileError(f"{name}: is there, and is no Zarr store; overwrite=True replaces it")
+            raise FileError(f"{name}: exists, and is not a Zarr store; overwrite=True replaces it")
         time.sleep(BEGINNING / 10)
 
 
@@ -138,7 +141,7 @@ def make_array(
     dtype: np.dtype[Any],
     axes: Sequence[str] | None = None,
 ) -> Any:
-    """Return an array of a group, made if it is not there; chunks of nothing but zeros are written too."""
+    """Return an array of a group, and create it if it does not exist. Chunks of zeros are also written."""
     if name in group:
         return group[name]
     try:
@@ -149,15 +152,15 @@ def make_array(
             dtype=dtype,
             fill_value=0,
             dimension_names=None if axes is None else list(axes),
-            # What is not there has not been made.
+            # Write chunks of zeros too, because a missing chunk means that it was not computed.
             config={"write_empty_chunks": True},
         )
-    except import_zarr().errors.ContainsArrayError:  # Another process was faster.
+    except import_zarr().errors.ContainsArrayError:  # Another process created the array first.
         return group[name]
 
 
 def _make_group(group: Any, name: str) -> Any:
-    """Return a group of a group, made if it is not there."""
+    """Return a subgroup of a group, and create it if it does not exist."""
     try:
         return group.require_group(name)
     except import_zarr().errors.ContainsGroupError:
@@ -165,13 +168,13 @@ def _make_group(group: Any, name: str) -> Any:
 
 
 def open_array(path: str, name: str) -> Any:
-    """Return an array of a store, to write chunks to."""
+    """Open an array of a store for writing."""
     zarr = import_zarr()
     return zarr.open_array(path, path=name, mode="r+", config={"write_empty_chunks": True})
 
 
 def list_done(array: Any) -> set[tuple[int, ...]]:
-    """Return the chunks that are there, by their index along each axis."""
+    """Return the stored chunks of an array, by their index along each axis."""
     from zarr.core.sync import sync
 
     store, prefix = array.store_path.store, f"{array.path}/c/".lstrip("/")
@@ -206,16 +209,16 @@ def write_image(
     overwrite: bool = False,
     progress: Progress | bool | None = None,
 ) -> Stored:
-    """Write maps to an OME-Zarr store; what an interrupted run has left is gone on with.
+    """Write maps to an OME-Zarr store, and continue an interrupted run.
 
-    A single map named ``image`` lies at the root, several in a group each.
+    A single map named ``image`` is stored at the root. Several maps are stored in a group each.
 
     Raises
     ------
     InvalidInput
-        A wrong size, or there is no zarr.
+        If a size is wrong, or zarr is not installed.
     FileError
-        The store holds something else, or cannot be written.
+        If the store contains other data, or cannot be written.
 
     """
     begun, watch = time.monotonic(), listen(progress)
@@ -230,6 +233,7 @@ def write_image(
         apart = tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
     if unit is not None:
         as_instance(unit, "unit", str)
+    # A store is continued only if all of these values are the same.
     record = {
         "version": __version__,
         "of": reader.key,
@@ -247,9 +251,10 @@ def write_image(
         for name, c in reader.maps.items()
     }
     if reader.key is None and not overwrite:
-        # Nobody can tell whether what is there is of the same function.
+        # A reader without a key cannot be compared with the existing store, so never continue one.
         record["of"] = f"unknown {time.time_ns()}"
     group = open_group(path, record, says[IMAGE] if alone else {}, overwrite=overwrite)
+    # Create all arrays before the work begins, so that workers only write chunks.
     letters = "zyx"[3 - axes :]
     try:
         for name, channel in reader.maps.items():
@@ -271,6 +276,7 @@ def write_image(
     total = sum(map(len, grids)) * len(reader.maps)
     made = 0
     clock = _Clock(watch, total)
+    # Finish a level before the next, which is computed from its stored chunks.
     for level, each in enumerate(grids):
         missing = {n: _find_missing(store, _place(n, level, alone), c, each) for n, c in reader.maps.items()}
         todo = each.sort(set().union(*missing.values()))
@@ -294,7 +300,7 @@ def _place(name: str, level: int, alone: bool) -> str:
 
 
 def _find_missing(store: str, place: str, channel: Channel, grid: Grid) -> set[int]:
-    """Return the numbers of the chunks of an array that are not there."""
+    """Return the numbers of the missing chunks of an array."""
     done = list_done(open_array(store, place))
     before = (0,) * len(channel.channels)
     return {n for n in range(len(grid)) if (*before, *grid.index(n)) not in done}
@@ -302,7 +308,7 @@ def _find_missing(store: str, place: str, channel: Channel, grid: Grid) -> set[i
 
 @dataclass(frozen=True)
 class _Fill:
-    """Makes a chunk of the finest level, of all maps."""
+    """Task that computes a chunk of the finest level in each map."""
 
     reader: Reader
     grid: Grid
@@ -318,7 +324,7 @@ class _Fill:
 
 @dataclass(frozen=True)
 class _Halve:
-    """Makes a chunk of a level from the one before."""
+    """Task that computes a chunk of a level from the previous level in each map."""
 
     maps: dict[str, Channel]
     grid: Grid
@@ -348,23 +354,23 @@ def _write(store: str, place: str, box: Box, block: Array, channel: Channel) -> 
 
 
 class _Clock:
-    """Tells how far it is, how fast it goes, and how long it will take."""
+    """Report the progress over all levels and maps."""
 
     def __init__(self, watch: Progress | None, total: int) -> None:
         self.watch, self.total, self.done, self.new = watch, max(total, 1), 0, 0
         self.begun = time.monotonic()
 
     def skip(self, count: int) -> None:
-        """Count what was there."""
+        """Count chunks that are already stored."""
         self.done += count
 
     def advance(self, count: int, stage: str) -> None:
-        """Count what was made."""
+        """Count new chunks, and report the progress."""
         self.done += count
         self.new += count
         self.say(stage)
 
     def say(self, stage: str) -> None:
-        """Say how far it is."""
+        """Call the progress function with the completed share."""
         if self.watch is not None:
             self.watch(stage, min(1.0, self.done / self.total))

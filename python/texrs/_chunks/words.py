@@ -1,4 +1,4 @@
-"""What parameters that several functions share are for, said once."""
+"""Descriptions of parameters that several functions share."""
 
 from __future__ import annotations
 
@@ -11,20 +11,23 @@ __all__ = ["share_words"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 WORDS = {
-    "scheduler": """None: this process. A number: so many processes of this machine, which a script must start under
-``if __name__ == "__main__":``. An address, or a client: the workers of that cluster, which see the same folders.""",
-    "threads": "Of each worker; by default the cores are shared out.",
-    "overwrite": "Whether what is there, and is not of the same, is replaced.",
-    "progress": "Called with the stage and the share of it that is done; raising stops the work. True shows a bar.",
-    "chunks": "Of a chunk; 512 each in pictures and 128 in volumes by default.",
-    "levels": "How many resolutions, each half of the one before; by default until one chunk holds all.",
-    "unit": 'Of the spacing, such as "micrometer".',
-    "map": "Of a material, the map; by default the one that shows it.",
+    "scheduler": """Scheduler of the work. An integer is a number of processes of this machine, which a script must start under
+``if __name__ == "__main__":``. An address or a client is a Dask cluster, whose workers need access to the same folders.
+Default: this process.""",
+    "threads": "Number of threads of each worker. Default: the workers share the cores.",
+    "overwrite": "If True, replace existing data of another computation. Default: False.",
+    "progress": """Function that is called with the stage and the completed share. If it raises an exception, the work stops.
+True shows a bar. Default: no report.""",
+    "chunks": "Samples of a chunk along each axis. Default: 512 for images, 128 for volumes.",
+    "levels": """Number of resolutions, each half of the previous one. Default: as many as are needed until one chunk holds the
+image.""",
+    "unit": 'Unit of the spacing, such as "micrometer". Default: none.',
+    "map": "Name of a map of a material. Default: the map that shows the texture.",
 }
 
 
 def share_words(function: F) -> F:
-    """Put the shared words into a docstring, where the name of a parameter stands in braces on a line of its own.
+    """Insert shared descriptions into a docstring, wherever ``{name}`` is alone on a line.
 
     Examples
     --------
@@ -36,10 +39,10 @@ def share_words(function: F) -> F:
     ...         {threads}
     ...     '''
     >>> print(store.__doc__.splitlines()[3].strip())
-    Of each worker; by default the cores are shared out.
+    Number of threads of each worker. Default: the workers share the cores.
 
     """
-    # Python may have been told to leave docstrings out.
+    # Python removes docstrings with the option -OO.
     if function.__doc__ is not None:
         function.__doc__ = re.sub(
             r"^( *)\{(\w+)\}$", lambda found: indent(WORDS[found[2]], found[1]), function.__doc__, flags=re.MULTILINE

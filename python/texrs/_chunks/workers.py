@@ -1,4 +1,4 @@
-"""Who makes the chunks: this process, others of this machine, or the workers of a cluster."""
+"""Run tasks in this process, in other processes of this machine, or on the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -31,19 +31,22 @@ Scheduler = Any
 Work = Callable[[int], Any]
 
 TRIES = 3
-"""Times that a task may end its worker."""
+"""Number of lost workers after which a task is given up."""
 AHEAD = 2
-"""Tasks that wait at each worker while it does another, so that it need not wait for the next."""
+"""Tasks queued at each worker, including the running one, so that a worker need not wait for the next."""
 SHORT = 1.0
-"""Seconds that tasks of a cluster take, about, which are handed out as one: the scheduler and each worker take some
-milliseconds for each that they are told of."""
+"""Target duration of a batch of tasks on a cluster, in seconds.
+
+Short tasks are batched because each task costs the scheduler and its worker some milliseconds.
+"""
 MOST_AT_ONCE = 32
+"""Maximum number of tasks of a batch."""
 GRACE = 5.0
-"""Seconds that a worker has to remove what is half-written, when it is to end."""
+"""Seconds in which a worker that must end can remove half-written files."""
 
 
 class WorkerLost(TexrsError):
-    """A task ended its workers again and again: too little memory, most often."""
+    """A task ended its worker three times, most often because there is too little memory."""
 
 
 def run(
@@ -54,36 +57,37 @@ def run(
     threads_each: int | None = None,
     spare: bool = False,
 ) -> Iterator[tuple[int, Any]]:
-    """Do some tasks, each by its number; neighbours are done by the same worker, as far as that goes.
+    """Run numbered tasks. Neighbouring numbers are run by the same worker if possible.
 
     Parameters
     ----------
     work : callable
-        Does the task of a number. It can be pickled, by cloudpickle at least, unless all is done in this process.
+        Function that runs the task of a number. It must be picklable, at least by cloudpickle, unless ``scheduler`` is
+        None.
     numbers : sequence of int
-        Which.
+        Numbers of the tasks.
     scheduler : None, int, str or distributed.Client
-        None: this process. A number: so many processes of this machine, which are started for it. An address or a client: the
-        workers of that cluster.
+        None is this process. An integer is a number of processes of this machine, which are started for this work. An
+        address or a client is a cluster.
     threads_each : int, optional
-        Of the pool of kernel threads, one a worker. By default the cores are shared out among processes, and workers of a
-        cluster have as many as it says.
+        Kernel threads of each worker. By default, processes share the cores, and a worker of a cluster uses its
+        configured number of threads.
     spare : bool
-        Whether a task that ends three workers stops no other: then `WorkerLost` is what it is said to have returned.
+        If True, a task that ends three workers does not stop the others. It yields a `WorkerLost` as its result.
 
     Yields
     ------
     (int, object)
-        A number and what its task returned, in the order in which they are done. A task whose worker is killed is done again
-        by another. Where nobody asks for more, as after Ctrl-C, processes leave what they are at, and clear it away; what the
-        workers of a cluster have begun they finish.
+        Number and result of a task, in the order of completion. The task of a killed worker is run again by another
+        worker. If the caller stops early, for example by Ctrl-C, processes abort their tasks and remove half-written
+        files. Workers of a cluster finish the tasks that they have begun.
 
     Raises
     ------
     WorkerLost
-        A task ended three workers.
+        If a task ended three workers and ``spare`` is False.
     InvalidInput
-        No such scheduler. What a task raises passes.
+        If the scheduler does not exist. Exceptions of tasks are passed on.
 
     """
     if scheduler is None:
@@ -111,9 +115,9 @@ _LEAVING = False
 
 
 def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
-    """Take what a worker is to do, once, and heed who started it."""
+    """Initialise a worker process: store its task, and watch for a stop message or the end of the parent process."""
     global _WORK, _THREADS
-    # Ctrl-C goes to all processes of a terminal; who started this one says what is to be done.
+    # Ctrl-C reaches all processes of a terminal. The parent process decides how its workers end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _WORK, _THREADS = pickle.loads(payload), count
     set(**most)
@@ -124,7 +128,7 @@ def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
 
 
 def _heed(stop: Any) -> None:
-    """Wait for word to stop, or for the end of who started this process: nobody else would end it then."""
+    """End this process after a stop message, or after the death of its parent, which could not end it."""
     told = False
     with suppress(EOFError, OSError):
         stop.recv_bytes()
@@ -134,21 +138,22 @@ def _heed(stop: Any) -> None:
     else:
         _thread.interrupt_main(signal.SIGTERM)
     late = time.monotonic() + GRACE
-    # Who said it also ends this process, when it has cleared up.
+    # After a stop message, the parent ends this process once it has cleaned up, so wait. Otherwise wait only for the
+    # cleanup.
     while time.monotonic() < late and (told or _BUSY):
         time.sleep(0.01)
     os._exit(1)
 
 
 def _leave(number: int, frame: Any) -> None:
-    """End what is being done, so that all that is half-written is removed; only once, for that is not to be ended."""
+    """Abort the running task so that it removes half-written files. Later signals must not interrupt this."""
     global _LEAVING
     if not _BUSY:
-        # Nothing is half-written; an exception would be told of, as one of the pool.
+        # No file is half-written. Do not raise, because the pool would print the exception.
         os._exit(1)
     if not _LEAVING:
         _LEAVING = True
-        # Libraries tell of what they cannot end: coroutines that nobody awaits now, and what was only half made.
+        # Hide warnings of libraries about coroutines that are never awaited and objects that are half constructed.
         warnings.simplefilter("ignore")
         sys.unraisablehook = lambda told: None
         raise SystemExit(1)
@@ -158,7 +163,7 @@ def _do(number: int) -> Any:
     global _BUSY
     assert _WORK is not None
     if _LEAVING:
-        # What was begun has been cleared away, and nobody waits for an answer.
+        # The aborted task has cleaned up, and the caller does not wait for further results.
         os._exit(1)
     _BUSY = True
     try:
@@ -170,7 +175,7 @@ def _do(number: int) -> Any:
 
 @contextmanager
 def _hold_interrupts() -> Iterator[None]:
-    """Let no Ctrl-C reach what is started within, not even while it starts."""
+    """Block Ctrl-C for processes that are started in this context, even while they start."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -182,10 +187,10 @@ def _hold_interrupts() -> Iterator[None]:
 
 
 class _Process:
-    """A worker, and the tasks that wait at it in their order: the first of them is being done."""
+    """A worker process and its queue of tasks, in order. It runs the first of them."""
 
     def __init__(self, payload: bytes, count: int) -> None:
-        # Spawned: a fork would inherit the locks of threads that it does not have.
+        # Spawn, because a forked process would inherit locks of threads that it does not have.
         context = multiprocessing.get_context("spawn")
         heard, self._stop = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(
@@ -194,19 +199,19 @@ class _Process:
         self.tasks: dict[Future[Any], int] = {}
 
     def submit(self, number: int) -> None:
-        """Let it do a task after the others."""
+        """Append a task to the queue."""
         with _hold_interrupts():
             self.tasks[self._pool.submit(_do, number)] = number
 
     def end(self) -> None:
-        """Let it leave what it is at."""
+        """Ask the process to abort its task and end."""
         if self.tasks:
             with suppress(OSError):
                 self._stop.send_bytes(b"stop")
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def wait(self) -> None:
-        """Wait for its end."""
+        """Wait until the process has ended."""
         self._pool.shutdown()
         self._stop.close()
 
@@ -214,15 +219,17 @@ class _Process:
 def _run_processes(
     work: Work, numbers: Sequence[int], count: int, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
-    """Do tasks in processes, each of which takes a row of neighbours, and then the last ones of the longest row."""
+    """Run tasks in processes. Each takes a row of neighbours, then tasks from the end of the longest remaining row."""
     payload = pack(work)
     each = threads_each or max(1, (os.cpu_count() or 1) // count)
+    # Give each process a row of neighbouring tasks, which share cached results.
     rows = [deque(numbers[len(numbers) * i // count : len(numbers) * (i + 1) // count]) for i in range(count)]
     tries: dict[int, int] = {}
     processes = [_Process(payload, each) for _ in range(count)]
 
     def feed(place: int) -> None:
         while len(processes[place].tasks) < AHEAD:
+            # A process without own tasks takes the last task of the longest row.
             row = rows[place] or max(rows, key=len)
             if not row:
                 return
@@ -246,10 +253,11 @@ def _run_processes(
                     if not isinstance(future.exception(), BrokenProcessPool):
                         yield one.tasks.pop(future), future.result()
                 if any(future in one.tasks for future in ready):
-                    # Only the first of those that wait was being done when it ended.
+                    # Blame only the first task of the queue, because the others had not been started.
                     first, *others = one.tasks.values()
                     one.tasks.clear()
                     one.end()
+                    # Return the tasks to their row, and start another process.
                     tries[first] = tries.get(first, 0) + 1
                     lost = tries[first] == TRIES
                     rows[place].extendleft(reversed(others if lost else [first, *others]))
@@ -265,10 +273,10 @@ def _run_processes(
 
 
 def _lose(number: int, spare: bool) -> WorkerLost:
-    """Return, or raise, that a task ended its workers."""
+    """Return an error about a task that ended its workers, or raise it if ``spare`` is False."""
     error = WorkerLost(
-        f"task {number}: ended {TRIES} workers; there may be too little memory for so many, or the "
-        "script that started them needs its work under: if __name__ == '__main__'"
+        f"task {number}: ended {TRIES} workers; there may be too little memory for all workers, or the "
+        "script that started them must do its work under: if __name__ == '__main__'"
     )
     if not spare:
         raise error
@@ -276,7 +284,7 @@ def _lose(number: int, spare: bool) -> WorkerLost:
 
 
 def pack(work: Work) -> bytes:
-    """Return a task as bytes: what pickle does not know, as functions of a script, is left to cloudpickle."""
+    """Pickle a task. Use cloudpickle for objects that pickle cannot handle, such as functions of a script."""
     try:
         return pickle.dumps(work)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -284,7 +292,7 @@ def pack(work: Work) -> bytes:
             import cloudpickle
         except ImportError:
             raise InvalidInput(
-                f"function: cannot be sent to other processes ({error}); cloudpickle may do it"
+                f"function: cannot be sent to other processes ({error}); install cloudpickle, which may help"
             ) from None
         return bytes(cloudpickle.dumps(work))
 
@@ -293,16 +301,16 @@ def pack(work: Work) -> bytes:
 
 
 def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
-    """Return a client, and whether it was made here."""
+    """Return a client, and whether this function created it."""
     try:
         from distributed import Client
     except ImportError:
-        raise InvalidInput("scheduler: needs the extra: pip install texrs[dask]") from None
+        raise InvalidInput("scheduler: requires Dask; install it with pip install texrs[dask]") from None
     if isinstance(scheduler, Client):
         return scheduler, False
     if not isinstance(scheduler, str):
         raise InvalidInput(
-            f"scheduler: needs None, a number of processes, an address or a distributed.Client, got {scheduler!r}"
+            f"scheduler: must be None, a number of processes, an address or a distributed.Client, got {scheduler!r}"
         )
     # A client that fails in its constructor is closed here. Otherwise the garbage collector closes it, and blocks
     # forever if it runs while the next client holds the lock of the event loop.
@@ -312,30 +320,35 @@ def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
     except (OSError, ValueError, TimeoutError, AssertionError) as error:
         # After several failures, distributed raises an AssertionError without a message.
         client.__del__()
-        raise InvalidInput(f"scheduler: none answers at {scheduler!r} ({str(error) or type(error).__name__})") from None
+        raise InvalidInput(
+            f"scheduler: no scheduler answers at {scheduler!r} ({str(error) or type(error).__name__})"
+        ) from None
     return client, True
 
 
 def _run_cluster(
     work: Work, numbers: Sequence[int], client: Any, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
-    """Do tasks on the workers of a cluster; it sees to those whose worker is lost."""
+    """Run tasks on the workers of a cluster, and run the tasks of lost workers again."""
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
 
     payload = pack(work)
     name = content_hash(payload, os.urandom(8)).hex()
-    # A task itself, not data that is sent once: it is made again on workers that come later.
+    # Submit the function as a task, not as scattered data: the cluster computes a task again for workers that join
+    # later.
     there = client.submit(pickle.loads, payload, key=f"texrs-work-{name}")
     workers = list(client.nthreads().items())
     if not workers:
         client.wait_for_workers(1, timeout=60)
         workers = list(client.nthreads().items())
+    # A slot is a thread of a worker. Each slot has a row of neighbouring tasks.
     slots = [address for address, count in workers for _ in range(count)]
     rows = [
         deque(numbers[len(numbers) * i // len(slots) : len(numbers) * (i + 1) // len(slots)]) for i in range(len(slots))
     ]
-    # What is handed out, and whether nothing else is: the cluster blames all that wait at a worker for its end.
+    # Slot, task numbers and ``alone`` of each submitted batch. A cluster blames all tasks that wait at a lost worker,
+    # so suspects are then run alone, with no other task submitted.
     known: dict[Any, tuple[int, list[int], bool]] = {}
     suspects: deque[tuple[int, int]] = deque()
     waiting = [0] * len(slots)
@@ -343,13 +356,13 @@ def _run_cluster(
     queue = as_completed(loop=client.loop)
 
     def take(slot: int) -> list[int]:
-        """Take some tasks from the row of a worker, or of the one that has most left."""
+        """Take a batch from the row of a slot, or from the longest row if its own is empty."""
         row = rows[slot] or max(rows, key=len)
         return [row.popleft() if row is rows[slot] else row.pop() for _ in range(min(at_once, -(-len(row) // 2)))]
 
     def submit(slot: int, some: list[int], alone: bool) -> None:
-        # What may end its worker brings the task along, and goes to any: a cluster that has just lost all of its workers waits
-        # for what was lost with them, and never gives to new ones what was meant for one that is gone.
+        # A suspect task carries its function, and may run on any worker. A cluster that has lost all workers waits for
+        # lost data, and never moves tasks of a lost worker to a new one.
         future = client.submit(
             _do_there,
             payload if alone else there,
@@ -366,7 +379,7 @@ def _run_cluster(
         queue.add(future)
 
     def feed() -> None:
-        """Let tasks wait at each worker; where some are suspected of ending theirs, first those, one by one."""
+        """Fill the queue of each slot. Tasks suspected of ending their workers are run first, one at a time."""
         if not suspects:
             for ahead in range(AHEAD):
                 for slot in range(len(slots)):
@@ -383,8 +396,10 @@ def _run_cluster(
             waiting[slot] -= 1
             try:
                 results, seconds = future.result()
+                # Choose the batch size so that a batch takes about SHORT seconds.
                 at_once = max(1, min(MOST_AT_ONCE, int(len(some) * SHORT / max(seconds, 1e-6))))
             except KilledWorker as error:
+                # A task that loses its worker alone is to blame. Otherwise all tasks of the batch are suspects.
                 if not alone:
                     suspects.extend((slot, number) for number in some)
                     some = []
@@ -400,7 +415,7 @@ def _run_cluster(
 def _do_there(
     task: Work | bytes, some: Sequence[int], count: int | None, most: dict[str, Any]
 ) -> tuple[list[Any], float]:
-    """Do some tasks within the limits of who asked for them; return what they return, and the seconds that it took."""
+    """Run tasks within the limits of the caller. Return their results and the duration in seconds."""
     from distributed import get_worker
 
     begun = time.monotonic()

@@ -223,7 +223,7 @@ class CornerTiles(InParts):
         wanted = "ranges [y0:y1, x0:x1] of integers, each with both ends"
         parts = as_tuple(index, "index", 2, wanted)
         if not all(isinstance(p, slice) and p.step is None and None not in (p.start, p.stop) for p in parts):
-            raise InvalidInput(f"index: needs {wanted}, got {index!r}")
+            raise InvalidInput(f"index: must be {wanted}, got {index!r}")
         origin = self._as_origin([p.start for p in parts])
         size = as_size([int(p.stop) - o for p, o in zip(parts, origin, strict=True)], way=LARGER)
         return self._read(origin, size, [self._maps[self._base]])[0]

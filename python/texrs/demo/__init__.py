@@ -1,8 +1,7 @@
-"""A page that shows what texrs makes, on built-in examples: ``texrs demo``.
+"""The page of ``texrs demo``, which shows the results of texrs on built-in examples.
 
-The page is one file: its pictures are in it, it needs no script and nothing from elsewhere. It is a list of sections;
-a system joins it by a `Section` of its own in `SECTIONS`, whose function makes pictures in the `Workshop` and gives
-HTML.
+The page is one file. It contains its images, needs no script and loads nothing. It is a list of sections. To add a
+section, append a `Section` to `SECTIONS`. Its function computes images in the `Workshop` and returns HTML.
 """
 
 from __future__ import annotations
@@ -40,19 +39,19 @@ SECTIONS: tuple[Section, ...] = (
 
 
 def page(sections: Sequence[Section] = SECTIONS, *, progress: Progress | None = None) -> str:
-    """Make the page.
+    """Generate the page.
 
     Parameters
     ----------
     sections : sequence of Section
-        What it shows, in this order.
+        Sections of the page, in this order. Default: all.
     progress : callable, optional
-        Called as ``progress(title, share)``; raising stops the work.
+        Function that is called as ``progress(title, share)``. If it raises an exception, the work stops.
 
     Returns
     -------
     str
-        HTML that refers to nothing outside itself.
+        HTML without references to other files.
 
     """
     watch = progress or (lambda stage, share: None)

@@ -1,4 +1,4 @@
-"""DESIGN on the page: results, stages and seeds."""
+"""Sections of the demo page about DESIGN: results, stages and seeds."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ SHOWN: tuple[tuple[str, str, dict[str, Any]], ...] = (
 )
 
 CAPTIONS = {
-    "segmentation": ("Elements", "each in a colour of its own"),
-    "deformed": ("Deformed", "moved as a logistic map says, stitched by graph cuts"),
-    "holes": ("Holes", "what no element covers"),
+    "segmentation": ("Elements", "each in its own colour"),
+    "deformed": ("Deformed", "moved by a logistic map, stitched by graph cuts"),
+    "holes": ("Holes", "pixels that no element covers"),
     "completed": ("Completed", "holes filled by example"),
     "before_blending": ("Composite", "variants stitched on the torus"),
 }
@@ -80,19 +80,19 @@ def _format_size(image: Array) -> str:
 RESULTS = Section(
     "results",
     "Any size from one example",
-    "DESIGN deforms the elements of the example, stitches them by graph cuts and fills what is left open. "
-    "The results repeat without a seam.",
+    "DESIGN deforms the elements of the example, stitches them by graph cuts and fills the remaining holes. "
+    "The results are tileable.",
     _results,
 )
 STAGES = Section(
     "stages",
-    "How it is made",
-    "The stages of one of the variants that the second result was stitched from, and the result.",
+    "Stages of a result",
+    "The second result was stitched from several variants. These are the stages of one variant, and the result.",
     _stages,
 )
 SEEDS = Section(
     "seeds",
-    "As many as you like",
-    "Each seed is another texture; the same seed is the same texture, byte for byte, on any number of threads.",
+    "Any number of results",
+    "Each seed gives another texture. The same seed gives the same texture, byte for byte, with any number of threads.",
     _seeds,
 )

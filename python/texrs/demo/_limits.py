@@ -1,4 +1,4 @@
-"""What fails, on the page: whoever sees it knows what not to ask for."""
+"""Section of the demo page about failures, so that users know which inputs do not work."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from texrs.inpainting import inpaint
 from texrs.papers.design import design
 
 SIDE = 192
-"""Pixels a side of the pictures."""
+"""Side of the images, in pixels."""
 
 
 def _fail(workshop: Workshop) -> str:
@@ -32,14 +32,14 @@ def _fail(workshop: Workshop) -> str:
         [
             card(
                 [figure(scene, "A scene")],
-                figure(scattered, "Is no texture", note="what is seen once has nowhere to go on"),
+                figure(scattered, "Not a texture", note="objects that occur once cannot be continued"),
             ),
             card(
                 [figure(covered, "A wide hole in a floor")],
                 figure(
                     filled,
-                    "Is filled with things that are cut",
-                    note="texrs remove, above, takes them from the flat plane",
+                    "Filled with elements that are cut off",
+                    note="texrs remove, above, copies them from the flattened plane",
                 ),
             ),
         ]
@@ -49,6 +49,6 @@ def _fail(workshop: Workshop) -> str:
 LIMITS = Section(
     "limits",
     "What fails",
-    "A texture is something of which any part looks like any other. Of what is not, the same commands make this.",
+    "All parts of a texture look alike. If an image is not a texture, the same commands give these results.",
     _fail,
 )

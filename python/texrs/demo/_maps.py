@@ -1,4 +1,4 @@
-"""Materials: heights, normals and labels follow the colours."""
+"""Sections of the demo page about materials: heights, normals and labels follow the colours."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ RELIEF = 12.0
 
 
 SIZE, LARGE, MAP = 320, 2048, 150
-"""Side of what is designed, and of what the page opens with; of a map at least: the five of a material stand in one row."""
+"""Side of a designed image, side of the image at the top of the page, and minimum side of a map.
+
+The five maps of a material fit in one row.
+"""
 
 
 def _open(workshop: Workshop) -> str:
@@ -32,7 +35,7 @@ def _open(workshop: Workshop) -> str:
         figure(example.preview(tiles=(1, 1)), "The example, lit", note=f"{side} × {side}"),
         "The result, lit",
         "The middle of the result, pixel by pixel",
-        note=f"{LARGE} × {LARGE}, of albedo, normal, height, roughness and labels; it repeats without a seam",
+        note=f"{LARGE} × {LARGE}, with maps of albedo, normal, height, roughness and labels; tileable",
     )
 
 
@@ -54,13 +57,13 @@ def _maps(workshop: Workshop) -> str:
         )
     return code(
         "texrs design STONES -o NEW --size 2048x2048 --preview lit.png   # a folder of maps, and a folder of maps\n"
-        "texrs design albedo.png -o new.png --source-map map.npz                # or one by one,\n"
-        "texrs apply map.npz normals.png -o new-normals.png --map-type normal # finished as the first was"
+        "texrs design albedo.png -o new.png --source-map map.npz                # or one by one\n"
+        "texrs apply map.npz normals.png -o new-normals.png --map-type normal # with the same options"
     ) + "".join(rows)
 
 
 def make_material(name: str, side: int) -> Material:
-    """Return the maps of a sample: its colours and labels, and a relief and normals that are guessed from them."""
+    """Return the maps of a sample: its colours and labels, and a relief and normals that are estimated from them."""
     sample = load_sample(name, side)
     assert sample.labels is not None
     height = guess_height(sample.labels, sample.image)
@@ -70,8 +73,8 @@ def make_material(name: str, side: int) -> Material:
 
 
 def show(material: Material, whose: str) -> list[str]:
-    """Return the pictures of maps."""
-    notes = {"normal": "y up, turned", "labels": "never mixed"}
+    """Return the figures of maps."""
+    notes = {"normal": "y up, rotated", "labels": "never mixed"}
     return [
         figure(
             label_to_color(each.pixels) if each.role.labelled else each.pixels,
@@ -84,10 +87,10 @@ def show(material: Material, whose: str) -> list[str]:
 
 
 def guess_height(labels: Labels, picture: Array) -> Array:
-    """Guess a relief: domes over the elements, with the fine grain of the picture; uint16."""
+    """Estimate a relief (uint16): domes over the elements, with the fine grain of the image."""
     depth = np.zeros(labels.shape)
     for label in range(1, int(labels.max()) + 1):
-        # Each element has its own distance, for elements that touch have a valley between them.
+        # Compute the distance within each element, because touching elements have a valley between them.
         inside = distance_transform_edt(np.pad(labels == label, 1, mode="edge"))[1:-1, 1:-1]
         depth += inside / max(float(inside.max()), 1.0)
     dome = np.sqrt(1 - (1 - np.clip(depth, 0, 1)) ** 2)
@@ -107,20 +110,20 @@ def derive_normals(height: Array) -> Array:
 
 
 MATERIALS = (("leaves_and_flowers", "Flowers on leaves"),)
-"""Samples that are shown, and what they are."""
+"""Samples on the page, and their captions."""
 
 OPENING = Section(
     "material",
     "A material, as large as you need",
-    "From a small example with all its maps: every stone keeps its height and its roughness, and the light falls on all of "
-    "them from one side.",
+    "Synthesised from a small example with all its maps. Each stone keeps its height and its roughness, and the light comes "
+    "from the same side everywhere.",
     _open,
 )
 MAPS = Section(
     "maps",
-    "Every map in register",
-    "A result is a source map: where in the example each pixel comes from, and in which frame. So a whole material comes of "
-    "one: decisions are made on what all its maps tell, and each map is looked up in its own dtype, blended by its role; "
-    "normals turn with what they belong to, so that the light stays where it is.",
+    "All maps stay aligned",
+    "The result of a synthesis is a source map: the position in the example of each pixel, and its local frame. One source "
+    "map therefore gives all maps of a material. All maps contribute to its decisions. Each map is copied in its own dtype "
+    "and blended according to its role. Normals rotate with their elements, so that the light does not change.",
     _maps,
 )

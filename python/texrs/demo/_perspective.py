@@ -1,4 +1,4 @@
-"""Textures whose elements are as large as a map says, on the page."""
+"""Section of the demo page about textures whose elements have the sizes of a scale map."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from texrs.rectification import rectify
 from texrs.removal import remove
 
 SIDE, SIZE = 192, 224
-"""Pixels a side of the example, and of what is grown."""
+"""Side of the example and side of the result, in pixels."""
 
 
 def _draw_targets(scale: Floats) -> dict[str, Floats]:
-    """Return targets that do not look like the example's map."""
+    """Return target scale maps that differ from the example's map."""
     low, high = np.log(np.quantile(scale, [0.05, 0.95]))
     at = (np.arange(SIZE) + 0.5) / SIZE
     wave = np.broadcast_to((low + high) / 2 + (high - low) / 2 * np.cos(2 * np.pi * at), (SIZE, SIZE))
@@ -30,7 +30,7 @@ def _draw_targets(scale: Floats) -> dict[str, Floats]:
 
 
 def _lay_on_surfaces() -> list[str]:
-    """Return bricks on a column, on a ball, on a floor and in circles."""
+    """Return figures of bricks around a column, around a ball and on another plane."""
     bricks = samples.bricks((SIDE, SIDE)).image
     y, x = np.mgrid[:SIZE, :SIZE] / ((SIZE - 1) / 2) - 1
     across = 0.97 * x
@@ -49,7 +49,7 @@ def _lay_on_surfaces() -> list[str]:
 
 
 def _shade(image: Array, normals: Floats) -> Array:
-    """Light a picture from the upper left, so that its shape is seen."""
+    """Light an image from the upper left, so that its shape is visible."""
     light = np.clip(normals @ (np.array([-0.4, 0.35, 0.85]) / np.linalg.norm([-0.4, 0.35, 0.85])), 0, 1)
     shaded: Array = np.rint(image * (0.25 + 0.75 * light[..., np.newaxis])).astype(np.uint8)
     return shaded
@@ -61,7 +61,7 @@ def _perspective(workshop: Workshop) -> str:
     patterns = _draw_targets(scale)
     given = [figure(floor.image, "Example"), figure(scale_maps.picture(scale), "Its scale map")]
     made = perspective(floor.image, scale, SIZE, seed=3)
-    grown = [card(given, figure(made.image, "Grown", note="the same map, stretched"))]
+    grown = [card(given, figure(made.image, "Grown", note="with the same map, enlarged"))]
     for i, (name, target) in enumerate(patterns.items(), start=1):
         workshop.watch(i / (len(patterns) + 2))
         made = perspective(floor.image, scale, SIZE, target=target, seed=3)
@@ -69,13 +69,13 @@ def _perspective(workshop: Workshop) -> str:
         grown.append(card(given, figure(made.image, name.capitalize())))
     workshop.watch((len(patterns) + 1) / (len(patterns) + 2))
     flat = rectify(floor.image, wrap=True, seed=3)
-    seen = [figure(floor.image, "As it was seen"), figure(flat.stages["flat"], "Flat", note="the plane was found")]
-    levelled = [card(seen, figure(np.tile(flat.image, (2, 2, 1)), "Cyclic", note="four side by side"))]
+    seen = [figure(floor.image, "In perspective"), figure(flat.stages["flat"], "Flat", note="the plane was found")]
+    levelled = [card(seen, figure(np.tile(flat.image, (2, 2, 1)), "Tileable", note="2 × 2 copies"))]
     thing = np.zeros((SIDE, SIDE), bool)
     thing[70:150, 80:120] = True
     stood = np.where(thing[..., np.newaxis], np.array([40, 90, 160], np.uint8), floor.image)
-    gone = figure(remove(stood, thing, seed=3).image, "Taken out", note="the plane and the ground were found")
-    cleared = [card([figure(stood, "Something on it")], gone)]
+    gone = figure(remove(stood, thing, seed=3).image, "Removed", note="the ground plane was found")
+    cleared = [card([figure(stood, "An object on the floor")], gone)]
     return (
         code("texrs scale-map floor.png -o scale.npy --slant 50 --tilt 90")
         + code(
@@ -94,7 +94,7 @@ def _perspective(workshop: Workshop) -> str:
 PERSPECTIVE = Section(
     "perspective",
     "Elements of the right size",
-    "A picture taken at an angle has elements of every size. A scale map says which; textures are grown with elements as large "
-    "as it, or any other map, asks for, or as a surface shows them; planes are made flat, and things are taken off them.",
+    "In an image in perspective, the size of elements varies. A scale map specifies these sizes. Textures are grown with "
+    "element sizes of the same map, of any other map, or of a surface. Planes are flattened, and objects are removed.",
     _perspective,
 )

@@ -1,4 +1,4 @@
-"""Pictures mended on the page: made cyclic, and holes filled."""
+"""Sections of the demo page about images that are made tileable, and about filled holes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from texrs.inpainting import inpaint
 from texrs.tiling import tile
 
 SIDE = 192
-"""Side of the pictures."""
+"""Side of the images, in pixels."""
 TILED = (
     ("bricks", "A wall: the courses meet"),
     ("leaves_and_flowers", "Flowers on leaves"),
@@ -57,14 +57,15 @@ def mark_scratches(shape: tuple[int, int]) -> Bools:
 
 TILE = Section(
     "tile",
-    "Any photograph, made to tile",
-    "The halves change places, so that the borders meet, and what were the borders is joined inside along the cut that "
-    "shows least. How far they overlap is chosen so that a pattern meets itself.",
+    "Any photograph made tileable",
+    "The halves are exchanged, so that opposite borders fit. The former borders are joined inside, along the least visible "
+    "cut. The overlap is chosen so that a regular pattern continues.",
     _tile,
 )
 COMPLETE = Section(
     "inpaint",
     "Holes filled by example",
-    "Patches of what is around, each cut in where it shows least. Nothing outside the hole changes.",
+    "The holes are filled with patches of their surroundings, cut where the seam is least visible. Pixels outside do not "
+    "change.",
     _inpaint,
 )

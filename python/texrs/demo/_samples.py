@@ -1,4 +1,4 @@
-"""The built-in examples on the page."""
+"""Section of the demo page with all built-in examples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.volume import render_block
 
 SIDE, EDGE = 128, 64
-"""Pixels a side of the pictures, and of the volumes."""
+"""Side of the images in pixels, and side of the volumes in voxels."""
 PHOTOGRAPHS = ("brick", "grass", "gravel")
 
 
@@ -17,14 +17,14 @@ def _samples(workshop: Workshop) -> str:
     names = samples.names()
     for i, name in enumerate(names):
         workshop.watch(i / len(names))
-        # The side says whether it is a volume: pictures take two.
+        # A sample does not say whether it is a volume, so try two axes first.
         try:
             sample = samples.load(name, size=(SIDE, SIDE))
         except ValueError:
             sample = samples.load(name, size=(EDGE,) * 3)
         known = [k for k in ("labels", "mask", "scale_map", "jacobians") if getattr(sample, k) is not None]
         volume = sample.image.ndim == 4
-        note = ("a volume; " * volume) + (f"known: {', '.join(known)}" if known else "nothing else known")
+        note = ("a volume; " * volume) + (f"known: {', '.join(known)}" if known else "no ground truth")
         pictures.append(
             figure(render_block(sample.image, 2 * SIDE) if volume else sample.image, name, note=note.replace("_", " "))
         )
@@ -35,6 +35,6 @@ def _samples(workshop: Workshop) -> str:
 SAMPLES = Section(
     "samples",
     "Built-in examples",
-    "Generated pictures and volumes, and what is known of them exactly; photographs that come with scikit-image.",
+    "Generated images and volumes with their exact ground truth, and photographs of scikit-image.",
     _samples,
 )

@@ -1,4 +1,4 @@
-"""Textures grown under a field on the page, in three dimensions and in two."""
+"""Section of the demo page about textures that follow a field, in three dimensions and in two."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from texrs.papers.solid import solid, synthesize
 from texrs.volume import render_block
 
 EDGE, SIZE = 64, 80
-"""Voxels a side of the examples, and of what is grown."""
+"""Side of the examples and side of the results, in voxels."""
 SIDE, WIDTH = 128, 256
-"""The same of pictures."""
+"""Side of the example images and side of the resulting images, in pixels."""
 CUBE = 320
-"""Pixels a side of the cubes."""
+"""Side of the drawn cubes, in pixels."""
 
 VOLUMES = (
     ("stripes", "rotation_3d"),
@@ -57,7 +57,7 @@ def _solid(workshop: Workshop) -> str:
 SOLID = Section(
     "solid",
     "Volumes, and textures that follow a field",
-    "A block of a material grown from a small one, turned at each point as a field says: carve it, cut it, break it, the "
-    "inside is there. The same in two dimensions.",
+    "A large block of a material is grown from a small one. A field rotates it at each point. The inside of the block is "
+    "complete, so it can be carved, cut or broken. The same works in two dimensions.",
     _solid,
 )

@@ -1,4 +1,4 @@
-"""Elements of one texture in the layout of another, on the page."""
+"""Section of the demo page about elements of one texture in the layout of another."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
 
 
 def _load_entry(name: str) -> ElementAnalysis:
-    """Return a sample with the elements that it is known to have."""
+    """Return a sample with its true elements."""
     return ElementAnalysis.of_sample(load_sample(name, SIDE))
 
 
@@ -43,7 +43,7 @@ def _splice(workshop: Workshop) -> str:
     ):
         made = splice(_load_entry(a), layout, seed=1, layout_scale=1)
         given = [figure(_load_entry(a).image, a), figure(layout.image, f"{words}, drawn")]
-        drawn.append(card(given, figure(made.image, f"{a} in them" if a == "bricks" else f"{a} on it")))
+        drawn.append(card(given, figure(made.image, f"{a} in this layout")))
     return (
         code("texrs splice sample:dots sample:net -o result.png --seed 1")
         + cards(spliced)
@@ -60,7 +60,7 @@ def _splice(workshop: Workshop) -> str:
 SPLICE = Section(
     "splice",
     "The elements of one texture in the layout of another",
-    "What is rigid is copied pixel by pixel, and the ground between is grown by example; walls are put together from their "
-    "bricks, cell by cell. The layout may be drawn, or the texture's own, edited.",
+    "Rigid elements are copied pixel by pixel, and the background between them is synthesised. Walls are assembled from "
+    "their bricks, cell by cell. The layout may also be drawn, or be an edited layout of the texture itself.",
     _splice,
 )

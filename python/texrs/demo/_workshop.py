@@ -1,4 +1,4 @@
-"""Where the sections of the demo make their textures: each is made once and shown by several."""
+"""Base of the sections of the demo page: each texture is computed once and can be used by several sections."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from texrs.synthesis import Synthesis
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of the page.
+    """A section of the page.
 
     Attributes
     ----------
     name : str
-        What links inside the page call it.
+        Anchor of the section for links inside the page.
     title, lead : str
-        Its heading, and a sentence or two below it; plain text.
+        Heading, and one or two sentences below it, as plain text.
     make : callable
-        Given the workshop, makes the pictures and returns HTML.
+        Function that takes the workshop, computes the images and returns HTML.
 
     """
 
@@ -38,7 +38,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Texture:
-    """An exemplar, a texture designed from it and the options that made it."""
+    """An exemplar, options of DESIGN, and the texture designed with them."""
 
     sample: samples.Sample
     size: int
@@ -53,23 +53,23 @@ class Texture:
 
 @dataclass
 class Workshop:
-    """What sections share: progress and the textures that were made."""
+    """Progress and textures that the sections share."""
 
     progress: Progress
     title: str = ""
     made: dict[str, Texture] = field(default_factory=dict)
 
     def begin(self, title: str) -> None:
-        """Start a section."""
+        """Begin a section."""
         self.title = title
         self.progress(title, 0.0)
 
     def watch(self, share: float) -> None:
-        """Report the share of the section that is done."""
+        """Report the completed share of the section."""
         self.progress(self.title, share)
 
     def design(self, name: str, side: int = 160, size: int = 320, **options: Any) -> Texture:
-        """Design a texture from a sample, or return the one that was made before."""
+        """Design a texture from a sample, or return the texture if it was designed before."""
         key = repr((name, side, size, sorted(options.items())))
         if key not in self.made:
             self.made[key] = Texture(load_sample(name, side), size, {"seed": 7, **options})
@@ -77,7 +77,7 @@ class Workshop:
 
 
 def load_sample(name: str, side: int) -> samples.Sample:
-    """Return a sample of a size; of a photograph, which has its own, the middle at half the scale."""
+    """Return a sample of a given side. A photograph has its own size, so return its centre at half the scale."""
     if name in samples.names():
         return samples.load(name, size=(side, side))
     image: Array = samples.load(name).image

@@ -1,16 +1,16 @@
-"""Limits of what a call may take: pixels, voxels, bytes of memory and seconds, in one place.
+"""Limit the pixels, voxels, bytes of memory and seconds of calls, in one place.
 
-Every verb compares what it needs with them before it begins, and stops with `texrs.errors.LimitExceeded` when its time is up.
-Where nothing is said, an array may have 2^28 pixels or voxels, memory is what the machine, the container and the limits of the
-process allow (`ulimit -v`, control groups), and there is no limit to the time.
+Every verb compares its needs with these limits before it begins, and raises `texrs.errors.LimitExceeded` when its time
+is up. By default an array may have 2^28 pixels or voxels. Memory is limited by the machine, the container and the
+limits of the process (`ulimit -v`, control groups). Time is not limited.
 
-They are said in three ways, of which the least holds:
+Limits are set in three ways. If several apply, the smallest counts:
 
-- in a block of code, for what this thread, or this asynchronous task, does in it: `context`;
-- for the whole process: `set`;
-- from outside, in the environment: ``TEXRS_PIXELS``, ``TEXRS_VOXELS``, ``TEXRS_MEMORY`` (bytes) and ``TEXRS_SECONDS``.
+- `context` for a block of code, in this thread or asynchronous task;
+- `set` for the whole process;
+- the environment variables ``TEXRS_PIXELS``, ``TEXRS_VOXELS``, ``TEXRS_MEMORY`` (bytes) and ``TEXRS_SECONDS``.
 
-`estimate_memory` tells beforehand what a verb takes.
+`estimate_memory` estimates the memory of a verb in advance.
 
 >>> import texrs
 >>> dots = texrs.samples.dots((64, 64)).image

@@ -1,4 +1,4 @@
-"""Which limits are in force: what a block says, what the process says, what the environment says."""
+"""Limits in force: the smallest of the limits of the block, of the process and of the environment."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from texrs.errors import InvalidInput, LimitExceeded
 __all__ = ["MAX_PIXELS", "Limits", "check_time", "context", "current", "find", "find_end", "said", "set"]
 
 MAX_PIXELS = 2**28
-"""Pixels or voxels that an array made by texrs may have, unless a limit is given."""
+"""Default limit of the pixels or voxels of an array."""
 MOST_PIXELS = 2**32 - 1
-"""What any limit of pixels may be at most: points are counted by 32 bits."""
+"""Maximum value of a limit of pixels, because points are counted by 32 bits."""
 WORDS = {
-    "pixels": "a number of pixels from 1 to 2^32 - 1",
-    "voxels": "a number of voxels from 1 to 2^32 - 1",
+    "pixels": "a number of pixels between 1 and 2^32 - 1",
+    "voxels": "a number of voxels between 1 and 2^32 - 1",
     "memory": "a number of bytes",
     "seconds": "a number of seconds above 0",
 }
@@ -36,11 +36,11 @@ class Limits:
     Attributes
     ----------
     pixels, voxels : int
-        Number of those that a picture, or a volume, may have which is made or read.
+        Maximum number of pixels of an image, or of voxels of a volume, that is computed or read.
     memory : int, optional
-        Bytes that the process may take in all; None where nothing tells.
+        Maximum bytes of the process. None if no limit is known.
     seconds : float, optional
-        Seconds that are left of a block, or that a call may take; None: any number.
+        Seconds that remain for a block, or maximum seconds of a call. None if there is no limit.
 
     Examples
     --------
@@ -58,14 +58,14 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """What is said of each; None where nothing is."""
+    """Limits from one place. None if a limit is not set there."""
 
     pixels: int | None = None
     voxels: int | None = None
     memory: int | None = None
     seconds: float | None = None
     end: tuple[float, float] | None = None
-    """When a block must have ended, by the clock that never goes back, and how many seconds it was given."""
+    """Deadline of a block on the monotonic clock, and the number of seconds it was given."""
 
 
 _NOTHING = _Said()
@@ -81,33 +81,34 @@ def context(
     memory: float | None = None,
     seconds: float | None = None,
 ) -> Iterator[None]:
-    """Limit what is done inside the ``with`` block, by this thread or asynchronous task.
+    """Limit the calls inside a ``with`` block, in this thread or asynchronous task.
 
     Parameters
     ----------
     pixels, voxels : int, optional
-        Number of those that a picture, or a volume, may have which is made or read, 1 to 2^32 - 1; None leaves
-        the limit as it is, here and below.
+        Maximum number of pixels of an image, or of voxels of a volume, that is computed or read. 1 to 2^32 - 1.
+        Default: unchanged.
     memory : int or float, optional
-        Bytes that the process may take in all; 8e9 is as good as 8000000000. Never more than the machine and its container
-        allow.
+        Maximum bytes of the process. 8e9 is the same as 8000000000. The limits of the machine and its container still
+        apply. Default: unchanged.
     seconds : float, optional
-        Seconds that all the block may take. Verbs stop where they report their progress, a fraction of a second later at most.
+        Maximum seconds of the whole block. Verbs stop at their next progress report, at most a fraction of a second
+        later. Default: unchanged.
 
     Yields
     ------
     None
-        What was in force before is again where the block ends.
+        The previous limits apply again after the block.
 
     Raises
     ------
     InvalidInput
-        No such number.
+        If a limit is not such a number.
 
     Notes
     -----
-    A thread that is started inside the block does not know of it, unless it runs in a copy of the context
-    (`contextvars.copy_context`); threads of texrs do. `set` is for all of them.
+    A thread that is started inside the block does not inherit its limits, unless it runs in a copy of the context
+    (`contextvars.copy_context`). The threads of texrs inherit them. `set` applies to all threads.
 
     Examples
     --------
@@ -120,7 +121,7 @@ def context(
     asked = _check(pixels=pixels, voxels=voxels, memory=memory, seconds=seconds)
     seconds = asked.pop("seconds")
     before, asked["end"] = _BLOCK.get(), None if seconds is None else (time.monotonic() + seconds, seconds)
-    # No block allows more than the one around it.
+    # A block cannot allow more than the block around it.
     least = {name: min(value, getattr(before, name) or value) for name, value in asked.items() if value is not None}
     token = _BLOCK.set(replace(before, **least))
     try:
@@ -136,19 +137,19 @@ def set(
     memory: float | None = None,
     seconds: float | None = None,
 ) -> None:
-    """Set the limits of the whole process, of any thread; what is not given has none of its own any more.
+    """Set the limits of all threads of the process. Limits that are not given are removed.
 
     Parameters
     ----------
     pixels, voxels, memory : optional
         As in `context`.
     seconds : float, optional
-        Seconds that each call may take.
+        Maximum seconds of each call. Default: no limit.
 
     Raises
     ------
     InvalidInput
-        No such number.
+        If a limit is not such a number.
 
     Examples
     --------
@@ -169,12 +170,12 @@ def current() -> Limits:
     Returns
     -------
     Limits
-        The least of what the block, the process and the environment say, and of the memory that there is.
+        The smallest limits of the block, the process and the environment, and of the available memory.
 
     Raises
     ------
     InvalidInput
-        A variable of the environment is no such number.
+        If an environment variable is not such a number.
 
     Examples
     --------
@@ -189,7 +190,7 @@ def current() -> Limits:
 
 
 def find(name: str) -> int | None:
-    """Return the limit of pixels, voxels or memory that is in force; None where there is none."""
+    """Return the limit of pixels, voxels or memory that is in force, or None if there is none."""
     several = [getattr(each, name) for each in (_BLOCK.get(), _PROCESS)] + [_read(name)]
     found = [value for value in several if value is not None]
     if name == "memory":
@@ -200,27 +201,29 @@ def find(name: str) -> int | None:
 
 
 def find_end() -> tuple[float, float] | None:
-    """Return when a call that begins now must have ended, and how many seconds it was given; None: at any time."""
+    """Return when a call that begins now must end, and the seconds it was given, or None without a time limit."""
     now, block = time.monotonic(), _BLOCK.get().end
     ends = [(now + s, s) for s in (_PROCESS.seconds, _read("seconds")) if s is not None]
     return min(ends + ([] if block is None else [block]), default=None)
 
 
 def check_time(end: tuple[float, float] | None, stage: str, share: float) -> None:
-    """Stop what has no time left.
+    """Stop a call after its time limit.
 
     Raises
     ------
     LimitExceeded
-        The time is up.
+        If the time is up.
 
     """
     if end is not None and time.monotonic() > end[0]:
-        raise LimitExceeded(f"the limit of {end[1]:.3g} s was reached in the stage {stage!r}, at {share:.0%} of it")
+        raise LimitExceeded(
+            f"the limit of {end[1]:.3g} s was reached in the stage {stage!r}, at {share:.0%} of its work"
+        )
 
 
 def said() -> dict[str, Any]:
-    """Return what `set` and `context` take in a process that works for this block, which itself ends what takes too long."""
+    """Return the limits that `set` and `context` take in a worker process. The caller enforces the time limit."""
     found = {}
     for name in ("pixels", "voxels", "memory"):
         several = [getattr(each, name) for each in (_BLOCK.get(), _PROCESS)]
@@ -229,7 +232,7 @@ def said() -> dict[str, Any]:
 
 
 def _read(name: str) -> Any:
-    """Return what the environment says."""
+    """Return the limit in an environment variable, or None."""
     variable = f"TEXRS_{name.upper()}"
     text = os.environ.get(variable, "").strip()
     if not text:
@@ -246,7 +249,7 @@ def _check(**given: object) -> dict[str, Any]:
 
 
 def _take(value: Any, name: str, said: str) -> Any:
-    """Check a limit; whole numbers may come as floats, as 8e9 does."""
+    """Check a limit. Integers may be given as floats, such as 8e9."""
     if not isinstance(value, bool) and isinstance(value, numbers.Real):
         try:
             number = float(value)
@@ -257,4 +260,4 @@ def _take(value: Any, name: str, said: str) -> Any:
         top = 2**62 if name == "memory" else MOST_PIXELS
         if name != "seconds" and 1 <= number <= top:
             return math.floor(value)
-    raise InvalidInput(f"{said}: needs {WORDS[name]}, got {value!r}")
+    raise InvalidInput(f"{said}: must be {WORDS[name]}, got {value!r}")

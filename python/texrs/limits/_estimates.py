@@ -1,4 +1,4 @@
-"""What each verb takes, as measured: bytes of a pixel of the example and of the result."""
+"""Estimate the memory of each verb, from measured bytes per pixel of the example and of the result."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from texrs.errors import InvalidInput
 
 if TYPE_CHECKING:
-    # Numpy would come with it.
+    # Importing it at run time would import NumPy.
     from numpy.typing import DTypeLike
 
 __all__ = ["estimate_memory"]
@@ -19,34 +19,34 @@ __all__ = ["estimate_memory"]
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Bytes that a verb takes, as ``benches/memory_table.py`` measures them.
+    """Memory of a verb in bytes, as measured by ``benches/memory_table.py``.
 
-    Two things are done one after the other: the examples are analysed, then the result is made beside what is known of them.
+    A verb first analyses the examples. Then it computes the result, while the results of the analysis stay in memory.
     """
 
     analysed: float
-    """Of a pixel of the examples, while they are analysed."""
+    """Bytes per pixel of the examples during the analysis."""
     known: float
-    """Of a pixel of the examples, while the result is made."""
+    """Bytes per pixel of the examples while the result is computed."""
     made: float
-    """Of a pixel of the result, beside its colours."""
+    """Bytes per pixel of the result, without its colours."""
     fixed: float = 3e6
-    """Whatever the sizes."""
+    """Bytes that do not depend on the sizes."""
     several: float = 0
-    """Of a pixel of the result, for each example where there are several."""
+    """Bytes per pixel of the result for each example, if there are several."""
     field: float = 0
-    """Of a pixel of the result, where a field says how it is turned."""
+    """Bytes per pixel of the result if a field varies."""
 
     def count(self, examples: int, of: int, result: int, colours: int, field: bool) -> float:
-        """Return the bytes for so many pixels, so many examples, and so many bytes of their colours."""
+        """Return the bytes for numbers of pixels, a number of examples, and the bytes of the colours of a pixel."""
         point = self.made + COPIES * colours + self.several * of * (of > 1) + self.field * field
         return self.fixed + max(self.analysed * examples, self.known * examples + point * result)
 
 
 COPIES = 4
-"""How often the colours of a result are there at once."""
+"""Number of copies of the result's colours that are in memory at the same time."""
 BEYOND = 600
-"""Bytes of a pixel that splice lets a texture go on by, where it gives elements or an arrangement to something larger."""
+"""Bytes per pixel of an extended texture. splice extends a texture to cover a larger result."""
 COSTS: dict[str, dict[str | None, Cost]] = {
     "design": {None: Cost(1000, 680, 73, several=55)},
     "splice": {None: Cost(0, 350, 100)},
@@ -62,7 +62,7 @@ COSTS: dict[str, dict[str | None, Cost]] = {
     "analyse": {None: Cost(480, 0, 0, fixed=14e6)},
     "CornerTiles": {None: Cost(1000, 680, 90)},
 }
-"""By verb, and by the ``method`` or the ``quality`` that takes another amount than the others."""
+"""Costs by verb, and by the ``method`` or ``quality`` if they differ from the others."""
 
 
 def estimate_memory(
@@ -74,34 +74,36 @@ def estimate_memory(
     method: str | None = None,
     field: bool = False,
 ) -> int:
-    """Return about how many bytes a verb takes, beside what the process has already.
+    """Estimate the bytes that a verb needs, in addition to the current memory of the process.
 
     Parameters
     ----------
     verb : str
-        Its name: design, splice, self_splice, perspective, solid, synthesize, tile, inpaint, extend, rectify, remove,
-        analyse (`texrs.elements.analyse`), or CornerTiles (`texrs.CornerTiles`).
-    exemplar : sequence of int, or a sequence of them
-        Shape of the example, (H, W), (H, W, C), or for solid (D, H, W[, C]); of several their shapes.
+        Name of the verb: design, splice, self_splice, perspective, solid, synthesize, tile, inpaint, extend, rectify,
+        remove, analyse (`texrs.elements.analyse`), or CornerTiles (`texrs.CornerTiles`).
+    exemplar : sequence of int, or sequence of such sequences
+        Shape of the example, (H, W) or (H, W, C), or for solid (D, H, W[, C]). For several examples, a sequence of
+        their shapes.
     size : sequence of int, optional
-        Of the result, which of a CornerTiles is its atlas, nine tiles a side; by default that of the first example.
+        Size of the result. For CornerTiles, the size of its atlas of nine tiles a side. Default: the size of the first
+        example.
     dtype : dtype
-        Of the example.
+        Dtype of the example. Default: "uint8".
     method : str, optional
-        The ``method`` or ``quality`` that is asked for.
+        Value of ``method`` or ``quality``. Default: that of the verb.
     field : bool
-        Whether solid or synthesize are given a field that varies.
+        If True, solid or synthesize is given a field that varies. Default: False.
 
     Returns
     -------
     int
-        Bytes. ``benches/memory_table.py`` compares it with the peak that is measured, of textures of 256 pixels a side and
-        more; splice and perspective take twice as much for some textures as for others.
+        Number of bytes. ``benches/memory_table.py`` compares it with the measured peak, for textures of at least 256
+        pixels a side. The verbs splice and perspective need twice as much for some textures as for others.
 
     Raises
     ------
     InvalidInput
-        No such verb, or no shapes of examples.
+        If the verb does not exist, or the shapes of the examples are wrong.
 
     Examples
     --------
@@ -121,9 +123,9 @@ def estimate_memory(
     try:
         itemsize = make_dtype(dtype).itemsize
     except (TypeError, ValueError):
-        raise InvalidInput(f"dtype: needs one of NumPy, got {dtype!r}") from None
+        raise InvalidInput(f"dtype: must be a NumPy dtype, got {dtype!r}") from None
     if not isinstance(field, bool):
-        raise InvalidInput(f"field: needs True or False, got {field!r}")
+        raise InvalidInput(f"field: must be True or False, got {field!r}")
     costs = COSTS[verb]
     cost = costs[method if isinstance(method, str) and method in costs else None]
     colours = itemsize * math.prod(shapes[0][axes:])
@@ -132,7 +134,7 @@ def estimate_memory(
 
 
 def _list_shapes(value: object) -> list[object]:
-    """Return one shape, or several, as a list of them."""
+    """Return one shape or several shapes as a list."""
     if isinstance(value, Sequence) and not isinstance(value, str | bytes | range) and len(value) > 0:
         return list(value) if isinstance(value[0], Sequence) else [value]
     return [value]
@@ -144,4 +146,4 @@ def _as_shape(value: Any, axes: int, name: str = "exemplar") -> tuple[int, ...]:
         sides = tuple(value)
         if all(not isinstance(n, bool) and isinstance(n, numbers.Integral) and int(n) > 0 for n in sides):
             return tuple(map(int, sides))
-    raise InvalidInput(f"{name}: needs a shape of {axes} sides, or with channels, got {value!r}")
+    raise InvalidInput(f"{name}: must be a shape of {axes} sides, with or without channels, got {value!r}")

@@ -41,9 +41,7 @@ def render_preview(
     maps: Mapping[str, Map], tiles: Sequence[int], light: Sequence[float], side: int
 ) -> NDArray[np.uint8]:
     """Return the image of lit maps, with a maximum number of pixels along a side."""
-    down, right = (
-        as_int(n, "tiles", 1, 64) for n in as_tuple(tiles, "tiles", 2, "how often it is shown (down, across)")
-    )
+    down, right = (as_int(n, "tiles", 1, 64) for n in as_tuple(tiles, "tiles", 2, "two counts (down, across)"))
     given = as_tuple(light, "light", 2, "(azimuth, elevation) in degrees")
     azimuth, elevation = as_float(given[0], "light[0]", -360, 360), as_float(given[1], "light[1]", 1, 90)
     most = as_int(side, "side", 1, 1 << 16)

@@ -1,7 +1,8 @@
-"""Source maps: for each output pixel, which exemplar it comes from, where, and in which local jacobian.
+"""Source maps: for each output pixel, the exemplar it was copied from, the position there, and the local Jacobian.
 
-Every pipeline of texrs makes one. The picture is only the exemplar looked up through it, so the same map serves each
-map that is in register with the exemplar: colours, normals, heights, labels, in any dtype and with any channels.
+Every verb of texrs returns a source map. The output image is the exemplar sampled through it. The same map therefore
+applies to every other map of the exemplar: colours, normals, heights or labels, of any dtype and any number of
+channels.
 """
 
 from __future__ import annotations
@@ -33,32 +34,32 @@ __all__ = ["CopyStatistics", "RenderOptions", "SourceMap"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SourceMap(Parted):
-    """Where each output pixel (or voxel) comes from.
+    """Position in an exemplar for each output pixel or voxel.
 
     Attributes
     ----------
     coordinates : (..., A) float32
-        Place in the exemplar, (row, column) or (plane, row, column), in samples with centres at the integers. The
-        output's shape is ``...``; A is 2 or 3.
+        Position in the exemplar, (row, column) or (plane, row, column), in samples whose centres are at integers.
+        ``...`` is the shape of the output, and A is 2 or 3.
     exemplar : (...) uint16
-        Which exemplar.
+        Number of the exemplar.
     label : (...) uint32
-        Which patch.
+        Number of the patch.
     jacobian : None, (L, A, A) or (..., A, A) float32, or a field
-        The Jacobian J = dS/dp of each pixel's patch: none (the identity), a table by label, dense, or a field of
-        `texrs.fields`, which is evaluated where it is needed. Its inverse says where the exemplar's axes point in the
-        output.
+        Jacobian J = dS/dp of each pixel's patch: None (the identity), a table by label, one matrix for each pixel, or
+        a field of `texrs.fields`. A field is evaluated on demand. The inverse of J gives the directions of the
+        exemplar's axes in the output.
     shapes : tuple of tuple of int
-        Shapes of the exemplars, without channels: what `render` expects.
+        Shapes of the exemplars, without channels. `render` requires images of these shapes.
     finish : RenderOptions, optional
-        How the verb that made the map finished its picture, which `texrs.apply` does with other maps; none of maps that are
-        put together by hand.
+        Options with which the verb rendered its image. `texrs.apply` uses them for other maps. None for maps that no
+        verb returned.
 
     Examples
     --------
     >>> import numpy as np
     >>> from texrs import SourceMap
-    >>> turned = np.stack(np.meshgrid([0, 1], [2, 1, 0]), axis=-1).astype(np.float32)  # what was a column is a row
+    >>> turned = np.stack(np.meshgrid([0, 1], [2, 1, 0]), axis=-1).astype(np.float32)  # columns become rows
     >>> source = SourceMap.from_coordinates(turned, (2, 3))
     >>> source.render(np.array([[1, 2, 3], [4, 5, 6]], np.uint8), interpolation="nearest").tolist()
     [[3, 6], [2, 5], [1, 4]]
@@ -66,15 +67,15 @@ class SourceMap(Parted):
     """
 
     def __repr__(self) -> str:
-        """Return its size, and those of the exemplars."""
+        """Return a short text with the size of the output and those of the exemplars."""
         into = ", ".join(" x ".join(map(str, s)) for s in self.shapes[:4]) + ", ..." * (len(self.shapes) > 4)
         jacobians = "" if self.jacobian is None else ", with Jacobians"
         return f"<SourceMap of {' x '.join(map(str, self.shape))} into {into}{jacobians}>"
 
     def _repr_png_(self) -> bytes:
-        """Show in a notebook where each pixel comes from, of a volume in its middle plane.
+        """Show the positions as colours in a notebook. A volume is shown in its middle plane.
 
-        Down the exemplar red grows, to the right green; blue tells exemplars apart.
+        Red grows with the row in the exemplar, green with the column. Blue distinguishes exemplars.
         """
         cut = () if self.axes == 2 else self.shape[0] // 2
         which = self.exemplar[cut]
@@ -85,7 +86,7 @@ class SourceMap(Parted):
 
     @classmethod
     def identity(cls, shape: tuple[int, ...]) -> SourceMap:
-        """Return the map of a picture that is the exemplar itself.
+        """Return the map of an image that equals its exemplar.
 
         Parameters
         ----------
@@ -95,12 +96,12 @@ class SourceMap(Parted):
         Returns
         -------
         SourceMap
-            Of one patch; it looks into one exemplar of that shape.
+            A map with one patch and one exemplar of that shape.
 
         Raises
         ------
         InvalidInput
-            Another number of sides.
+            If ``shape`` does not have 2 or 3 sides.
 
         Examples
         --------
@@ -111,7 +112,7 @@ class SourceMap(Parted):
         """
         sides = tuple(as_int(n, "shape", 1, 2**31 - 1) for n in as_items(shape, "shape"))
         if len(sides) not in (2, 3):
-            raise InvalidInput(f"shape: needs (rows, columns) or (planes, rows, columns), got {shape!r}")
+            raise InvalidInput(f"shape: must be (rows, columns) or (planes, rows, columns), got {shape!r}")
         check_pixels(sides, "shape")
         grid = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in sides), indexing="ij"), axis=-1)
         return cls.from_coordinates(grid, sides)
@@ -125,28 +126,28 @@ class SourceMap(Parted):
         label: NDArray[np.uint32] | None = None,
         jacobian: NDArray[np.float32] | Frames | None = None,
     ) -> SourceMap:
-        """Return the map of a picture (or a volume) that was made from one exemplar.
+        """Return the map of an image or volume made from one exemplar.
 
         Parameters
         ----------
         coordinates : (rows, columns, 2) or (planes, rows, columns, 3) float32 array
-            Where each pixel comes from, in pixels of the exemplar.
+            Position of each pixel in the exemplar, in pixels.
         shape : tuple of int
             Sides of the exemplar, without channels.
         label : (...) uint32 array, optional
-            The patch of each pixel; one patch by default.
+            Patch of each pixel. Default: one patch.
         jacobian : (L, A, A) or (..., A, A) float32 array, or field, optional
-            As the attribute; nothing is turned by default.
+            Jacobians, as in the attribute. Default: the identity.
 
         Returns
         -------
         SourceMap
-            Which looks into that exemplar alone.
+            A map with this single exemplar.
 
         Raises
         ------
         InvalidInput
-            Parts that do not agree.
+            If the shapes or dtypes of the arrays do not agree.
 
         Examples
         --------
@@ -161,7 +162,7 @@ class SourceMap(Parted):
         if not isinstance(coordinates, np.ndarray) or coordinates.shape[-1:] not in ((2,), (3,)):
             what = getattr(coordinates, "shape", type(coordinates).__name__)
             raise InvalidInput(
-                f"coordinates: needs an array (rows, columns, 2) or (planes, rows, columns, 3), got {what}"
+                f"coordinates: must be an array (rows, columns, 2) or (planes, rows, columns, 3), got {what}"
             )
         sides = coordinates.shape[:-1]
         check_memory(8 * coordinates.size, "coordinates")
@@ -169,14 +170,14 @@ class SourceMap(Parted):
         return cls(coordinates, np.zeros(sides, np.uint16), patches, jacobian, (shape,))
 
     def with_finish(self, wrap: Sequence[bool], **how: Any) -> SourceMap:
-        """Return the map of a picture that is finished in a way.
+        """Return the same map with other render options.
 
         Parameters
         ----------
         wrap : sequence of bool
-            Axes along which the picture is cyclic.
+            Axes along which the image is periodic.
         **how : object
-            The other attributes of a `RenderOptions`.
+            Other attributes of `RenderOptions`.
 
         Returns
         -------
@@ -185,7 +186,7 @@ class SourceMap(Parted):
         Raises
         ------
         TypeError
-            What is no attribute of a `RenderOptions`.
+            If `RenderOptions` does not have the attribute.
 
         Examples
         --------
@@ -197,12 +198,12 @@ class SourceMap(Parted):
         return replace(self, finish=RenderOptions(as_wrap(wrap, axes=self.axes), **how))
 
     def jacobians(self) -> NDArray[np.float32]:
-        """Return the Jacobian J of every pixel.
+        """Return the Jacobian J of each pixel.
 
         Returns
         -------
         (..., A, A) float32
-            Dense; read-only where all are the identity.
+            One matrix for each pixel. Read-only if all are the identity.
 
         Examples
         --------
@@ -225,35 +226,36 @@ class SourceMap(Parted):
         map_type: Literal["colour", "normal", "vector", "slope"] = "colour",
         green: Literal["up", "down"] = "up",
     ) -> Array:
-        """Return what a map that is in register with the exemplar looks like through this source map.
+        """Sample the exemplars, or other maps of the same sizes, through this map.
 
         Parameters
         ----------
-        exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one an exemplar
-            Any map of the exemplar's height and width (and depth), any dtype and channels.
+        exemplars : (H, W[, C]) or (D, H, W[, C]) array, or sequence of arrays
+            One image for each exemplar, with its height and width (and depth). Any dtype and any number of channels.
         interpolation : {"cubic", "linear", "nearest"}
-            Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
+            Interpolation between samples. Use "nearest" for labels. Samples at integer coordinates are copied exactly.
         antialias : bool
-            Whether the exemplar is smoothed where the Jacobians say that it is shrunk. Not for labels, nor with "nearest".
+            If True, smooth the exemplar before sampling wherever the Jacobians shrink it. Not for labels. Has no
+            effect with "nearest". Default: False.
         map_type : {"colour", "normal", "vector", "slope"}
-            "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
-            with the local Jacobian. If z is not stored, only x and y turn, and the other channels stay as they are: the
-            third channel is constant, holds other values, or is missing. "vector": directions on the surface, such as
-            those of flow or of brushed metal. Channels x and y turn and keep their length, other channels do not turn. "slope":
-            how much heights grow to the right and along y. In a volume all are directions in space, whose z, along the planes,
-            turns too.
+            Kind of the values. "colour": no vectors. "normal": a tangent-space normal map with channels x, y, z, where
+            unsigned values mean 2 v - 1. Its vectors rotate with the local Jacobian. The third channel may be
+            constant, have other values, or be missing. In this case only x and y rotate. "vector": directions on the
+            surface, such as those of flow or of brushed metal. Channels x and y rotate and keep their length, and
+            other channels do not change. "slope": slopes of heights to the right and along y. In a volume, all three
+            kinds are directions in space. Their z component is along the planes and also rotates. Default: "colour".
         green : {"up", "down"}
-            Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
+            Direction of y in normals and vectors: up (OpenGL) or down (DirectX).
 
         Returns
         -------
         array
-            Shape of the output with the map's channels, in the map's dtype.
+            Image with the shape of the output, and with the channels and dtype of the exemplars.
 
         Raises
         ------
         InvalidInput
-            Another number of exemplars, or of another size, than the map was made from.
+            If the number or the sizes of the images differ from the exemplars of the map.
 
         Examples
         --------
@@ -266,11 +268,13 @@ class SourceMap(Parted):
         """
         several = [as_ndarray(e, "exemplars", axes=self.axes) for e in as_list(exemplars)]
         if len(several) != len(self.shapes):
-            raise InvalidInput(f"exemplars: the map was made from {len(self.shapes)}, got {len(several)}")
+            raise InvalidInput(
+                f"exemplars: must be {len(self.shapes)}, as many as the map was made from, got {len(several)}"
+            )
         images = [as_image(e, "exemplars", axes=self.axes) for e in several]
         for i, (image, shape) in enumerate(zip(images, self.shapes, strict=True)):
             if image.shape[: self.axes] != shape:
-                raise InvalidInput(f"exemplars: number {i} needs size {shape}, got {image.shape[: self.axes]}")
+                raise InvalidInput(f"exemplars: number {i} must have size {shape}, got {image.shape[: self.axes]}")
         out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
         if as_bool(antialias, "antialias") and interpolation != "nearest":
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, find_shrinking(self), interpolation)
@@ -285,32 +289,32 @@ class SourceMap(Parted):
             raise InvalidInput(
                 f"map_type, green: must be one of colour, normal, vector, slope, and of up, down; got {map_type!r}, {green!r}"
             )
-        # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
+        # Check the exemplars, because the sampled part of them may have no negative value.
         bare = map_type == "normal" and self.axes == 2 and not stores_z(images)
         channels = 3 if (map_type == "normal" and not bare) or self.axes == 3 else 2
         return turn_all(self, out, map_type, green, any(float(e[..., :channels].min()) < 0 for e in images), bare)
 
     def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:
-        """Return the map of a picture made from pictures that were made from exemplars.
+        """Chain two levels of maps: ``self`` samples images that were themselves sampled from exemplars.
 
-        ``self`` looks into pictures whose own source maps are ``inner``, one for each of its exemplars; the result looks
-        into the exemplars of ``inner`` at once: S(p) = inner(q) + J_inner (self(p) - q), where q is the pixel nearest
-        to self(p), and J = J_inner J_self.
+        ``inner`` contains one map for each exemplar of ``self``, and the result samples the exemplars of ``inner``.
+        Let q be the pixel nearest to self(p). Then S(p) = inner(q) + J_inner (self(p) - q) and J = J_inner J_self.
 
         Parameters
         ----------
-        inner : SourceMap, or a sequence of them
-            Those of the pictures that ``self`` looks into, in the order of its exemplars.
+        inner : SourceMap or sequence of SourceMap
+            Maps of the images that ``self`` samples, in the order of its exemplars.
 
         Returns
         -------
         SourceMap
-            Of the shape of ``self``; it looks into the exemplars of ``inner``.
+            A map of the shape of ``self`` with the exemplars of ``inner``.
 
         Raises
         ------
         InvalidInput
-            Another number of maps, or of other sizes, than ``self`` looks into, or maps of different exemplars.
+            If the number or the sizes of the maps differ from the exemplars of ``self``, or the maps have different
+            exemplars.
 
         Examples
         --------
@@ -321,12 +325,13 @@ class SourceMap(Parted):
 
         """
         several = (inner,) if isinstance(inner, SourceMap) else as_items(inner, "inner")
-        # The first that is none ends it, however many there are.
+        # Stop at the first entry that is not a map, because an iterable may be endless.
         maps: list[SourceMap] = [as_instance(each, "inner", SourceMap) for each in several]
         if tuple(m.shape for m in maps) != self.shapes:
-            raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
+            raise InvalidInput(f"inner: must have outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
         if any(m.shapes != maps[0].shapes for m in maps):
-            raise InvalidInput("inner: all maps must look into the same exemplars")
+            raise InvalidInput("inner: all maps must have the same exemplars")
+        # Find the inner pixel nearest to each position, and keep the rest of the position for J_inner.
         inners = Pixels.chain(maps)
         place = np.empty(self.shape, np.uint32 if inners.count < 2**32 else np.uint64)
         rest = np.zeros_like(self.coordinates)
@@ -346,28 +351,29 @@ class SourceMap(Parted):
         *,
         overwrite: bool = False,
     ) -> SourceMap:
-        """Return the map of a picture that is put together from single pixels of pictures.
+        """Return the map of an image assembled from single pixels of other images.
 
         Parameters
         ----------
         maps : sequence of SourceMap
-            Those of the pictures; they look into the same exemplars.
+            Maps of the images. All must have the same exemplars.
         place : (rows, columns) of unsigned int
-            Which pixel: counted row by row, through one picture after the other.
+            Index of each pixel in the concatenation of all images, counted row by row.
         label : (rows, columns) uint32
-            Which patch: pixels of two patches get different labels, also where they are neighbours in a picture.
+            Patch of each pixel. Pixels of different patches get different labels, even if they are neighbours in an
+            image.
         overwrite : bool
-            Write the labels of the map over ``label``, which saves 4 bytes a pixel.
+            If True, write the labels of the result into ``label``, which saves 4 bytes a pixel. Default: False.
 
         Returns
         -------
         SourceMap
-            It looks into the exemplars.
+            A map with the same exemplars.
 
         Raises
         ------
         InvalidInput
-            A pixel that none of the pictures has, no pictures, or arrays of another type or shape.
+            If an index is beyond the last pixel, there are no maps, or an array has another type or shape.
 
         Examples
         --------
@@ -381,47 +387,47 @@ class SourceMap(Parted):
         """
         overwrite = as_bool(overwrite, "overwrite")
         several = [as_instance(each, "maps", SourceMap) for each in as_items(maps, "maps")]
-        # Of a masked array its values count.
+        # Use the values of masked arrays, without their masks.
         place, label = (np.asarray(v) if isinstance(v, np.ndarray) else v for v in (place, label))
         if not several:
-            raise InvalidInput("maps: needs at least one, got none")
+            raise InvalidInput("maps: must have at least one entry, got none")
         if any(each.shapes != several[0].shapes for each in several):
-            raise InvalidInput(
-                "maps: look into exemplars of different sizes; those of one set of exemplars are allowed"
-            )
+            raise InvalidInput("maps: must have exemplars of the same sizes")
         for name, value in (("place", place), ("label", label)):
             if not isinstance(value, np.ndarray) or value.dtype.kind != "u" or value.ndim not in (2, 3):
                 what = f"{value.dtype} of {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
-                raise InvalidInput(f"{name}: needs unsigned integers, an array of 2 or 3 axes, got {what}")
+                raise InvalidInput(f"{name}: must be an array of unsigned integers with 2 or 3 axes, got {what}")
         if label.shape != place.shape or label.dtype != np.uint32:
-            raise InvalidInput(f"label: needs uint32 of shape {place.shape}, got {label.dtype} of {label.shape}")
+            raise InvalidInput(f"label: must be uint32 of shape {place.shape}, got {label.dtype} of {label.shape}")
         count = sum(math.prod(each.shape) for each in several)
         if place.size and int(np.asarray(place).max()) >= count:
-            raise InvalidInput(f"place: {int(place.max())} is none of the {count} pixels of all pictures")
+            raise InvalidInput(
+                f"place: must be below {count}, the number of pixels of all maps, got {int(place.max())}"
+            )
         return cls(*Pixels.chain(several).pick(place, label, out=label if overwrite else None), several[0].shapes)
 
     def is_coherent(self, axis: int, *, wrap: bool = False) -> Bools:
-        """Return where a pixel and the next one along ``axis`` come from one piece of the exemplar.
+        """Return which pixels continue in the exemplar to their next pixel along ``axis``.
 
-        True where S(p + e) = S(p) + J(p) e within a tenth of a sample, in one exemplar. Along an axis that does not
-        wrap the last one is False. False means a seam.
+        True if S(p + e) = S(p) + J(p) e within 0.1 samples, in the same exemplar. False means a seam. The last pixel
+        of an axis that does not wrap is False.
 
         Parameters
         ----------
         axis : int
-            From 0.
+            Number of the axis, from 0.
         wrap : bool
-            Whether the last pixel of the axis is followed by the first.
+            If True, the last pixel of the axis is followed by the first. Default: False.
 
         Returns
         -------
         (...) bool
-            Of the shape of the output.
+            One value for each output pixel.
 
         Raises
         ------
-        numpy.exceptions.AxisError
-            It has no such axis.
+        InvalidInput
+            If the map does not have the axis.
 
         Examples
         --------
@@ -434,12 +440,12 @@ class SourceMap(Parted):
         return find_continued(self, as_int(axis, "axis", 0, self.axes - 1), wrap=as_bool(wrap, "wrap"))
 
     def reuse(self) -> CopyStatistics:
-        """Return how much is copied verbatim from the exemplars, and in how large pieces.
+        """Measure how much of the output is copied verbatim from the exemplars, and how large the copied pieces are.
 
         Returns
         -------
         CopyStatistics
-            Shares of the output and of the exemplar, and the number of pieces.
+            Fractions of the output and of the exemplar, and the number of pieces.
 
         Examples
         --------
@@ -451,17 +457,17 @@ class SourceMap(Parted):
         return measure_reuse(self)
 
     def save(self, path: Path) -> None:
-        """Write the map to an ``.npz`` file, whole or not at all.
+        """Write the map to an ``.npz`` file, completely or not at all.
 
         Parameters
         ----------
         path : path_like
-            A file that is there already is replaced.
+            Path of the file. An existing file is replaced.
 
         Raises
         ------
         FileError
-            The file cannot be written. A former file is as it was.
+            If the file cannot be written. An existing file does not change.
 
         Examples
         --------
@@ -478,22 +484,22 @@ class SourceMap(Parted):
 
     @classmethod
     def load(cls, path: Path) -> SourceMap:
-        """Return the map of a file that `save` wrote.
+        """Read a map from a file that `save` wrote.
 
         Parameters
         ----------
         path : path_like
-            An ``.npz`` file.
+            Path of an ``.npz`` file.
 
         Returns
         -------
         SourceMap
-            With the Jacobians as an array, and its finish.
+            The map with its render options. The Jacobians are an array.
 
         Raises
         ------
         FileError
-            Not there, not a source map, damaged, or of a later version.
+            If the file does not exist, is not a source map, is damaged, or is of a later version.
 
         Examples
         --------

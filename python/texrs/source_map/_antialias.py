@@ -1,4 +1,4 @@
-"""Look-up without aliases: where a picture is shrunk, it is smoothed first."""
+"""Sample images without aliasing: an image is smoothed before it is shrunk."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from texrs.source_map._parts import Parted
 __all__ = ["find_shrinking", "gather_smoothed"]
 
 LEVELS = 2
-"""Smoothed pictures for each octave by which it is shrunk; between two of them what they show is mixed."""
+"""Number of smoothed images per octave of shrinking. Values between two of them are interpolated."""
 OCTAVES = 5.0
-"""By more than so many nothing is smoothed further."""
+"""Maximum shrinking in octaves. Beyond it, the image is not smoothed further."""
 STRAIGHT = 1.05
-"""What is shrunk by less is looked up as it is."""
+"""Minimum shrinking factor. Pixels below it are sampled without smoothing."""
 
 
 def gather_smoothed(
@@ -30,20 +30,20 @@ def gather_smoothed(
     shrunk: Floats,
     interpolation: Interpolation,
 ) -> Array:
-    """Replace what is shrunk in a look-up by what is seen in smoothed pictures.
+    """Replace the shrunk pixels of a sampled image by samples of smoothed images.
 
     Parameters
     ----------
     out : array
-        The look-up as it is, of any shape with channels or without; overwritten.
+        Sampled image without antialiasing, of any shape, with or without channels. It is overwritten.
     images : sequence of array
-        What is looked up, each (..., C) or without channels.
+        Sampled images, each (..., C) or without channels.
     coordinates, exemplar : (N, A) float32, (N) uint16
-        Where, and in which.
+        Position of each pixel, and number of its image.
     shrunk : (N) float
-        By how much, as a length: above 1 where the picture gets smaller.
+        Factor by which lengths shrink at each pixel. Above 1, the output is smaller than the image.
     interpolation : str
-        Between samples.
+        Interpolation between samples.
 
     Returns
     -------
@@ -61,12 +61,14 @@ def gather_smoothed(
     channels = out.shape[exemplar.ndim :]
     mixed = np.zeros((len(here), *channels), np.float64)
     low = np.floor(level)
+    # Interpolate linearly between the two nearest smoothed images of each pixel.
     for k in np.unique(np.concatenate([low, low + 1])):
         weight = 1 - np.abs(level - k)
         near = np.flatnonzero(weight > 0)
         if not near.size:
             continue
-        # A pixel is a box as wide as one sample; one that is r times as wide has r^2 times its variance.
+        # A pixel is a box of one sample. A box r times as wide has r^2 times the variance, and sigma supplies the
+        # difference.
         sigma = 0.5 * np.sqrt(4.0 ** (k / LEVELS) - 1)
         for number, image in enumerate(images):
             own = near[which[near] == number]
@@ -87,7 +89,7 @@ def gather_smoothed(
 
 
 def find_shrinking(source: Parted) -> NDArray[np.float32]:
-    """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
+    """Return the factor by which lengths around each pixel are smaller than in the exemplar."""
     jacobian = source.jacobian_array()
     if jacobian is None:
         return np.ones(source.shape, np.float32)

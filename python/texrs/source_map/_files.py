@@ -1,4 +1,4 @@
-"""Source maps in files: one ``.npz`` of arrays."""
+"""Read and write source maps: one ``.npz`` file of arrays."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ FORMAT = 1
 """Version of the file layout."""
 NAMES = ("texrs_source_map", "coordinates", "exemplar", "label", "shapes")
 LEAST = 2**26
-"""Bytes that a table of Jacobians may have, however small the map."""
+"""Maximum bytes of a table of Jacobians for small maps. Larger maps may have one matrix for each pixel."""
 
 Map = TypeVar("Map", bound=Parted)
 
 
 def write_map(source: Parted, path: Path) -> None:
-    """Write a map, whole or not at all."""
+    """Write a map, completely or not at all."""
     from texrs.io import atomic
 
     parts: dict[str, Any] = {
@@ -48,7 +48,7 @@ def write_map(source: Parted, path: Path) -> None:
 
 
 def read_map(path: Path, make: type[Map]) -> Map:
-    """Return the map that a file holds, made of its parts."""
+    """Read a map from a file, as an instance of ``make``."""
     from texrs.io import read_arrays
 
     def choose(headers: Mapping[str, Header]) -> list[str]:
@@ -56,7 +56,7 @@ def read_map(path: Path, make: type[Map]) -> Map:
 
     parts = read_arrays(path, choose=choose)
     if parts["texrs_source_map"].ravel().tolist() != [FORMAT]:
-        raise FileError(f"{path}: has another layout than {FORMAT}, which this version of texrs reads")
+        raise FileError(f"{path}: has a file layout other than {FORMAT}, the layout that this version of texrs reads")
     try:
         shapes = tuple(tuple(int(n) for n in s) for s in parts["shapes"])
         rest = (parts["label"], parts.get("jacobian", parts.get("frame")), shapes)
@@ -70,7 +70,7 @@ def read_map(path: Path, make: type[Map]) -> Map:
 
 
 def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
-    """Return which arrays of a file make a map, none of which is larger than the map says, before any is read."""
+    """Check the headers of a file before any array is read, and return the names of the map's arrays."""
     if any(name not in headers for name in NAMES):
         raise FileError(f"{path}: is not a source map")
     shape = headers["coordinates"].shape[:-1]
@@ -93,6 +93,7 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
         "finish/parts": 2 * pixels,
         "finish/fade": pixels,
     }
+    # The masks of exemplars have sizes of their own, so limit their sum.
     known = [name for name in headers if name.startswith("finish/known/")]
     chosen = [name for name in most if name in headers]
     for name in chosen:

@@ -1,4 +1,4 @@
-"""How a picture is finished when it is looked up: kept with its source map, so that other maps are finished in the same way."""
+"""Options with which an image was rendered. A source map keeps them, so that other maps are rendered alike."""
 
 from __future__ import annotations
 
@@ -18,45 +18,47 @@ from texrs.errors import InvalidInput
 __all__ = ["RenderOptions"]
 
 PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines", "flatten_lighting", "light")
-"""What is said in words; the rest are masks."""
+"""Attributes that are stored as JSON. The others are masks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderOptions:
-    """How a verb looks its exemplar up through its source map, and makes the seams disappear.
+    """Options with which a verb samples its exemplar through a source map and blends the seams.
 
-    `texrs.apply` does the same with any map in register, and ``texrs apply`` with files.
+    `texrs.apply` uses the same options for any other map of the exemplar, and ``texrs apply`` does so for files.
 
     Attributes
     ----------
     wrap : tuple of bool
-        Axes along which the picture is cyclic.
+        Axes along which the image is periodic.
     interpolation : {"cubic", "linear", "nearest"}
-        Between samples.
+        Interpolation between samples. Default: "cubic".
     antialias : bool
-        Whether the exemplar is smoothed where it is shrunk.
+        If True, smooth the exemplar wherever it is shrunk. Default: False.
     screening : float, optional
-        Weight of the values when seams are made to disappear, above 0, see `texrs.blend`. None: they stay as they are.
+        Weight of the original values when seams are blended, above 0 (see `texrs.blend`). Default: no blending.
     band : int, optional
-        Correct only what is at most this many pixels from a seam; all else keeps its values. None: everything.
+        Maximum distance in pixels from a seam up to where values are corrected. Default: no limit.
     across : bool
-        Whether values are corrected also where two exemplars meet.
+        If True, also correct values where two exemplars meet. Default: True.
     outlines : bool
-        Whether the step across a seam stays where it is the outline of a thing.
+        If True, keep the step across a seam where it is the outline of an element. Default: True.
     flatten_lighting : bool
-        Whether uneven light is taken out of colours before they are looked up, see `texrs.materials.flatten_lighting`.
+        If True, remove uneven light from colours before they are sampled (see `texrs.materials.flatten_lighting`).
+        Default: False.
     within : (rows, columns) bool, optional
-        Correct only marked pixels; all others keep their values. None: correct all.
+        Mask of the pixels that may be corrected. Default: all.
     known : tuple of (h, w) bool, optional
-        What of each exemplar may be looked at beyond a seam. None: everything.
+        Masks of the pixels of each exemplar that may be read beyond a seam. Default: all.
     parts : (rows, columns) uint16, optional
-        What each pixel belongs to; nothing is corrected where two of these meet. None: everywhere.
+        Number of the region of each pixel. The border of two regions is not corrected. Default: one region.
     light : (int, int), optional
-        Of a picture that goes on beyond its exemplar, or in holes of it: the place (row, column) in the exemplar that its first
-        pixel lies at. Slow light of each part is divided out of what is looked up, and that of where it is shown multiplied on.
-        None: it brings its own light along.
+        Position (row, column) in the exemplar of the first output pixel, if the output extends the exemplar or fills
+        its holes. The low-frequency light of each region is divided out of the samples, and the light at their new
+        position is multiplied on. Default: samples keep their own light.
     fade : (rows, columns) uint8, optional
-        Weight of what is looked up, 0 to 255, where a filling fades into the exemplar of the same size. None: 255 everywhere.
+        Weight of the samples, 0 to 255, where a filling fades into the exemplar of the same size. Default: 255
+        everywhere.
 
     Examples
     --------
@@ -84,13 +86,13 @@ class RenderOptions:
     __repr__ = brief
 
     def arrays(self) -> dict[str, Array]:
-        """Return what is written to a file: the words as the bytes of a JSON text, and the masks.
+        """Return the arrays to store in a file: a JSON text as bytes, and the masks.
 
         Returns
         -------
         dict of str to array
-            ``"finish"`` is (n,) uint8; where there are any, ``"finish/within"`` and ``"finish/known/0"`` are bool, and
-            ``"finish/parts"`` is uint16, ``"finish/fade"`` uint8.
+            ``"finish"`` is (n,) uint8. The others are present if the options have them: ``"finish/within"`` and
+            ``"finish/known/0"`` are bool, ``"finish/parts"`` is uint16, and ``"finish/fade"`` is uint8.
 
         Examples
         --------
@@ -114,16 +116,16 @@ class RenderOptions:
     def from_arrays(
         cls, parts: Mapping[str, Array], shape: tuple[int, ...], shapes: tuple[tuple[int, ...], ...]
     ) -> RenderOptions:
-        """Return what `arrays` wrote of a map of a shape, which looks into exemplars of other shapes.
+        """Return the options from the arrays that `arrays` returned.
 
         Parameters
         ----------
         parts : mapping of str to array
-            As `arrays` returns them; others are left alone.
+            Arrays by name. Other entries are ignored.
         shape : tuple of int
-            Of the map, in pixels.
+            Shape of the map in pixels.
         shapes : tuple of tuple of int
-            Of its exemplars, in pixels.
+            Shapes of its exemplars in pixels.
 
         Returns
         -------
@@ -132,9 +134,9 @@ class RenderOptions:
         Raises
         ------
         InvalidInput
-            Something else, or masks of other shapes.
+            If entries are missing, or masks have another shape.
         ValueError
-            Not the text that is expected.
+            If the text is not JSON.
 
         Examples
         --------
@@ -144,29 +146,29 @@ class RenderOptions:
 
         """
         if not isinstance(parts, Mapping) or not isinstance(parts.get("finish"), np.ndarray):
-            raise InvalidInput("parts: needs arrays by their names, finish among them")
+            raise InvalidInput("parts: must be a mapping of arrays by name with the entry 'finish'")
         shape, shapes = as_instance(shape, "shape", tuple), as_instance(shapes, "shapes", tuple)
         words: dict[str, Any] = json.loads(parts["finish"].tobytes())
-        # Files of before there was flattening say nothing of it.
+        # Older files do not contain ``flatten_lighting``.
         if not isinstance(words, dict) or {"flatten_lighting", *words} != set(PLAIN):
-            raise InvalidInput(f"finish: needs {', '.join(PLAIN)}")
+            raise InvalidInput(f"finish: must contain {', '.join(PLAIN)}")
         if not isinstance(words["wrap"], list) or len(words["wrap"]) != len(shape):
-            raise InvalidInput(f"finish: wrap needs {len(shape)} values")
+            raise InvalidInput(f"finish: wrap must have {len(shape)} values")
         masks = [parts[name] for i in range(len(shapes)) if (name := f"finish/known/{i}") in parts]
         within = parts.get("finish/within")
         if masks and [m.shape for m in masks] != list(shapes):
-            raise InvalidInput(f"finish: known needs masks of shapes {shapes}")
+            raise InvalidInput(f"finish: known must be masks of shapes {shapes}")
         apart = parts.get("finish/parts")
         if apart is not None and (apart.shape != shape or apart.dtype != np.uint16):
-            raise InvalidInput(f"finish: parts needs uint16 of shape {shape}")
+            raise InvalidInput(f"finish: parts must be uint16 of shape {shape}")
         if within is not None and within.shape != shape:
-            raise InvalidInput(f"finish: within needs a mask of shape {shape}")
+            raise InvalidInput(f"finish: within must be a mask of shape {shape}")
         fade = parts.get("finish/fade")
         if fade is not None and ((fade.shape, *shapes[:1]) != (shape, shape) or fade.dtype != np.uint8):
             raise InvalidInput(f"finish: fade must be uint8 of shape {shape}, which must be that of the first exemplar")
         light = words["light"]
         if light is not None and not (isinstance(light, list) and len(light) == 2):
-            raise InvalidInput("finish: light needs a row and a column")
+            raise InvalidInput("finish: light must be a row and a column")
         screening, band = words["screening"], words["band"]
         return cls(
             tuple(as_bool(w, "wrap") for w in words["wrap"]),

@@ -1,4 +1,4 @@
-"""A source map in parts: the map of one, and what it shows as arrays in chunks, each looked up when it is asked for."""
+"""Base class of source maps: checks of their arrays, maps of a part of the output, and rendering in chunks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["Parted"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parted(ABC):
-    """The arrays of a source map, which agree, and what it gives in parts."""
+    """Arrays of a source map that agree with each other, and their rendering in chunks."""
 
     coordinates: NDArray[np.float32]
     exemplar: NDArray[np.uint16]
@@ -38,15 +38,15 @@ class Parted(ABC):
     finish: RenderOptions | None = None
 
     def __post_init__(self) -> None:
-        """Check that the parts agree."""
+        """Check that the arrays agree."""
         for name in ("coordinates", "exemplar", "label"):
             if not isinstance(getattr(self, name), np.ndarray):
-                raise InvalidInput(f"{name}: needs a NumPy array, got {type(getattr(self, name)).__name__}")
+                raise InvalidInput(f"{name}: must be a NumPy array, got {type(getattr(self, name)).__name__}")
         shape = self.coordinates.shape[:-1]
         axes = self.coordinates.shape[-1] if self.coordinates.ndim else 0
         if len(shape) != axes or axes not in (2, 3) or 0 in shape:
             raise InvalidInput(
-                "coordinates: needs shape (rows, columns, 2) or (planes, rows, columns, 3), not empty, "
+                "coordinates: must have shape (rows, columns, 2) or (planes, rows, columns, 3) and not be empty, "
                 f"got {self.coordinates.shape}"
             )
         for name, array, dtype in (
@@ -56,28 +56,32 @@ class Parted(ABC):
         ):
             extent = array.shape[:-1] if name == "coordinates" else array.shape
             if array.dtype != dtype or extent != shape:
-                raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
-        # Whether it is a field is asked last: to look at all that a protocol names takes as long as all else here.
+                raise InvalidInput(f"{name}: must be {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
+        # Check for a field last, because checking a protocol takes as long as all other checks together.
         if isinstance(self.jacobian, np.ndarray):
             table = self.jacobian.ndim == 3
             wanted = self.jacobian.shape[:1] if table else shape
             if self.jacobian.dtype != np.float32 or self.jacobian.shape != (*wanted, axes, axes):
                 raise InvalidInput(
-                    f"jacobian: needs float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.jacobian.shape}"
+                    f"jacobian: must be float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.jacobian.shape}"
                 )
             if table and self.label.size and int(self.label.max()) >= len(self.jacobian):
-                raise InvalidInput(f"jacobian: has {len(self.jacobian)} rows, but labels reach {int(self.label.max())}")
+                raise InvalidInput(
+                    f"jacobian: must have a matrix for each label up to {int(self.label.max())}, got {len(self.jacobian)}"
+                )
         elif self.jacobian is not None:
             if not isinstance(self.jacobian, Frames):
                 raise InvalidInput(
-                    f"jacobian: needs a NumPy array, a field or None, got {type(self.jacobian).__name__}"
+                    f"jacobian: must be a NumPy array, a field or None, got {type(self.jacobian).__name__}"
                 )
             if self.jacobian.axes != axes:
-                raise InvalidInput(f"jacobian: the field has {self.jacobian.axes} axes, the map {axes}")
+                raise InvalidInput(f"jacobian: must be a field of {axes} axes as the map, got {self.jacobian.axes}")
         if not isinstance(self.shapes, Sequence) or not all(_is_shape(s, axes) for s in self.shapes):
-            raise InvalidInput(f"shapes: each needs {axes} sides, integers of at least 1, got {self.shapes}")
+            raise InvalidInput(f"shapes: each must have {axes} sides, integers of at least 1, got {self.shapes}")
         if self.exemplar.size and int(np.asarray(self.exemplar).max()) >= len(self.shapes):
-            raise InvalidInput(f"exemplar: reaches {int(self.exemplar.max())}, but there are {len(self.shapes)} shapes")
+            raise InvalidInput(
+                f"exemplar: must be below {len(self.shapes)}, the number of shapes, got {int(self.exemplar.max())}"
+            )
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -95,7 +99,7 @@ class Parted(ABC):
         Returns
         -------
         None, (L, A, A) or (..., A, A) float32
-            None stands for the identity; a table by label; or dense.
+            None for the identity, a table by label, or one matrix for each pixel.
 
         Examples
         --------
@@ -108,26 +112,26 @@ class Parted(ABC):
 
     @abstractmethod
     def render(self, *exemplars: Any, **options: Any) -> Array:
-        """Return what exemplars look like through the map."""
+        """Sample exemplars through the map."""
 
     def part(self, box: tuple[slice, ...]) -> Self:
-        """Return the map of a part of the picture.
+        """Return the map of a part of the output.
 
         Parameters
         ----------
         box : tuple of slice
-            Of each axis, from a first pixel to one beyond the last, both within the picture.
+            Range of pixels along each axis, within the output. The end is exclusive.
 
         Returns
         -------
         SourceMap
-            With the same labels, into the same exemplars. How the whole was finished, as where it was blended, does not hold of
-            a part.
+            A map with the same labels and exemplars. It has no render options, because the options of the whole do not
+            apply to a part (for example, masks of blended pixels).
 
         Raises
         ------
         InvalidInput
-            Not such slices.
+            If the ranges are not within the output.
 
         Examples
         --------
@@ -145,7 +149,7 @@ class Parted(ABC):
             )
         )
         if not fits:
-            raise InvalidInput(f"box: needs {self.axes} ranges within {self.shape}, got {box!r}")
+            raise InvalidInput(f"box: must be {self.axes} ranges within {self.shape}, got {box!r}")
         jacobian = self.jacobian
         if isinstance(jacobian, Frames):
             origin = [s.start or 0 for s in box]
@@ -167,16 +171,16 @@ class Parted(ABC):
         chunks: int | Sequence[int] | None = None,
         **options: Any,
     ) -> Any:
-        """Return what `render` returns as an array of Dask: a block is looked up when it is asked for.
+        """Return the result of `render` as a Dask array, whose blocks are computed on demand.
 
         Parameters
         ----------
-        exemplars : array, or a sequence of one an exemplar
-            As for `render`.
-        chunks : int, or one an axis, optional
-            Of a block; 512 each in pictures and 128 in volumes by default.
+        exemplars : array or sequence of arrays
+            Images, as for `render`.
+        chunks : int or sequence of int, optional
+            Samples of a block along each axis. Default: 512 for images, 128 for volumes.
         **options
-            Those of `render`.
+            Options of `render`.
 
         Returns
         -------
@@ -185,7 +189,7 @@ class Parted(ABC):
         Raises
         ------
         InvalidInput
-            As `render`, or there is no Dask (``pip install texrs[dask]``).
+            As `render`, or if Dask is not installed (``pip install texrs[dask]``).
 
         Examples
         --------
@@ -214,26 +218,25 @@ class Parted(ABC):
         progress: Progress | bool | None = None,
         **options: Any,
     ) -> Stored:
-        """Write what `render` returns to an OME-Zarr store, with its coarser levels: it is never in memory as a whole.
+        """Write the result of `render` to an OME-Zarr store with coarser levels, without all of it in memory.
 
-        What a run that was stopped has left is gone on with. `texrs.stores.open_store` and `texrs.io.read` read the store.
+        The same call continues a run that was stopped. `texrs.stores.open_store` and `texrs.io.read` read the store.
 
         Parameters
         ----------
         path : path_like
-            A folder, which workers see too.
-        exemplars : array, or a sequence of one an exemplar
-            As for `render`.
-        chunks : int, or one an axis, optional
+            Folder of the store. The workers must also have access to it.
+        exemplars : array or sequence of arrays
+            Images, as for `render`.
+        chunks : int or sequence of int, optional
             {chunks}
         levels : int, optional
             {levels}
         spacing : sequence of float, optional
-            Of pixels along each axis, 1 by default.
+            Distance of pixels along each axis. Default: 1.
         unit : str, optional
             {unit}
         scheduler : None, int, str or distributed.Client
-            Who looks the chunks up; each worker has the map.
             {scheduler}
         threads : int, optional
             {threads}
@@ -242,19 +245,19 @@ class Parted(ABC):
         progress : callable or True, optional
             {progress}
         **options
-            Those of `render`.
+            Options of `render`.
 
         Returns
         -------
         texrs.stores.Stored
-            How many chunks there are, and were made.
+            Number of chunks, and number of chunks computed in this call.
 
         Raises
         ------
         InvalidInput
-            As `render`, no such scheduler, or there is no zarr (``pip install texrs[dask]``).
+            As `render`, or if the scheduler does not exist or zarr is not installed (``pip install texrs[dask]``).
         FileError
-            The store holds something else, or cannot be written.
+            If the store contains other data, or cannot be written.
 
         Examples
         --------
@@ -286,7 +289,7 @@ class Parted(ABC):
 
 
 def _is_shape(value: object, axes: int) -> bool:
-    """Return whether a value is the shape of an exemplar."""
+    """Return whether a value is the shape of an exemplar with ``axes`` sides."""
     return (
         isinstance(value, Sequence | np.ndarray)
         and getattr(value, "ndim", 1) > 0
@@ -297,7 +300,7 @@ def _is_shape(value: object, axes: int) -> bool:
 
 @dataclass(frozen=True)
 class _Lookups:
-    """Reads parts of what exemplars look like through a source map."""
+    """Source of chunks that samples exemplars through a source map."""
 
     look_up: Callable[[Box], Array]
     channel: Channel
@@ -305,7 +308,7 @@ class _Lookups:
 
     @property
     def maps(self) -> Mapping[str, Channel]:
-        """The one there is."""
+        """Description of the single map."""
         return {IMAGE: self.channel}
 
     @property
@@ -314,13 +317,13 @@ class _Lookups:
         return content_hash(*self.content).hex()
 
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
-        """Return a part."""
+        """Return a box of the rendered image."""
         return {IMAGE: self.look_up(box)}
 
 
 def _read_parts(source: Parted, exemplars: Array | Sequence[Array], options: dict[str, Any]) -> _Lookups:
     images = [try_array(each) for each in as_list(exemplars)]
-    # What is wrong is said now, and not when a worker comes to it.
+    # Render one pixel now, so that wrong arguments are reported here and not by a worker.
     first = source.part((slice(0, 1),) * source.axes).render(images, **options)
     channel = Channel.of(first, source.axes, labelled=options.get("interpolation") == "nearest")
     jacobian = source.jacobian

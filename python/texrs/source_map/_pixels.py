@@ -1,4 +1,4 @@
-"""The pixels of several source maps in one row, from which another map is put together."""
+"""Concatenate the pixels of several source maps, and assemble another map from them."""
 
 from __future__ import annotations
 
@@ -14,51 +14,51 @@ from texrs._typing import Bools
 
 
 class Mapped(Protocol):
-    """What a `texrs.SourceMap` says of its pixels."""
+    """Protocol of a `texrs.SourceMap` in this module."""
 
     @property
     def coordinates(self) -> NDArray[np.float32]:
-        """Where each comes from."""
+        """Position of each pixel in its exemplar."""
 
     @property
     def exemplar(self) -> NDArray[np.uint16]:
-        """From which exemplar."""
+        """Number of the exemplar of each pixel."""
 
     @property
     def label(self) -> NDArray[np.uint32]:
-        """Of which patch it is."""
+        """Patch of each pixel."""
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Sides of the picture."""
+        """Sides of the image."""
 
     def jacobian_array(self) -> NDArray[np.float32] | None:
-        """Return the Jacobians: none, by label, or dense."""
+        """Return the Jacobians: None, a table by label, or one matrix for each pixel."""
 
     def jacobians(self) -> NDArray[np.float32]:
-        """Return that of each pixel."""
+        """Return the Jacobian of each pixel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pixels:
-    """Pixels of source maps, one map after the other, their labels counted on."""
+    """Pixels of several source maps, concatenated. The labels of a map follow those of the previous map."""
 
     shapes: NDArray[np.int64]
     """Sides of each map."""
     first: NDArray[np.int64]
-    """Where each map begins in the row."""
+    """Index of the first pixel of each map."""
     coordinates: NDArray[np.float32]
     exemplar: NDArray[np.uint16]
     label: NDArray[np.uint64]
     labels: int
     table: NDArray[np.float32] | None
-    """Frame of each label; none where all are the identity or some map has a Jacobian for each pixel."""
+    """Jacobian of each label. None if all are the identity, or some map has a Jacobian for each pixel."""
     pixels: NDArray[np.float32] | None
-    """Frame of each pixel, where some map has one."""
+    """Jacobian of each pixel if some map has one, else None."""
 
     @classmethod
     def chain(cls, maps: Sequence[Mapped]) -> Pixels:
-        """Return the pixels of maps, one map after the other."""
+        """Concatenate the pixels of maps."""
         axes = maps[0].coordinates.shape[-1]
         counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
         offsets = np.cumsum([0, *counts]).astype(np.uint64)
@@ -92,11 +92,11 @@ class Pixels:
 
     @property
     def turned(self) -> bool:
-        """Whether some map has a Jacobian for each pixel."""
+        """True if some map has a Jacobian for each pixel."""
         return self.pixels is not None
 
     def places(self, point: NDArray[np.int64], which: NDArray[np.uint16]) -> NDArray[np.int64]:
-        """Return the place in the row of a pixel of each of some maps; points outside are moved to the border, in place."""
+        """Return the index of a pixel in each given map. Points outside a map are moved to its border, in place."""
         place = np.zeros(which.shape, np.int64)
         for axis in range(point.shape[-1]):
             side = self.shapes[:, axis][which]
@@ -105,7 +105,7 @@ class Pixels:
         return place + self.first[which]
 
     def jacobians(self, at: NDArray[np.integer]) -> NDArray[np.float32]:
-        """Return the Jacobians at places in the row."""
+        """Return the Jacobians of pixels by index."""
         return self.jacobians_of(self.label[at]) if self.pixels is None else self.pixels[at]
 
     def jacobians_of(self, label: NDArray[np.integer]) -> NDArray[np.float32]:
@@ -123,9 +123,10 @@ class Pixels:
         rest: NDArray[np.float32] | None = None,
         out: NDArray[np.uint32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.float32] | None]:
-        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner jacobian; ``out`` for labels may be ``outer``.
+        """Assemble a map of pixels: S(p) = inner(q) + J_inner rest and J = J_inner jacobian.
 
-        Returns the coordinates, exemplars, labels and jacobians of a source map.
+        Returns the coordinates, exemplars, labels and Jacobians of a source map. The labels are written to ``out``,
+        which may be ``outer``.
         """
         axes = place.ndim
         exemplar = np.empty(place.shape, np.uint16)
@@ -144,6 +145,7 @@ class Pixels:
                     jacobians[band] = chain_jacobians(
                         jacobians[band], jacobian[band] if jacobian.ndim > 3 else jacobian[outer[band]]
                     )
+        # A pair of an outer and an inner label is a new patch, with one Jacobian in the table.
         keys = number_pairs(outer, self, place, label)
         if jacobians is None and (jacobian is not None or self.table is not None):
             outer_of, inner_of = np.divmod(keys, np.uint64(max(1, self.labels)))
@@ -158,37 +160,37 @@ def turn_places(jacobians: NDArray[np.float32], places: NDArray[np.floating[Any]
 
 
 def chain_jacobians(inner: NDArray[np.float32], outer: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return products of matrices: in double precision, for BLAS differs in the last bit from processor to processor."""
+    """Return products of matrices. Double precision, because the last bit of BLAS results depends on the processor."""
     return np.asarray(np.einsum("...ij,...jk->...ik", inner, outer, dtype=np.float64), np.float32)
 
 
 BAND = 1 << 18
-"""Pixels that are composed at once."""
+"""Number of pixels that are composed at once."""
 
 
 def divide_bands(shape: tuple[int, ...]) -> Iterator[slice]:
-    """Cut the first axis into bands, so that what is computed for each pixel needs little memory."""
+    """Divide the first axis into bands, so that intermediate values of each pixel take little memory."""
     step = max(1, BAND // max(1, math.prod(shape[1:])))
     for start in range(0, shape[0], step):
         yield slice(start, start + step)
 
 
 def label_pieces(joined: Sequence[Bools], shape: tuple[int, ...]) -> tuple[int, NDArray[np.int32]]:
-    """Return how many pieces a picture falls into, and the piece of each pixel.
+    """Return the number of connected pieces of an image, and the piece of each pixel.
 
     Parameters
     ----------
     joined : sequence of bool array
-        For each axis, whether a pixel and the next one are of one piece: one shorter than the picture along that axis.
+        For each axis, True if a pixel is connected to the next. One shorter than the image along that axis.
     shape : tuple of int
-        Sides of the picture.
+        Sides of the image.
 
     Returns
     -------
     int
         Number of pieces.
     int32 array, (pixels,)
-        The piece of each pixel.
+        Number of the piece of each pixel.
 
     """
     from scipy.sparse import coo_array
@@ -206,14 +208,15 @@ def label_pieces(joined: Sequence[Bools], shape: tuple[int, ...]) -> tuple[int, 
 def number_pairs(
     outer: NDArray[np.uint32], pixels: Pixels, place: NDArray[np.unsignedinteger], out: NDArray[np.uint32]
 ) -> NDArray[np.uint64]:
-    """Return the pairs of an outer label and the label of the pixel at a place that occur, and number them by rising value.
+    """Return the sorted pairs of outer and inner labels, and write the number of each pixel's pair to ``out``.
 
-    Pairs are outer * pixels.labels + inner. The number of that of each pixel is written into ``out``.
+    A pair is outer * pixels.labels + inner, where inner is the label of the pixel at ``place``.
     """
 
     def pairs(band: slice) -> NDArray[np.uint64]:
         return np.asarray(outer[band] * np.uint64(pixels.labels) + pixels.label[place[band]], np.uint64)
 
+    # Count pairs in an array if it is small enough, because sorting takes longer.
     most = (int(outer.max()) + 1) * pixels.labels if outer.size else 0
     if most > max(1 << 22, place.size):
         found = np.unique(np.concatenate([np.unique(pairs(band)) for band in divide_bands(place.shape)]))

@@ -1,4 +1,4 @@
-"""How much of a synthesis is copied from its exemplars as it stands, and in how large pieces."""
+"""Measure how much of a synthesis is copied verbatim from its exemplars, and how large the copied pieces are."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class CopyStatistics:
     Attributes
     ----------
     verbatim : float
-        Share of the output pixels that are exemplar samples, unchanged: whole coordinates.
+        Fraction of the output pixels that are unchanged samples of an exemplar, at integer coordinates.
     largest : float
-        Area of the largest connected region copied in one piece, as a share of the exemplar's area.
+        Area of the largest connected region copied in one piece, divided by the area of the largest exemplar.
     regions : int
         Number of such regions.
 
@@ -41,10 +41,10 @@ class CopyStatistics:
 
 
 def find_continued(source: Parted, axis: int, *, wrap: bool = False) -> Bools:
-    """Return where a pixel and the next one along an axis come from one piece of the exemplar."""
+    """Return which pixels continue in the exemplar to their next pixel along an axis."""
     joined = source.exemplar == np.roll(source.exemplar, -1, axis)
     jacobian = source.jacobian_array()
-    # One coordinate at a time, for a dense jacobian of a large picture is many times its size.
+    # Compare one coordinate at a time, because the Jacobians of all pixels are many times the size of the image.
     for a in range(source.axes):
         place = source.coordinates[..., a]
         step: Any = np.float32(a == axis)
@@ -58,7 +58,7 @@ def find_continued(source: Parted, axis: int, *, wrap: bool = False) -> Bools:
 
 
 def measure_reuse(source: Parted) -> CopyStatistics:
-    """Return how much is copied verbatim from the exemplars, and in how large pieces."""
+    """Return how much is copied verbatim from the exemplars, and how large the copied pieces are."""
     joined = [np.delete(find_continued(source, axis), -1, axis) for axis in range(source.axes)]
     regions, region = label_pieces(joined, source.shape)
     largest = int(np.bincount(region).max())
