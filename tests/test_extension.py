@@ -107,7 +107,7 @@ def test_again_and_otherwise() -> None:
         (lambda: texrs.extend(FLOOR, top=300, view=PLANE), "reach the plane's horizon"),
         (
             lambda: texrs.extend(FLOOR, top=8, view=PlaneView(corners=[[0, 0]] * 4)),
-            "corners: needs the four of a convex",
+            "corners: must form a convex quadrilateral",
         ),
         (lambda: texrs.extend(FLOOR, top=8, view=PLANE, boundary_width=65), "boundary_width: "),
         (lambda: texrs.extend(FLOOR[:40], top=8), "each side must be at least 64"),

@@ -125,7 +125,7 @@ def test_a_picture_is_enough(files, capsys):
     np.testing.assert_array_equal(io.read(files / "out.png"), made.image)
     io.write(files / "torn.png", look_twice())
     assert run(files, "perspective @torn.png -o @twice.png") == 0
-    assert "no plane was found surely" in capsys.readouterr().err
+    assert "no plane was found with confidence" in capsys.readouterr().err
     assert io.read(files / "twice.png").shape[:2] == tuple(2 * n for n in io.read(files / "torn.png").shape[:2])
 
 

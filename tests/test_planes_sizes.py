@@ -60,7 +60,7 @@ def test_what_nobody_knows_is_even_and_said() -> None:
     assert found.shape == "even"
     assert found.confidence < SURE
     assert found.scale.min() == found.scale.max() == 1
-    with pytest.warns(UserWarning, match="no plane was found surely.*little in common"):
+    with pytest.warns(UserWarning, match="no plane was found with confidence.*little in common"):
         measure_known_scale(look_twice(), np.ones((192, 224), np.bool_))
 
 

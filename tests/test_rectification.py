@@ -137,13 +137,16 @@ def test_only_the_ground_is_used() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: texrs.rectify(FLOOR, view=Plane((9, 9), 0)), "plane: needs one of a picture of 240 x 288"),
-        (lambda: texrs.rectify(FLOOR, view=[PLANE, PLANE]), "view: one plane is made flat"),
-        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: must be a number"),
-        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=7.9), "resolution: at most|hardly anything"),
+        (lambda: texrs.rectify(FLOOR, view=Plane((9, 9), 0)), "plane: must have the shape of the image, 240 x 288"),
+        (lambda: texrs.rectify(FLOOR, view=[PLANE, PLANE]), "view: must be one plane at a time"),
+        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: needs a number"),
+        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=7.9), "resolution: must be at most|almost none"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, size=8), "size"),
-        (lambda: texrs.rectify(FLOOR, view=PlaneView(slant=88, fov=10)), "sharp|before its horizon|are sharp"),
-        (lambda: texrs.rectify(FLOOR, view=PlaneView(ground=np.zeros((240, 288), bool))), "ground: marks nothing"),
+        (lambda: texrs.rectify(FLOOR, view=PlaneView(slant=88, fov=10)), "sharp|in front of its horizon"),
+        (
+            lambda: texrs.rectify(FLOOR, view=PlaneView(ground=np.zeros((240, 288), bool))),
+            "ground: must mark at least one pixel",
+        ),
         (lambda: texrs.rectify(FLOOR, view=PlaneView(ground=np.zeros((9, 9), bool))), "ground"),
         (lambda: texrs.rectify(FLOOR[:32], view=PLANE), "image: each side must be at least 64"),
     ],

@@ -31,8 +31,7 @@ from texrs.tiling import tile
 __all__ = ["rectify"]
 
 SHARP = 0.5
-"""Minimum number of photograph pixels in each texture pixel for a sharp result, along the direction with the fewest.
-"""
+"""Minimum number of photograph pixels in each texture pixel for a sharp result, along the direction with the fewest."""
 SMALLEST = 32
 """Minimum side of the flat texture, in pixels."""
 LEAST = 0.05
@@ -143,20 +142,23 @@ def rectify(
     fine = _choose_resolution(plane, seen.ground, fine)
     sheet = _FlatSheet.of(plane, seen.ground, fine)
     if seen.found:
+        # A found plane has an arbitrary rotation, so level its courses.
         plane = _level(plane, sheet.source.render(pixels, interpolation="linear"), sheet.sharp)
         sheet = _FlatSheet.of(plane, seen.ground, fine)
     start, sides = sheet.find_rectangle()
     if min(sides) < SMALLEST:
         raise InvalidInput(
-            f"image: of the plane {sides[0]} x {sides[1]} pixels are sharp at this resolution, {SMALLEST} x {SMALLEST} are "
-            "needed; give a smaller resolution, or another plane"
+            f"image: must show at least {SMALLEST} x {SMALLEST} sharp pixels of the plane, got {sides[0]} x {sides[1]}; give "
+            "a smaller resolution, or another plane"
         )
+    # Render only the sharp rectangle at the full resolution.
     known, _ = _lay(plane, start, sides, fine)
     texture = known.render(pixels, interpolation=interpolation, antialias=True)
     laid, grown = _grow(texture, asked, cyclic, number, watch)
     # Seams of a grown texture are corrected like those of any other.
     rest = {} if laid.finish is None else {"screening": laid.finish.screening, "across": laid.finish.across}
     source = laid.compose(known).with_finish(cyclic, interpolation=interpolation, antialias=True, **rest)
+    # A texture that was not grown does not have to be rendered again.
     as_it_is = source.shape == known.shape and not any(cyclic)
     composite = texture if as_it_is else source.render(pixels, interpolation=interpolation, antialias=True)
     squeeze = image.ndim == 2
@@ -193,7 +195,7 @@ def _choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> floa
     width = plane.width(_list_points(ground))
     if np.count_nonzero(width > LEAST) < SMALLEST:
         raise InvalidInput(
-            "ground: too little of the plane lies before its horizon; give a mask of it, or another plane"
+            "ground: must contain more of the plane in front of its horizon; give another mask, or another plane"
         )
     resolution = asked or float(np.median(width[width > LEAST]))
     while True:
@@ -202,7 +204,7 @@ def _choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> floa
         if resolution <= most:
             return resolution
         if asked is not None:
-            raise InvalidInput(f"resolution: at most {most:.3g} for this plane, got {resolution:.3g}")
+            raise InvalidInput(f"resolution: must be at most {most:.3g} for this plane, got {resolution:.3g}")
         # A coarser resolution makes more of the plane sharp, up to its horizon.
         resolution = 0.9 * most
 
@@ -212,7 +214,9 @@ def _measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDA
     grid = _list_points(ground)
     near = grid[plane.width(grid) > max(LEAST, SHARP * resolution)]
     if len(near) < SMALLEST:
-        raise InvalidInput(f"resolution: at {resolution:.3g} hardly anything of this plane is sharp; give less")
+        raise InvalidInput(
+            f"resolution: must be smaller for this plane, got {resolution:.3g}; almost none of it is sharp"
+        )
     points = plane.flatten(near)
     return points.min(axis=0), points.max(axis=0)
 

@@ -154,10 +154,11 @@ def remove(
     side = None if patch_size is None else as_int(patch_size, "patch_size", 4, min(shape))
     views = as_views(view)
     settled = [v.settle(shape) for v in views]
+    # The margin is replaced completely; the feather fades outside it.
     inner = widen(marked, wide)
     hole = widen(inner, asked.feather)
     if hole.all():
-        raise InvalidInput("mask: with its margin it covers the whole photograph, so nothing is left to fill it from")
+        raise InvalidInput("mask: must leave pixels to fill from, but covers the whole photograph with its margin")
     check_work("remove", [pixels], shape, "image")
     watch("plane", 0.0)
     with answering(progress, "plane", 0.0):
@@ -167,10 +168,12 @@ def remove(
             for v, (said, _), ground in zip(views, settled, grounds, strict=True)
         ]
     watch("plane", 1.0)
+    # Each plane is a part with its own pixels, and areas off all planes are other parts.
     parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole, pixels)
     made = fill_parts(
         pixels, hole, parts, boundary=rim, things=things, light=follow, patch=side, seed=number, progress=progress
     )
+    # The source map contains the steps after copying, so that other maps get the same ones.
     how = made.finish(screening, (0, 0) if follow else None)
     how |= {"known": (~hole,)} if how else {}
     how |= {"fade": np.rint(255 * fade(inner, asked.feather)).astype(np.uint8)} if asked.feather else {}

@@ -1,8 +1,9 @@
-"""Planes in photographs: how they lie, where each pixel is on them, and how large things are there.
+"""Planes in photographs: their orientation, the point of the plane at each pixel, and the size of elements there.
 
-A `Plane` is said by angles, by four corners of a rectangle, by two vanishing points, by its horizon or by a scale map; `find`
-finds it in a picture alone, and `find_ground` where the picture shows it. A `PlaneView` is what somebody says of both.
-`measure_scale` returns the sizes of elements all over a picture, also where the picture does not show a plane.
+A `Plane` is given by angles, by four corners of a rectangle, by two vanishing points, by its horizon, or by a scale
+map. `find` finds the plane in an image, and `find_ground` finds the pixels that show it. A `PlaneView` contains the
+facts about both that are known. `measure_scale` returns the size of elements at each pixel, also for images that do
+not show a plane.
 """
 
 from texrs.planes._find import find

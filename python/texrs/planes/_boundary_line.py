@@ -1,8 +1,8 @@
-"""Whether a line goes across a photograph beyond which something else begins: a wall that is as bright as the floor before it.
+"""Find a line in a photograph beyond which another surface begins, such as a wall that is as bright as its floor.
 
-One slow change can follow a floor and a wall, where these are not very unlike; but then two, with a step between them, follow
-the same far better. Light takes steps too, at the border of a shadow. So colours are compared as ratios, and contrast with
-what is there, both of which light leaves as they are.
+If a floor and a wall are similar, one slow change may fit both. Two slow changes with a step between them then fit
+much better. Light also has steps, at the border of a shadow. The search therefore compares ratios of colours, and
+contrast relative to brightness, because light does not change them.
 """
 
 from __future__ import annotations
@@ -18,25 +18,30 @@ from texrs._typing import Bools
 __all__ = ["find_step"]
 
 ANGLES, SHARES = np.arange(0, 180, 15), np.arange(0.15, 0.86, 0.05)
-"""Directions across the lines that are tried, in degrees from the columns, and shares of the windows before a line."""
+"""Directions across the tested lines, in degrees from the columns; and shares of the windows before a line."""
 FEWEST = 12
-"""Windows on either side that tell enough."""
+"""Minimum number of windows on each side of a line."""
 DARK, FLAT = 0.02, 1e-5
-"""Added to colours, and to squares of contrast, of which there are logarithms."""
+"""Offsets of colours and of squared contrasts before their logarithms are taken."""
 USUAL = np.array([0.025, 0.025, 0.05, 0.05, 0.025])
-"""What ratios of colours, relative contrasts and brightness deviate in any case."""
+"""Minimum deviation that is assumed for two ratios of colours, two relative contrasts and the brightness."""
 EVEN = 0.05
-"""By how much no change at all is preferred, of the variance of places."""
+"""Weight of the penalty on changes across the image, relative to the number of windows."""
 BETTER, COLOURED = 0.8, 0.1
-"""By how much two changes leave less than one, as logarithms: of ratios and contrasts, and of ratios and brightness. The
-far end of a floor loses its contrast alone."""
+"""Minimum gain of two changes over one: over ratios and contrasts, and over ratios and brightness.
+
+It is a sum of logarithms of the ratio of residuals. The second limit excludes the far end of a floor, where only the
+contrast falls.
+"""
 
 
 def find_step(facts: NDArray[np.float64], reach: float, known: Bools) -> Bools | None:
-    """Return the larger side of the line across which what windows show changes all at once; None where there is none.
+    """Return the larger side of the line across which the windows change abruptly, or None.
 
-    The facts (H, W, 5) are the means of three colours and of two squares of detail in windows, `reach` their deviation.
+    The facts (H, W, 5) are the means of three colours and of two bands of squared detail in windows. `reach` is the
+    standard deviation of the windows.
     """
+    # Use quantities that light does not change, and the brightness.
     colours, details = np.log(facts[..., :3] + DARK), 0.5 * np.log(facts[..., 3:] + FLAT)
     bright = colours.mean(axis=-1, keepdims=True)
     told = np.concatenate([np.diff(colours, axis=-1), details - bright, bright], axis=-1)
@@ -50,17 +55,18 @@ def find_step(facts: NDArray[np.float64], reach: float, known: Bools) -> Bools |
     best: tuple[float, float, tuple[float, float], float] | None = None
     for angle, share in product(ANGLES, SHARES):
         ask()
-        # To so many digits these, and on which side a pixel lies, are the same on every processor.
+        # Round to nine digits, so that the direction, and the side of a pixel, do not depend on the processor.
         down, right = (round(float(f(np.radians(angle))), 9) for f in (np.sin, np.cos))
         along, aside = rows * down + columns * right, rows * right - columns * down
         line = float(np.quantile(along, share))
-        # Windows upon the line show both sides.
+        # Ignore the windows on the line, because they contain both sides.
         sides = along < line - reach, along > line + reach
         if min(np.count_nonzero(side) for side in sides) < FEWEST:
             continue
         terms = np.stack([np.ones(len(rows)), (along - line) / size, aside / size], axis=-1)
         both = sides[0] | sides[1]
         apart = np.concatenate([leave(terms[side], values[side]) for side in sides])
+        # Compare the residuals of one slow change with those of one change on each side.
         less = np.log((leave(terms[both], values[both]).std(axis=0) + USUAL) / (apart.std(axis=0) + USUAL))
         if best is None or less[:4].sum() > best[0]:
             best = float(less[:4].sum()), float(less[[0, 1, 4]].sum()), (down, right), line
@@ -73,6 +79,6 @@ def find_step(facts: NDArray[np.float64], reach: float, known: Bools) -> Bools |
 
 
 def leave(terms: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what a slow change leaves of values."""
+    """Return the residuals of values after a slow change is fitted."""
     even = np.diag([0.0] + [EVEN] * (terms.shape[1] - 1)) * len(terms)
     return np.asarray(values - terms @ np.linalg.solve(terms.T @ terms + even, terms.T @ values), np.float64)

@@ -1,4 +1,4 @@
-"""The plane that a user says, or the one that is found."""
+"""Choose the plane that the user gives, or find it."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ __all__ = ["SURE", "Seen", "as_views", "find_grounds", "follow_plane", "measure_
 
 
 FLAT = 8.0
-"""Degrees of slant up to which a plane is taken for seen from the front."""
+"""Maximum slant in degrees of a plane that is treated as seen from the front."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A plane in a photograph, as it is said or as it was found."""
+    """A plane in a photograph, as given or as found."""
 
     plane: Plane
     ground: Bools
-    """(H, W): where the photograph shows it."""
+    """Mask (H, W) of the pixels that show the plane."""
     found: bool
-    """Whether nobody said how it lies."""
+    """If True, the orientation was found, not given."""
 
 
 def see(pixels: Array, view: PlaneView) -> Seen:
-    """Return what is said of a plane, and what is found where nothing is, with a warning where that is not sure.
+    """Return the given facts about a plane, and find the others; warn if the plane is uncertain.
 
-    All is checked before anything is looked for.
+    All facts are checked before the search starts.
     """
     said = view.settle(pixels.shape)
     known = np.ones((pixels.shape[0], pixels.shape[1]), np.bool_)
@@ -48,20 +48,20 @@ def see(pixels: Array, view: PlaneView) -> Seen:
     if found.confidence < SURE:
         warnings.warn(
             f"the plane was found with a confidence of {found.confidence:.2f} of 1 (slant {found.slant:.0f}, tilt "
-            f"{found.tilt:.0f}); where the result does not look right give the corners of a rectangle, or slant and tilt",
+            f"{found.tilt:.0f}); if the result is wrong, give the corners of a rectangle, or slant and tilt",
             stacklevel=3,
         )
     return Seen(found, ground, True)
 
 
 def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
-    """Return the plane that is said, or found surely enough, and whether it was found; none that is seen from the front."""
+    """Return the plane, None if uncertain or seen from the front, and whether it was found; warn if it is uncertain."""
     if said is not None:
         return (None if said.slant < FLAT else said), False
     try:
         seen = find(pixels, fov=fov, known=ground)
     except InvalidInput:
-        # Too little of it is known.
+        # Too few pixels are known.
         return None, False
     if seen.confidence < SURE:
         warnings.warn(
@@ -74,60 +74,64 @@ def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | 
 
 
 def as_views(view: PlaneView | Plane | Sequence[PlaneView | Plane] | None) -> list[PlaneView]:
-    """Return what is said of one plane, or of each of several."""
+    """Return the views of one plane or of several planes."""
     if not isinstance(view, Sequence):
         return [PlaneView.of(view)]
     if not view:
-        raise InvalidInput("view: needs at least one, got an empty list")
+        raise InvalidInput("view: must contain at least one plane, got an empty list")
     views = [PlaneView.of(each) for each in view]
     if len(views) > 1 and sum(v.ground is None for v in views) > 1:
-        raise InvalidInput("ground: of several planes all but one need one, for they are told apart by that")
+        raise InvalidInput("ground: must be given for all but one of several planes; pass a mask for each")
     return views
 
 
 def find_grounds(
     pixels: Array, settled: Sequence[tuple[Plane | None, Bools | None]], known: Bools, *, everywhere: bool
 ) -> list[Bools]:
-    """Return where the picture shows each plane: as is given, or as is found in what the others leave.
+    """Return the mask of each plane: as given, or as found in the pixels that the others leave.
 
     Parameters
     ----------
     pixels : (H, W, C) array
-        The picture.
+        The image.
     settled : sequence of (Plane, (H, W) bool)
-        What is said of each plane (`PlaneView.settle`). Of two grounds that overlap the first counts.
+        Known facts about each plane (`PlaneView.settle`). If two masks overlap, the first gets the common pixels.
     known : (H, W) bool
-        Where the picture says anything.
+        Mask of the known pixels.
     everywhere : bool
-        Whether a plane is seen in all that the others leave where it is said how it lies.
+        If True, a plane of known orientation without a mask gets all pixels that the others leave.
 
     """
     free, found = known.copy(), []
+    # Given masks come first, and each takes its pixels from the later ones.
     for _, ground in settled:
         if ground is not None:
             found.append(np.asarray(ground & free, np.bool_))
             free &= ~ground
             if not found[-1].any():
-                raise InvalidInput("ground: nothing of it is left beside what is to be filled, and other planes")
+                raise InvalidInput("ground: must have pixels outside the hole and the other planes, got none")
+    # The pixels that remain belong to the plane without a mask, or are searched for its ground.
     missing = next((n for n, (_, ground) in enumerate(settled) if ground is None), None)
     if missing is not None:
         if not free.any():
-            raise InvalidInput("ground: the others leave nothing for the plane whose ground is not said")
+            raise InvalidInput(
+                "ground: the other planes leave no pixels for the plane without a mask; pass a mask for it"
+            )
         whole = everywhere and settled[missing][0] is not None
         found.insert(missing, free if whole else find_ground(pixels, known=free))
     return found
 
 
 def measure_known_scale(pixels: Array, known: Bools) -> ScaleEstimate:
-    """Return how large things are at each pixel of a picture, with a warning where that is not sure."""
+    """Return the size of elements at each pixel of an image; warn if it is uncertain."""
     found = measure_scale(pixels, known=known)
     if found.confidence < SURE:
-        why = "what was measured in several ways has little in common, so all things are taken to be equally large"
+        why = "the measurements have little in common, so all elements are assumed to be equally large"
         if found.shape != "even":
-            why = "there is too little to measure in more than one way, so sizes are those of what is lighter than around it"
+            why = "the image is too small for several measurements, so sizes are those of light areas"
         warnings.warn(
-            f"scale_map: no plane was found surely, and {why} (confidence {found.confidence:.2f} of 1); where the result does "
-            "not look right give a map",
+            f"scale_map: no plane was found with confidence, and {why} (confidence {found.confidence:.2f} of 1); if the "
+            "result is wrong, give a map",
             stacklevel=3,
         )
     return found

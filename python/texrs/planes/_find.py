@@ -1,8 +1,8 @@
-"""The plane of a picture, found in the picture alone.
+"""Find the plane that an image shows, from its pixels only.
 
-Two things tell of it: patterns, which are the same all over a texture but for how they are seen (`_patterns`), and straight
-lines, which meet on the horizon where many run in one direction (`_lines`). Both tell only the horizon; the angle of view then
-gives the slant. Fine and coarse patterns are followed for themselves: how sure a plane is hangs on whether they agree.
+There are two sources of evidence. Patterns of a texture differ only by perspective (`_patterns`). Straight lines in
+one direction meet on the horizon (`_lines`). Both determine only the horizon, and the angle of view then determines
+the slant. Fine and coarse patterns are evaluated separately, and the confidence depends on their agreement.
 """
 
 from __future__ import annotations
@@ -26,56 +26,66 @@ __all__ = ["find"]
 Reals = NDArray[np.float64]
 
 SMALLEST = 64
-"""Pixels across the smallest picture that a plane is looked for in."""
+"""Minimum side of an image, in pixels."""
 LARGEST = 520
-"""A longer side is shrunk to so many pixels: slopes of patterns finer than that tell little."""
+"""Maximum longer side after shrinking, in pixels. Slopes of finer patterns contain little information."""
 FINE = 1.0, 1.6
-"""Standard deviations of the Gaussians under which slopes are taken, in samples: each should find the same plane."""
+"""Standard deviations of the Gaussians before slopes are computed, in samples. Each should find the same plane."""
 HALVED, FIRST = 400, 4
-"""Pixels of the longer side from which on the first rounds, and so many at most, look at half the resolution."""
+"""Minimum longer side in pixels for first rounds at half the resolution; and maximum number of these rounds."""
 RIGHT, STRAIGHT = (8.0, 15.0), 20.0
-"""Degrees by which slant and tilt may be off where a plane counts as found; and the slant below which tilts may be off by more,
-as they tell less."""
+"""Maximum errors of slant and tilt of a correct plane; and slant below which a larger error of the tilt is accepted.
+
+All are in degrees. A small slant does not determine the tilt well.
+"""
 DOUBT = 0.04, 0.05, 0.35, 0.4
-"""Standard deviation of the rise, over the longer side, that the confidence counts with: a constant, what the rise adds, what
-adds that what is measured deviates from the plane, and that bands differ. Chosen on 168 generated floors."""
+"""Parts of the standard deviation of the rise over the longer side, which the confidence assumes.
+
+They are a constant, and factors of the rise, of the deviation of measurements from the plane, and of the difference
+between bands. Chosen on 168 generated floors.
+"""
 ROUGH = 0.25
-"""Deviation of what is measured from the plane at which the confidence is 1 / e: of curved things, and of none."""
+"""Deviation of measurements from the plane that lowers the confidence to 1 / e.
+
+Curved surfaces deviate more, and so do images without a surface.
+"""
 SMALL = 256
-"""Pixels of the longer side below which bands may differ more: there are fewer things to be seen, and the camera blurs more of
-each."""
+"""Longer side in pixels below which bands may differ more: fewer elements are visible, and each is more blurred."""
 UNSURE = 0.02, 0.03, 2.0
-"""Standard deviation of the rise that patterns tell, over the longer side: a constant, what the rise adds, and what adds that
-they deviate; what bands differ is added to it."""
+"""Parts of the standard deviation of the rise from patterns over the longer side.
+
+They are a constant, and factors of the rise and of the deviation of measurements. The difference between bands is
+added.
+"""
 SHARED = 0.5
-"""Lines are the same for both bands, so what these differ counts by so much at least."""
+"""Minimum share of the bands' difference that remains after lines are used, because both bands use the same lines."""
 FEWEST = 20
-"""Lines from which on they are asked."""
+"""Minimum number of lines for using them."""
 
 
 def find(image: object, *, fov: float | None = None, known: object = None) -> Plane:
-    """Find how the plane lies that a picture shows.
+    """Find the orientation of the plane that an image shows.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        A texture seen aslant, the same all over its plane; each side at least 64.
+        An oblique view of a plane with a homogeneous texture, each side at least 64 pixels.
     fov : float, optional
-        Degrees that the longer side of the picture spans, 1 to 170; `FOV` by default. The picture does not tell: the tilt holds
-        for any, the slant for this one.
+        Angle of view of the longer side in degrees, 1 to 170. The image does not determine it. The tilt is valid for
+        any angle, the slant only for this one. Default: `FOV`.
     known : (H, W) bool array, optional
-        Where the picture shows the plane; all of it by default.
+        Mask of the pixels that show the plane. Default: all pixels.
 
     Returns
     -------
     Plane
-        With a confidence from 0 to 1, about how likely the slant is right within 8 degrees, and the tilt within 15: whether
-        fine and coarse patterns say the same, and all parts of the picture.
+        The plane. Its confidence, 0 to 1, is about the probability that the slant is right within 8 degrees and the
+        tilt within 15. It depends on the agreement of fine and coarse patterns, and of all parts of the image.
 
     Raises
     ------
     InvalidInput
-        A picture that is too small, of one colour, or of which too little is known.
+        If the image is too small or has one colour, or too few pixels are known.
 
     Examples
     --------
@@ -92,27 +102,25 @@ def find(image: object, *, fov: float | None = None, known: object = None) -> Pl
     there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
     colours = guidance(pixels)
     if there.sum() < SMALLEST**2 / 4:
-        raise InvalidInput(
-            f"known: {int(there.sum())} pixels of the picture show the plane; {SMALLEST**2 // 4} are needed"
-        )
+        raise InvalidInput(f"known: must mark at least {SMALLEST**2 // 4} pixels of the plane, got {int(there.sum())}")
     if float(colours[there].std(axis=0).max()) < 1e-4:
-        raise InvalidInput("image: has one colour, so no plane can be found in it; give its corners, or angles")
+        raise InvalidInput("image: must contain a texture, got one colour; give the corners or angles of the plane")
     grey, there, step = prepare(colours, there)
     rise, confidence = look(grey, there, find_focal(grey.shape, angle) / max(grey.shape))
-    # What a fit says beyond these digits hangs on the processor.
+    # Keep six digits, because later digits of a fit depend on the processor.
     rounded = [float(f"{r / step / max(grey.shape):.6g}") for r in rise]
     return Plane._of_line(size, np.array([*rounded, 1.0]), "image", angle, float(f"{confidence:.3g}"))
 
 
 def prepare(colours: Floats, known: Bools) -> tuple[Floats, Bools, int]:
-    """Return a picture of one channel of at most `LARGEST` pixels a side, what of it is known, and how many pixels each is."""
+    """Return a grey image of at most `LARGEST` pixels a side, its known pixels, and the pixels per sample."""
     step = max(1, ceil(max(known.shape) / LARGEST))
     small, there = _shrink(colours, known, step)
     return take_grey(small, there), there, step
 
 
 def _shrink(colours: Floats, known: Bools, step: int) -> tuple[Floats, Bools]:
-    """Return the means of squares of so many pixels a side, and whether all of each is known."""
+    """Return the means of blocks of ``step`` pixels a side, and whether each block is completely known."""
     if step == 1:
         return colours, known
     rows, columns = (n // step * step for n in known.shape)
@@ -122,11 +130,14 @@ def _shrink(colours: Floats, known: Bools, step: int) -> tuple[Floats, Bools]:
 
 
 def look(grey: Floats, known: Bools, focal: float) -> tuple[Reals, float]:
-    """Return the rise of the width over the longer side, (2,), and how sure it is; the focal length is over that side too."""
+    """Return the rise (2,) of the width over the longer side, and its confidence.
+
+    The focal length is over this side too.
+    """
     side = max(grey.shape)
     starts = [np.zeros(2) for _ in FINE]
     if side >= HALVED:
-        # Each band for itself: one that starts where another ended agrees with it too soon.
+        # Start each band separately, because a band that starts at the end of another agrees with it too soon.
         small, whole = _shrink(grey[..., np.newaxis], known, 2)
         levels = blur_levels(small[..., 0])
         starts = [follow(levels, whole, sigma, at, FIRST)[0] / 2 for sigma, at in zip(FINE, starts, strict=True)]
@@ -147,9 +158,9 @@ def look(grey: Floats, known: Bools, focal: float) -> tuple[Reals, float]:
 
 
 def trust(rise: float, apart: float, off: float, focal: float) -> float:
-    """Return how likely a plane is that slant and tilt are right, by what bands differ and what is measured is off it.
+    """Return the probability that slant and tilt are right, from the difference of bands and the deviation.
 
-    The same doubt about the rise is many degrees of the tilt where the rise is small, and few of the slant where it is large.
+    The same error of the rise changes the tilt much if the rise is small, and the slant little if the rise is large.
     """
     constant, rising, rough, differing = DOUBT
     doubt = constant + rising * rise + rough * max(0.0, off - LEAST) + differing * apart
@@ -163,5 +174,5 @@ def trust(rise: float, apart: float, off: float, focal: float) -> float:
 
 
 def measure(way: Reals) -> float:
-    """Return the length of a way."""
+    """Return the length of a vector."""
     return float(np.sqrt((way * way).sum()))

@@ -1,8 +1,9 @@
-"""Where a photograph shows its ground, and where something else: sky, walls, things that stand on it.
+"""Find the pixels of a photograph that show its ground, and not sky, walls, or objects on the ground.
 
-A ground is one texture. Its colours, and how much they vary, are about the same all over it, or change slowly with the light
-and with how far it is. What is looked for is the slow change that most of the picture follows, and what does not follow it.
-Windows say that, which blur every border; so where the two meet the colours decide that each side has elsewhere.
+A ground is a surface with one texture. Its colours and its contrast are about the same everywhere, or change slowly
+with light and distance. The search fits the slow change that most of the image follows, and excludes the windows that
+deviate from it. Windows blur borders. Near a border, each pixel therefore gets the side whose usual colours match its
+own.
 """
 
 from __future__ import annotations
@@ -22,64 +23,73 @@ from texrs.planes._boundary_line import find_step
 __all__ = ["find_ground"]
 
 SMALLEST, TELLING = 64, 160
-"""Pixels across the smallest picture that a ground is looked for in, and across the smallest that shows enough to tell."""
+"""Minimum side of an image for the search, and minimum side for detecting other objects than the ground."""
 LARGEST = 240
-"""A longer side is shrunk to so many pixels."""
+"""Maximum longer side after shrinking, in pixels."""
 WINDOW, NARROWEST = 0.045, 8.0
-"""Standard deviation of the windows, as a share of the shorter side, and the least in pixels of what is shrunk."""
+"""Standard deviation of the windows as a share of the shorter side, and its minimum in pixels of the shrunk image."""
 BANDS = 1.0, 2.5
-"""Standard deviations of the Gaussians beyond which colours are detail, in pixels of what is shrunk."""
+"""Standard deviations of the Gaussians that separate detail from colours, in pixels of the shrunk image."""
 COLOUR, CONTRAST = 0.02, 0.2
-"""What colours, of 1, and logarithms of contrast deviate in any case."""
+"""Minimum deviation that is assumed for colours, from 0 to 1, and for logarithms of contrast."""
 RANGE, PLAIN = np.array([1.0, 1.0, 1.0, 4.0, 4.0]), -5.0
-"""Range of the same, where nothing is said; logarithm of the contrast of what is smooth."""
+"""Range of colours and logarithms of contrast without a ground; and logarithm of the contrast of a smooth surface."""
 LOOSE = 1.5
-"""Times what they deviate in any case that they may deviate of one ground."""
+"""Maximum deviation within one ground, as a multiple of the minimum deviation."""
 POWER = 4
-"""Of the mean of what is off."""
+"""Exponent of the mean of deviations. It is high so that one large deviation counts."""
 EVEN = 1.0
-"""By how much no change at all is preferred, of the variance of places."""
+"""Weight of the penalty on changes across the image, relative to the fit. Positions are from -1 to 1."""
 FAR = 4.0
-"""Standard deviations from which on a window does not follow the ground."""
+"""Minimum deviation of a window that does not follow the ground, in standard deviations."""
 ROUNDS = 20
-"""Steps of a robust fit."""
+"""Number of steps of the robust fit."""
 BINS, FINE = 12, 0.012
-"""Bins of colours, of each channel; standard deviation of the windows, as a share of the shorter side, in which they decide."""
+"""Bins per colour channel; and standard deviation of the windows for comparing colours, as a share of the shorter side.
+"""
 DOUBT = 2.0
-"""Windows of the first kind around a border in which colours decide."""
+"""Width of the band along a border where colours decide, as a multiple of the windows' standard deviation."""
 PART, USUAL = 0.08, 0.25
-"""Share of a picture up to which a part may be ground that windows find unlike it, and the quantile of what ground has that its
-colours must reach."""
+"""Maximum share of the image of a part that is returned to the ground, and quantile for its colours.
+
+The median likelihood of its colours must reach this quantile of the likelihoods within the ground.
+"""
 LEAST, THING = 0.004, 0.02
-"""Share of a picture below which a part of it is no part of its own, of the ground and of what is not: one button among many is
-no thing that stands on a floor."""
+"""Minimum share of the image of a separate part of the ground, and of another object.
+
+A single button among many is not an object on a floor.
+"""
 LIT = 0.13
-"""Share of the variance of brightness that even light must leave at most: walls and skies leave more."""
+"""Maximum share of the variance of brightness that remains after uneven light is divided out.
+
+For walls and skies, more remains.
+"""
 FEWEST = 0.03
-"""Where less than this share of a picture does not follow the ground all of it is ground."""
+"""Minimum share of the image that must deviate from the ground. Below it, a step is searched for instead."""
 
 
 def find_ground(image: object, *, known: object = None) -> Bools:
-    """Find where a picture shows its ground: the texture that most of it shows.
+    """Find the ground in an image: the texture that most of the image shows.
 
-    A picture of less than 160 pixels across shows too few things to tell what else is one; all of it is taken for ground.
+    An image of less than 160 pixels across contains too few elements to detect other objects. All of its known pixels
+    are then ground.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
         A photograph, any real dtype, each side at least 64.
     known : (H, W) bool array, optional
-        Where it says anything; all of it by default.
+        Mask of the known pixels. Default: all pixels.
 
     Returns
     -------
     (H, W) bool array
-        True on the ground; False where it is not known.
+        True on the ground, and False elsewhere and at unknown pixels.
 
     Raises
     ------
     InvalidInput
-        A picture that is too small, or of which nothing is known.
+        If the image is too small, or no pixel is known.
 
     Examples
     --------
@@ -98,13 +108,14 @@ def find_ground(image: object, *, known: object = None) -> Bools:
     size = pixels.shape[0], pixels.shape[1]
     there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
     if not there.any():
-        raise InvalidInput("known: nothing of the picture is known")
+        raise InvalidInput("known: must mark at least one pixel, got none")
     if min(size) < TELLING:
         return there
+    # A small image is enough, because the windows blur fine detail.
     colours, seen = shrink(guidance(pixels), there)
     follows = seen if is_evenly_covered(colours, seen) else find_windows(colours, seen)
     if np.count_nonzero(seen & ~follows) < FEWEST * np.count_nonzero(seen):
-        # One slow change follows it all, but two may do so better.
+        # One slow change fits the whole image, but two changes with a step between them may fit better.
         side = find_step(*look(colours, seen), seen)
         if side is None:
             return there
@@ -112,7 +123,7 @@ def find_ground(image: object, *, known: object = None) -> Bools:
     ground = settle(colours, seen, follows)
     if np.count_nonzero(seen & ~ground) < THING * ground.size:
         return there
-    # What is not wholly known is what lies nearest to it.
+    # Give blocks with unknown pixels the value of the nearest known block.
     nearest = distance_transform_edt(~seen, return_distances=False, return_indices=True)
     ground = ground[tuple(nearest)]
     rows, columns = (np.minimum(np.arange(n) * m // n, m - 1) for n, m in zip(size, ground.shape, strict=True))
@@ -120,7 +131,7 @@ def find_ground(image: object, *, known: object = None) -> Bools:
 
 
 def is_evenly_covered(colours: NDArray[np.float64], known: Bools) -> bool:
-    """Return whether all of a picture follows one ground once uneven light is divided out."""
+    """Return True if the whole image follows one ground after uneven light is divided out."""
     light = Light.of(colours, known)
     if light is None:
         return False
@@ -129,14 +140,17 @@ def is_evenly_covered(colours: NDArray[np.float64], known: Bools) -> bool:
     means = blur(colours.mean(axis=-1, keepdims=True), known, 2 * NARROWEST)
     seen, off = (np.log(m[known] + COLOUR) for m in (means, means / factor))
     if off.var() > LIT * seen.var():
-        # A wall above a floor is no light.
+        # The brightness step comes from a wall above a floor, not from uneven light.
         return False
     even = colours / factor
     return bool(np.count_nonzero(known & ~find_windows(even, known)) < PART * np.count_nonzero(known))
 
 
 def shrink(colours: Floats, known: Bools) -> tuple[NDArray[np.float64], Bools]:
-    """Return a picture of three channels of at most `LARGEST` pixels a side, by means of squares, and what of it is known."""
+    """Return an image of three channels of at most `LARGEST` pixels a side, and its known pixels.
+
+    Blocks of pixels are averaged.
+    """
     step = max(1, ceil(max(known.shape) / LARGEST))
     rows, columns = (n // step * step for n in known.shape)
     three = colours if colours.shape[2] == 3 else np.repeat(colours[..., :1], 3, axis=2)
@@ -146,7 +160,7 @@ def shrink(colours: Floats, known: Bools) -> tuple[NDArray[np.float64], Bools]:
 
 
 def blur(values: NDArray[np.float64], known: Bools, sigma: float) -> NDArray[np.float64]:
-    """Return the means of what is known in windows around each pixel, channel by channel."""
+    """Return the Gaussian means of known pixels around each pixel, channel by channel."""
     from scipy.ndimage import gaussian_filter
 
     seen = known.astype(np.float64)
@@ -156,14 +170,14 @@ def blur(values: NDArray[np.float64], known: Bools, sigma: float) -> NDArray[np.
 
 
 def look(colours: NDArray[np.float64], known: Bools) -> tuple[NDArray[np.float64], float]:
-    """Return the means of colours, and of squares of two bands of detail, in windows, and the deviation of these."""
+    """Return window means of colours and of two bands of squared detail, and the windows' standard deviation."""
     sigma = max(NARROWEST, WINDOW * min(known.shape))
     details = [np.square(colours - blur(colours, known, s)).sum(axis=-1) for s in BANDS]
     return blur(np.stack([*np.moveaxis(colours, -1, 0), *details], axis=-1), known, sigma), sigma
 
 
 def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
-    """Mark the pixels whose windows follow what most of the picture follows."""
+    """Mark the pixels whose windows follow the slow change that most of the image follows."""
     facts, sigma = look(colours, known)
     facts[..., 3:] = 0.5 * np.log(facts[..., 3:] + 1e-5)
     least = np.array([COLOUR] * 3 + [CONTRAST] * len(BANDS))
@@ -178,7 +192,8 @@ def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
         ask()
         coefficients, spread = fit(terms[thin], facts[thin], start[thin], least)
         off = np.sqrt(measure_off(facts - terms @ coefficients, spread))
-        # How much likelier it is than anything in the range; and what has detail is a ground sooner than what has not.
+        # Compute the gain in log likelihood over a uniform distribution. Detailed parts count more, because a ground
+        # is rarely smooth.
         gain = np.log(RANGE / (2.5 * spread)).sum() - len(spread) * off[thin] ** 2 / 2
         value = float((np.maximum(gain, 0) * np.clip(facts[thin][:, 3] - PLAIN, 0.2, 2)).sum())
         if best is None or value > best[0]:
@@ -188,7 +203,7 @@ def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
 
 
 def list_starts(thin: Bools) -> list[Bools]:
-    """Return parts of a picture that may be ground: all of it, its halves, and its middle."""
+    """Return parts of an image that may be ground: all of it, its halves, and its middle."""
     rows, columns = np.indices(thin.shape)
     height, width = thin.shape
     middle = (np.abs(rows - height / 2) < height / 4) & (np.abs(columns - width / 2) < width / 4)
@@ -197,14 +212,14 @@ def list_starts(thin: Bools) -> list[Bools]:
 
 
 def measure_off(rest: NDArray[np.float64], spread: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return squares of how far facts are off, in standard deviations: what is far off in one alone is far off."""
+    """Return squared deviations in standard deviations, such that one large deviation of a fact is enough."""
     return np.asarray((np.abs(rest / spread) ** POWER).mean(axis=-1) ** (2 / POWER), np.float64)
 
 
 def fit(
     terms: NDArray[np.float64], facts: NDArray[np.float64], start: Bools, least: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the slow change (terms, facts) that a part follows, and all that follows it; and by how much these deviate."""
+    """Fit a slow change to a part and all windows that follow it; return coefficients (terms, facts) and spread."""
     weight = start.astype(np.float64)
     coefficients, spread = np.zeros((terms.shape[1], facts.shape[1])), least
     even = np.diag([0.0] + [EVEN] * (terms.shape[1] - 1))
@@ -223,7 +238,7 @@ def fit(
 
 
 def measure_chances(cell: NDArray[np.intp], part: Bools) -> NDArray[np.float64]:
-    """Return the logarithm of the chance that a part of a picture has the colour of each pixel."""
+    """Return the log likelihood of the colour of each pixel within a part of the image."""
     from scipy.ndimage import gaussian_filter
 
     count = np.bincount(np.ravel_multi_index(tuple(cell[part].T), (BINS,) * 3), minlength=BINS**3).astype(np.float64)
@@ -232,7 +247,7 @@ def measure_chances(cell: NDArray[np.intp], part: Bools) -> NDArray[np.float64]:
 
 
 def return_parts(cell: NDArray[np.intp], known: Bools, ground: Bools) -> Bools:
-    """Return the ground with those smaller parts of the rest whose colours it has elsewhere, as one large tile of a floor."""
+    """Return the ground with smaller other parts that have its colours, such as one large tile of a floor."""
     from scipy.ndimage import label
 
     own = ground & known
@@ -250,7 +265,7 @@ def return_parts(cell: NDArray[np.intp], known: Bools, ground: Bools) -> Bools:
 
 
 def settle(colours: NDArray[np.float64], known: Bools, follows: Bools) -> Bools:
-    """Draw the border of what follows the ground by the colours of both sides."""
+    """Draw the border of the ground by the colours on both sides."""
     from scipy.ndimage import distance_transform_edt, label, median_filter
 
     side = min(known.shape)
@@ -273,7 +288,7 @@ def settle(colours: NDArray[np.float64], known: Bools, follows: Bools) -> Bools:
         ground = np.where(near, says > 0, ground) & known
         ground = median_filter(ground, 5) & known
     for value, least in ((True, LEAST), (False, THING)):
-        # Crumbs belong to what is around them.
+        # Merge parts that are too small with their surroundings.
         pieces, _ = label(ground == value)
         small = np.bincount(pieces.ravel()) < least * ground.size
         small[0] = False

@@ -1,10 +1,11 @@
-"""Straight lines of a picture, and how the plane lies on which they run in one direction, or in two.
+"""Estimate the horizon of a plane from straight lines of its image that run in one or two directions.
 
-Lines of one direction of a plane meet in one point of its horizon. Where borders of what a picture shows are straight and
-most of them run in one direction, or two, that tells more of the horizon than any patch of texture does.
+Parallel lines of a plane meet in one point of its horizon. If most straight borders in an image run in one or two
+directions, they determine the horizon better than any patch of texture.
 
-Borders are taken as Burns et al. do: pixels beside each other whose slopes have about the same direction are one border, and
-its principal axis is a line. The rest is a mixture: a line runs in one of the two directions, but for an error, or anyhow.
+Borders are detected as by Burns et al. Adjacent pixels whose slopes have about the same direction form a border, and
+its principal axis is a line. A mixture model then describes the lines: a line runs in one of the two directions, with
+an error, or in a random direction.
 
 J. B. Burns, A. R. Hanson and E. M. Riseman, "Extracting straight lines", IEEE Transactions on Pattern Analysis and Machine
 Intelligence 8, 1986.
@@ -24,39 +25,44 @@ __all__ = ["Lean", "Lines", "find_lines", "lean"]
 Reals = NDArray[np.float64]
 
 SMOOTH = 1.0
-"""Standard deviation of the Gaussian under which slopes are taken, in pixels."""
+"""Standard deviation of the Gaussian before slopes are computed, in pixels."""
 STEEP = 0.5
-"""A border is at least so steep, of the root mean square of the slopes around it."""
+"""Minimum slope of a border, as a share of the root mean square of the slopes around it."""
 AROUND = 0.06
-"""Standard deviation of the windows of that, as a share of the longer side."""
+"""Standard deviation of the windows for this mean, as a share of the longer side."""
 SHORTEST = 12.0
-"""Length of a line, in pixels."""
+"""Minimum length of a line, in pixels."""
 THIN = 0.6
-"""Standard deviation across a line, in pixels, up to which it is straight."""
+"""Maximum standard deviation of pixels across a straight line, in pixels."""
 TANGENT = 0.4142135623730951
-"""Of an eighth of a half turn."""
+"""Tangent of 22.5 degrees, an eighth of a half turn."""
 ASKEW = 0.12
-"""Sine of the angle, at most, between a line and what lies across its slopes."""
+"""Maximum sine of the angle between a line and the perpendicular of its slopes."""
 MOST = 1500
-"""The longest lines are enough."""
+"""Maximum number of lines. The longest are used."""
 COUNTED, TOLD = 60.0, 300.0
-"""A line counts by its length, in pixels, up to the first. So much length tells one thing: lines beside each other are not
-independent."""
+"""Maximum length of a line that counts, in pixels; and length that is worth one independent measurement.
+
+The second is longer because adjacent lines are not independent.
+"""
 FINEST, BROADEST = np.radians(0.7), np.radians(12.0)
-"""Standard deviation of the angle between a line and its direction: the least, and the largest that is looked for."""
+"""Minimum and maximum standard deviation of the angle between a line and its direction."""
 STRAIGHT, CURVED = np.radians(3.0), np.radians(6.0)
-"""Up to the first, directions tell all that they can; from the second on, nothing: borders are curved."""
+"""Maximum standard deviation of this angle for directions that count fully, and minimum for those that do not count.
+
+A larger deviation means that borders are curved.
+"""
 LOOSE = 0.05
-"""Share of lines, at least, that run anyhow."""
+"""Minimum share of lines in random directions."""
 BINS, BETWEEN = 90, 12
-"""Bins of half a turn in which directions are looked for, and how many lie between two of them at least."""
+"""Number of bins of half a turn for finding the two directions, and minimum number of bins between them."""
 ROUNDS = 30
-"""Steps of expectation and maximisation."""
+"""Maximum number of steps of expectation and maximisation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Straight lines of a picture: middles (n, 2) in pixels from its middle, directions (n, 2), and lengths (n,)."""
+    """Straight lines of an image: middles (n, 2) in pixels from its middle, directions (n, 2), and lengths (n,)."""
 
     middles: Reals
     ways: Reals
@@ -65,16 +71,17 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Lean:
-    """What lines tell of a horizon.
+    """Estimate of a horizon from lines.
 
     Attributes
     ----------
     rise : (2,) array
-        Of the width a longer side of the picture, as lines and what was known before have it.
+        Rise of the relative width over the longer side, from the lines and the prior estimate.
     told : (2, 2) array
-        Inverse of the covariance of the rise, by lines alone.
+        Inverse of the covariance of the rise, from the lines only.
     spreads, shares : (2,) arrays
-        Standard deviation, in radians, of the angle between lines and each of two directions, and the share of lines in it.
+        Standard deviation of the angle between lines and each of two directions, in radians; and the share of lines in
+        it.
 
     """
 
@@ -85,7 +92,7 @@ class Lean:
 
 
 def find_lines(grey: Floats, known: Bools) -> Lines:
-    """Return the straight borders of what a picture, (H, W), shows where it is known."""
+    """Return the straight borders in the known pixels of an image (H, W)."""
     from scipy.ndimage import binary_erosion, gaussian_filter
 
     smooth = gaussian_filter(grey.astype(np.float64), SMOOTH, mode="nearest")
@@ -95,9 +102,11 @@ def find_lines(grey: Floats, known: Bools) -> Lines:
     inner[[0, 1, 2, -3, -2, -1]] = inner[:, [0, 1, 2, -3, -2, -1]] = False
     if not known.all():
         inner &= binary_erosion(known, iterations=3)
+    # Keep the pixels that are much steeper than their surroundings.
     border = inner & (steep > STEEP * np.sqrt(_look_around(steep**2, inner))) & (steep > 1e-4)
     crests, away = _mark_crests(steep, down, right)
     border &= crests
+    # Number these pixels, and list the pairs that are adjacent in any of eight directions.
     rows, columns = np.nonzero(border)
     number = np.full(grey.shape, -1, np.intp)
     number[rows, columns] = np.arange(len(rows))
@@ -109,13 +118,15 @@ def find_lines(grey: Floats, known: Bools) -> Lines:
     ]
     beside = np.concatenate([np.stack([a, b], axis=-1)[(a >= 0) & (b >= 0)] for a, b in pairs])
     slopes = np.stack([down[rows, columns], right[rows, columns]], axis=-1)
-    # Eighths of a turn, by comparisons alone, in two ways: a line at the limit of two lies in the midst of one of the other.
+    # Group slopes by eighths of a turn, and again by eighths that are shifted by half of one. A line at the limit of
+    # two eighths is in the middle of an eighth of the other grouping.
     parts = [_join(_tell_eighths(slopes, turn), beside) for turn in (0.0, np.pi / 8)]
     sizes = [np.bincount(part) if len(part) else np.zeros(1, np.intp) for part in parts]
     first = sizes[0][parts[0]] >= sizes[1][parts[1]]
     places = np.stack([rows, columns], axis=-1) + away[rows, columns]
     found = []
     for part, size, won in zip(parts, sizes, (first, ~first), strict=True):
+        # Choose a part if, for most of its pixels, the part of the other grouping is not larger.
         votes = np.bincount(part, won, minlength=len(size))
         chosen = (votes >= 0.5 * size) & (size >= SHORTEST)
         found.append(_measure(part, chosen, places, steep[rows, columns], slopes))
@@ -126,7 +137,7 @@ def find_lines(grey: Floats, known: Bools) -> Lines:
 
 
 def _look_around(values: Reals, known: Bools) -> Reals:
-    """Return the means of values in the windows around each pixel, by cells."""
+    """Return the mean of known values in the window around each pixel, computed by cells."""
     from scipy.ndimage import gaussian_filter
 
     sigma = AROUND * max(values.shape)
@@ -141,14 +152,14 @@ def _look_around(values: Reals, known: Bools) -> Reals:
 
 
 def _tell_eighths(slopes: Reals, turn: float) -> NDArray[np.intp]:
-    """Return in which eighth of a turn each slope lies."""
+    """Return the index of the eighth of a turn that contains each slope, turned by an angle."""
     y = slopes[:, 0] * np.cos(turn) - slopes[:, 1] * np.sin(turn)
     x = slopes[:, 0] * np.sin(turn) + slopes[:, 1] * np.cos(turn)
     return np.asarray((y > 0) * 4 + (x > 0) * 2 + (np.abs(y) > np.abs(x)), np.intp)
 
 
 def _join(kinds: NDArray[np.intp], beside: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the numbers of the parts of pixels of one kind that lie beside each other."""
+    """Return the number of the connected part of each pixel. Adjacent pixels of the same kind are connected."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -158,7 +169,7 @@ def _join(kinds: NDArray[np.intp], beside: NDArray[np.intp]) -> NDArray[np.intp]
 
 
 def _mark_crests(steep: Reals, down: Reals, right: Reals) -> tuple[Bools, Reals]:
-    """Mark the pixels that are no less steep than both beside them, across the border, and how far from each it is steepest."""
+    """Mark pixels of maximum slope across a border; return the mask and the offsets to the exact maxima."""
     padded = np.pad(steep, 1)
     rows, columns = steep.shape
 
@@ -200,7 +211,7 @@ def _measure(
     length, across = np.sqrt(12 * (middle + half)), np.sqrt(np.maximum(middle - half, 0))
     angle = 0.5 * np.arctan2(2 * yx, yy - xx)
     ways = np.stack([np.cos(angle), np.sin(angle)], -1)
-    # Where slopes do not lie across it, it is a row of other borders.
+    # A part whose slopes are not perpendicular to it is a row of other borders.
     mean = np.stack([add_up(slopes[:, 0]), add_up(slopes[:, 1])], -1)
     askew = np.abs((ways * mean).sum(axis=-1)) / np.maximum(np.hypot(*mean.T), 1e-12)
     good = chosen & (length >= SHORTEST) & (across <= THIN + 0.01 * length) & (askew <= ASKEW)
@@ -208,20 +219,21 @@ def _measure(
 
 
 def lean(lines: Lines, side: int, before: Reals, sure: float, focal: float) -> Lean:
-    """Return what lines tell of a horizon.
+    """Estimate the horizon from lines and a prior estimate.
 
     Parameters
     ----------
     lines : Lines
-        Of a picture.
+        Straight lines of the image.
     side : int
-        The longer one of the picture.
+        Longer side of the image, in pixels.
     before : (2,) array
-        Rise of the width a side as it is known.
+        Prior estimate of the rise of the relative width over the longer side.
     sure : float
-        Standard deviation of that.
+        Standard deviation of the prior estimate.
     focal : float
-        Focal length over the side: of lines that run anyhow on the plane, it tells how they run in the picture.
+        Focal length over the longer side. It determines how random directions on the plane are distributed in the
+        image.
     """
     mixture = _Mixture(lines, side, before, focal)
     known = np.eye(2) / sure**2
@@ -234,7 +246,7 @@ def lean(lines: Lines, side: int, before: Reals, sure: float, focal: float) -> L
 
 
 class _Mixture:
-    """Lines of two directions of a plane, and lines that run anyhow on it."""
+    """Mixture model of lines: two directions on a plane, and random directions on it."""
 
     def __init__(self, lines: Lines, side: int, rise: Reals, focal: float) -> None:
         self.places, self.ways, self.focal = lines.middles / side, lines.ways, focal
@@ -245,7 +257,7 @@ class _Mixture:
         self.angles = self._start()
 
     def _flatten(self, ways: Reals) -> Reals:
-        """Return the directions on the plane that are seen as some in the picture."""
+        """Return the directions on the plane that appear as given directions in the image."""
         width = 1 + self.places[:, 0] * self.rise[0] + self.places[:, 1] * self.rise[1]
         along = ways[:, 0] * self.rise[0] + ways[:, 1] * self.rise[1]
         flat = ways * width[:, np.newaxis] - self.places * along[:, np.newaxis]
@@ -255,11 +267,11 @@ class _Mixture:
         return np.asarray(flat + stretch * (flat[:, 0] * down[0] + flat[:, 1] * down[1])[:, np.newaxis] * down)
 
     def _start(self) -> Reals:
-        """Return two directions in which most lines run, as angles on the plane before it is stretched along its slope."""
+        """Return the two directions of most lines, as angles on the plane before the stretch along its slope."""
         from scipy.ndimage import gaussian_filter1d
 
         flat = self._flatten(self.ways)
-        # No usual direction, as that of a row, lies at the limit of two bins.
+        # Shift the bins, so that usual directions, such as rows, are not at the limit of two bins.
         turns = np.arctan2(flat[:, 1], flat[:, 0]) / np.pi + 0.3 / BINS
         bins = np.floor(turns * BINS).astype(np.intp) % BINS
         count = gaussian_filter1d(np.bincount(bins, self.weights, minlength=BINS), 1.5, mode="wrap")
@@ -275,8 +287,8 @@ class _Mixture:
         return np.asarray(np.arctan2(ways[:, 1], ways[:, 0]))
 
     def step(self) -> tuple[Reals, Reals]:
-        """Share lines out among directions; return the matrix and the right side of the change of rise and of angles."""
-        # How densely what runs anyhow on the plane is seen to run as each line does.
+        """Assign lines to directions; return the normal matrix and right side for the change of rise and angles."""
+        # Density in the image, at the direction of each line, of random directions on the plane.
         flat = self._flatten(self.ways)
         aside = self._flatten(np.stack([-self.ways[:, 1], self.ways[:, 0]], axis=-1))
         turned = np.abs(flat[:, 0] * aside[:, 1] - flat[:, 1] * aside[:, 0])
@@ -304,7 +316,7 @@ class _Mixture:
         return matrix, pull
 
     def _differ(self, which: int) -> tuple[Reals, Reals]:
-        """Return by what angle lines differ from a direction, and how that changes with rise and angles, (n, 4)."""
+        """Return the angle of each line to a direction, and its derivatives by rise and angles, (n, 4)."""
         turn = self.angles[which]
         way, aside = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
         towards = way + self.places * float((self.rise * way).sum())
@@ -322,7 +334,7 @@ class _Mixture:
         return (off + np.pi / 2) % np.pi - np.pi / 2, slopes
 
     def move(self, matrix: Reals, pull: Reals, known: Reals, before: Reals) -> bool:
-        """Change rise and angles; return whether it was by much."""
+        """Update rise and angles; return True if the change was above 1e-5."""
         whole, right = matrix + 1e-6 * np.eye(4), pull.copy()
         whole[:2, :2] += known
         right[:2] += np.einsum("ij,j->i", known, before - self.rise)
@@ -331,6 +343,6 @@ class _Mixture:
         return float(np.abs(change).max()) > 1e-5
 
     def free(self, matrix: Reals) -> Reals:
-        """Return what is told of the rise where nothing is known of the angles."""
+        """Return the inverse covariance of the rise if the angles are unknown."""
         least = matrix[2:, 2:] + 1e-6 * np.eye(2)
         return np.asarray(matrix[:2, :2] - matrix[:2, 2:] @ np.linalg.solve(least, matrix[2:, :2]))

@@ -1,12 +1,14 @@
-"""How patterns differ over a picture, and the plane on which they do not.
+"""Find the horizon of a plane from the size and shape of local patterns.
 
-Of a texture that is the same everywhere, seen aslant, local patterns differ only by how they are seen. What is measured of
-one is the covariance C of its autocorrelation, from mean products of slopes over the variance, N = C^-1: its size, its shape
-and its direction at once, with no mask of elements, whatever the contrast. The plane is that on which C is the same
-everywhere. Only its horizon can be told so: a linear change of such a texture is such a texture.
+Local patterns of a homogeneous texture differ only by perspective. A pattern is measured by the covariance C of its
+autocorrelation. Its inverse N = C^-1 is the mean product of slopes over the variance. C contains size, shape and
+direction at once. It needs no mask of elements, and does not depend on contrast. The plane is chosen so that C is the
+same everywhere on it. This determines only the horizon, because a linear change of a homogeneous texture is
+homogeneous too.
 
-Each round flattens the picture by the horizon found so far, measures there, and corrects it: what measuring does to large and
-small patterns is the same where all are of one size. What the camera blurs is known, in pixels, and taken off: C = N^-1 - B.
+Each round flattens the image by the current horizon, measures the patterns there, and corrects the horizon. Errors of
+measurement depend on the size of patterns, so they cancel if all patterns have the same size. The blur B of the camera
+is known in pixels and subtracted: C = N^-1 - B.
 """
 
 from __future__ import annotations
@@ -26,52 +28,57 @@ __all__ = ["blur_levels", "follow", "measure_in_sizes", "measure_windows"]
 Reals = NDArray[np.float64]
 
 SPREAD = 0.1
-"""Standard deviation of the windows that are measured, as a share of the side of what is flattened."""
+"""Standard deviation of the measured windows, as a share of the side of the flattened image."""
 FULL = 0.55
-"""Share of a window that must be known."""
+"""Minimum known share of a window."""
 CAMERA = 0.55
-"""Standard deviation of what a pixel sees, in pixels."""
+"""Standard deviation of the blur of one camera pixel, in pixels."""
 FAR, COARSE = 0.35, 0.1
-"""Nearer to the horizon than this share of the middle's scale nothing is looked at. The flattened picture has the resolution
-of this quantile of scales: what is finer would be blurred where it is farther."""
+"""Minimum scale that is used, as a share of the scale in the middle; and quantile of scales for the resolution.
+
+The flattened image gets the resolution of this quantile. A finer one would blur distant parts.
+"""
 LEVELS = 4
-"""Blurred versions of the picture, each for twice the step."""
+"""Number of blur levels, with the image itself. Each level is for twice the step of the level before."""
 ROUNDS, STEPS = 8, 10
-"""How often the picture is flattened anew, and steps of each fit."""
+"""Maximum number of rounds, each with a new flattening, and of steps of each fit."""
 SETTLED = 0.015
-"""Change of the horizon, over the longer side, below which it is found."""
+"""Change of the rise over the longer side below which the rounds stop."""
 LONGEST = 4.0
-"""Times what a fit says that a round may change the horizon, where changes are seen to go on."""
+"""Maximum length of an extrapolated step, as a multiple of the fitted change."""
 STEP, PARTS = 1e-3, 2.0**15
-"""Differences that a fit takes its slopes from, and to which it is rounded: its last bits hang on the processor."""
+"""Step of the finite differences of a fit; and 1 / the unit to which its result is rounded.
+
+Its last bits depend on the processor.
+"""
 LEAST = 0.03
-"""Standard deviation of what is measured, in natural logarithms, that is always allowed for."""
+"""Minimum standard deviation that is assumed for the measurements, in natural logarithms."""
 TILTED = 0.95
-"""The horizon stays so far outside: scales fall at most by this share from the middle to a corner."""
+"""Maximum fall of the scale from the middle to a corner, as a share. It keeps the horizon outside the image."""
 FARTHEST = 0.3
-"""Change of the horizon, over the longer side, that a step of a fit may make."""
+"""Maximum change of the rise over the longer side in one step of a fit."""
 DEVIATES = 1.4826
-"""Standard deviation over the median of absolute values."""
+"""Ratio of the standard deviation to the median absolute deviation of a normal distribution."""
 FEWEST = 8
-"""Windows that say something about a plane."""
+"""Minimum number of windows for a fit of the horizon."""
 LATTICE = 120
-"""Pixels of the shorter side, about, that say how large the flattened picture is."""
+"""Approximate number of points along the shorter side that determine the extent of the flattened image."""
 CELLS = 4
-"""Cells to a standard deviation of a window, in which what is measured is summed up first."""
+"""Number of cells per standard deviation of a window. Measurements are summed in cells first."""
 
 
 def blur_levels(grey: Floats) -> list[Floats]:
-    """Return a picture and its blurred versions."""
+    """Return an image and its blurred versions."""
     from scipy.ndimage import gaussian_filter
 
     return [grey, *(gaussian_filter(grey, 0.5 * (4.0**k - 1) ** 0.5) for k in range(1, LEVELS))]
 
 
 def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, rounds: int = ROUNDS) -> tuple[Reals, float]:
-    """Return the rise of the width a pixel, (2,), from a first guess on, and by how much what is measured deviates from it.
+    """Refine the rise of the relative width per pixel, (2,), from a first guess; return it and the remaining deviation.
 
-    A fit says too little where patterns are blurred, so rounds go on for long in one direction; from two of them it is told
-    how far (Anderson's mixing).
+    A fit underestimates the change where patterns are blurred, so plain rounds would need many steps in one direction.
+    The step is therefore extrapolated from the last two rounds (Anderson mixing).
     """
     side = max(known.shape)
     rise, off = start, float("nan")
@@ -85,7 +92,7 @@ def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, round
         step = change if last is None else _hasten(change, rise - last[0], change - last[1])
         last = rise, change
         rise = rise + step
-        # The farthest corner lies before the horizon.
+        # Keep the farthest corner in front of the horizon.
         fall = float(abs(rise[0]) * known.shape[0] + abs(rise[1]) * known.shape[1]) / 2
         rise = rise * min(1.0, TILTED / max(fall, 1e-12))
         if float(np.abs(step).max()) * side < SETTLED:
@@ -94,15 +101,15 @@ def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, round
 
 
 def measure_windows(levels: list[Floats], known: Bools, rise: Reals, sigma: float) -> tuple[Reals, Reals]:
-    """Return points of the plane of a horizon, (n, 2), in pixels from the picture's middle, and N around each, (n, 2, 2)."""
+    """Return points (n, 2) of the plane, in pixels from the middle of the image, and N around each point, (n, 2, 2)."""
     return _Flat(levels, known, rise).measure(sigma)
 
 
 def measure_in_sizes(levels: list[Floats], known: Bools, rise: Reals, sigmas: Sequence[float]) -> tuple[Reals, Reals]:
-    """Return points of the plane, (n, 2), and logarithms of sizes of patterns around each under each Gaussian, (sigmas, n)."""
+    """Return points of the plane, (n, 2), and log sizes of the patterns around them for each Gaussian, (sigmas, n)."""
     flat = _Flat(levels, known, rise)
     found = [flat.measure(sigma) for sigma in sigmas]
-    # Under the widest fewest windows are whole.
+    # Use the points of the widest Gaussian, which has the fewest complete windows.
     points = min((p for p, _ in found), key=len)
     sizes = []
     for at, slopes in found:
@@ -115,7 +122,7 @@ def measure_in_sizes(levels: list[Floats], known: Bools, rise: Reals, sigmas: Se
 
 
 def _hasten(change: Reals, moved: Reals, differs: Reals) -> Reals:
-    """Return the step after which a fit would say no change, if fits go on as they did from the last place to this."""
+    """Extrapolate the last two rounds to the step after which the fitted change would be zero."""
     share = float((change * differs).sum() / max(float((differs * differs).sum()), 1e-18))
     step = change - share * (moved + differs)
     most = LONGEST * float(np.sqrt((change * change).sum()))
@@ -124,11 +131,11 @@ def _hasten(change: Reals, moved: Reals, differs: Reals) -> Reals:
 
 
 class _Flat:
-    """A picture flattened by a horizon: its samples lie at (low + index) / resolution, in pixels of its middle."""
+    """An image flattened by a horizon. Its samples are at low + index / resolution, in pixels of the image's middle."""
 
     def __init__(self, levels: list[Floats], known: Bools, rise: Reals) -> None:
         middle = [(n - 1) / 2 for n in known.shape]
-        # A lattice of the picture says how far the flat one reaches.
+        # A sparse lattice of the image is enough to find the extent of the flattened image.
         step = max(1, min(known.shape) // LATTICE)
         rows, columns = (np.arange(0, n, step) - m for n, m in zip(known.shape, middle, strict=True))
         width = 1 + (rows * rise[0])[:, np.newaxis] + columns * rise[1]
@@ -139,6 +146,7 @@ class _Flat:
         self.resolution = float(np.quantile(scales, COARSE))
         sides = [int((v.max() - low) * self.resolution) + 1 for v, low in zip(spread, self.low, strict=True)]
         down, right = (low + np.arange(n) / self.resolution for low, n in zip(self.low, sides, strict=True))
+        # Find the position in the image of each sample of the flattened image.
         near = 1 - (down * rise[0])[:, np.newaxis] - right * rise[1]
         wide = 1 / np.maximum(near, 1e-3)
         at = down[:, np.newaxis] * wide + middle[0], right * wide + middle[1]
@@ -148,6 +156,7 @@ class _Flat:
         places = np.stack([along[inside] for along in at], axis=-1).astype(np.float32)
         scale = wide[inside] * (1 / self.resolution)
         self.known = inside
+        # Only known pixels of the image give known samples.
         if not known.all():
             nearest = np.rint(places).astype(np.intp)
             there = known[nearest[:, 0], nearest[:, 1]]
@@ -155,7 +164,7 @@ class _Flat:
             places, scale = places[there], scale[there]
         values = np.zeros(len(places))
         for k, level in enumerate(levels):
-            # From half the step to the whole, and from there to twice of it.
+            # Blend neighbouring levels: a level counts fully at its own step, and not at half or twice of it.
             part = np.minimum(scale / 2 ** (k - 1) - 1, 2 - scale / 2**k)
             if k == 0:
                 part = np.minimum(2 - scale, 1)
@@ -170,7 +179,7 @@ class _Flat:
         self.picture[self.known] = values
 
     def measure(self, sigma: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return points of the plane, (n, 2), and N around each, (n, 2, 2)."""
+        """Return points of the plane, (n, 2), and N around each point, (n, 2, 2)."""
         from scipy.ndimage import gaussian_filter
 
         def blur(values: NDArray[Any], by: float) -> NDArray[np.float64]:
@@ -180,16 +189,18 @@ class _Flat:
         share = blur(seen, sigma)
         picture = blur(self.picture * seen, sigma) / np.maximum(share, 1e-6)
         rows, columns = np.gradient(picture)
+        # Ignore the samples near unknown ones, where slopes are wrong.
         inner = share > 0.98
         inner[[0, -1]] = inner[:, [0, -1]] = False
         rows, columns, picture = (np.where(inner, v, 0) for v in (rows, columns, picture))
         spread = SPREAD * float(np.sqrt(self.known.sum()))
+        # Sum in cells first, so that blurring by a wide window is cheap.
         cell = max(1, int(spread / CELLS))
         counts = [n // cell for n in inner.shape]
         lattice = (slice(CELLS // 2, None, CELLS),) * 2
 
         def add_up(values: NDArray[Any]) -> Reals:
-            """Return the sums of cells: along rows first, where they lie beside each other."""
+            """Return the sums of cells, along rows first because these values are adjacent in memory."""
             whole = values[: counts[0] * cell, : counts[1] * cell]
             along = whole.reshape(-1, counts[1], cell).sum(axis=-1, dtype=np.float64)
             return np.asarray(along.reshape(counts[0], cell, counts[1]).sum(axis=1))
@@ -204,17 +215,18 @@ class _Flat:
         def mean(cells: Reals) -> Reals:
             return np.asarray(spread_out(cells)[at] / total[at], np.float64)
 
+        # N is the mean product of slopes, divided by the variance so that contrast does not matter.
         value = mean(add_up(picture))
         variance = np.maximum(mean(add_up(picture * picture)) - value**2, 1e-8)
         products = [mean(add_up(v)) / variance for v in (rows * rows, rows * columns, columns * columns)]
         slopes = np.stack([products[0], products[1], products[1], products[2]], axis=-1).reshape(-1, 2, 2)
-        # What a window says holds at the middle of what it sees.
+        # Assign each measurement to the mean position of the samples in its window.
         middles = [mean(weight * (cell * v + (cell - 1) / 2)) for v in np.indices(weight.shape)]
         points = self.low + np.stack(middles, axis=-1) / self.resolution
         return points, self._sharpen(points, slopes + 1e-9 * np.eye(2))
 
     def _sharpen(self, points: NDArray[np.float64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Take off what the camera, and the levels, have blurred."""
+        """Subtract the blur of the camera and of the levels."""
         width = 1 / (1 - points @ self.rise)
         step = (np.eye(2) - points[:, :, np.newaxis] * self.rise) * (self.resolution / width)[:, np.newaxis, np.newaxis]
         blurred = CAMERA**2 + 0.25 * (np.maximum(width / self.resolution, 1) ** 2 - 1)
@@ -227,7 +239,7 @@ class _Flat:
 
 
 def _fit(points: Reals, slopes: Reals, side: int) -> tuple[Reals, float]:
-    """Return the change of the rise after which all of N is alike, and how far it is from that still."""
+    """Return the change of the rise for which N is most uniform, and the remaining deviation."""
     change, spread = np.zeros(2), np.ones(3)
     for _ in range(2):
         change = _minimise(change, spread, points * (1 / side), slopes)
@@ -236,7 +248,7 @@ def _fit(points: Reals, slopes: Reals, side: int) -> tuple[Reals, float]:
 
 
 def _minimise(start: Reals, spread: Reals, points: Reals, slopes: Reals) -> Reals:
-    """Return the change with the least sum of sqrt(1 + z^2), z in standard deviations, by Gauss and Newton's steps."""
+    """Minimise the sum of sqrt(1 + z^2), with z in standard deviations, by Gauss-Newton steps; return the change."""
 
     def differ(change: Reals) -> tuple[Reals, float]:
         rest = _compare(change, points, slopes) / spread
@@ -265,12 +277,12 @@ def _minimise(start: Reals, spread: Reals, points: Reals, slopes: Reals) -> Real
 
 
 def _compare(change: Reals, points: Reals, slopes: Reals) -> Reals:
-    """Return how N differs from the usual one after a change of the horizon: logarithm of size, and two of shape, (n, 3)."""
+    """Return the differences of N from its median after a change of the horizon: log size and two shapes, (n, 3)."""
     y, x = points[:, 0], points[:, 1]
     width = 1 + y * change[0] + x * change[1]
     if float(width.min()) < 0.05:
         return np.full((len(points), 3), 10.0)
-    # The map there is (I w - p c') / w^2; its inverse is w times this.
+    # The Jacobian of the change is (I w - p c') / w^2. Its inverse is w times the matrix (a b; c d).
     a, b, c, d = width - x * change[1], y * change[1], x * change[0], width - y * change[0]
     p, q, r = slopes[:, 0, 0], slopes[:, 0, 1], slopes[:, 1, 1]
     grown = width * width
@@ -280,7 +292,7 @@ def _compare(change: Reals, points: Reals, slopes: Reals) -> Reals:
         (b * b * p + 2 * b * d * q + d * d * r) * grown,
     )
     e, f, g = (float(_middle(s)) for s in scaled)
-    # By the usual one's root, of Cholesky: any does, up to a turn of the two of shape.
+    # Divide by the Cholesky root of the median N. Another root would only rotate the two shape components.
     top = max(e, 1e-30) ** 0.5
     low = f / top
     last = max(g - low * low, 1e-9 * g, 1e-30) ** 0.5
@@ -297,6 +309,6 @@ def _compare(change: Reals, points: Reals, slopes: Reals) -> Reals:
 
 
 def _middle(values: Reals) -> Reals:
-    """Return the median along the first axis: of few numbers, sorted."""
+    """Return the median along the first axis, by sorting because there are few values."""
     order, count = np.sort(values, axis=0), len(values)
     return np.asarray((order[(count - 1) // 2] + order[count // 2]) / 2)

@@ -1,4 +1,4 @@
-"""A plane as a pinhole camera sees it."""
+"""A plane in perspective: its orientation, and the maps between an image and the flattened plane."""
 
 from __future__ import annotations
 
@@ -23,46 +23,52 @@ __all__ = ["FOV", "MAX_SLANT", "Plane"]
 Pair = tuple[float, float]
 
 FOV = 60.0
-"""Degrees that the longer side of a picture spans where nobody says: about those of a telephone, or of 30 mm on film."""
+"""Default angle of view of the longer side in degrees: about that of a telephone, or of a 30 mm lens on 35 mm film."""
 MAX_SLANT = 88.0
-"""Degrees of slant beyond which a plane is seen edge on."""
+"""Maximum slant in degrees. Beyond it the plane is seen edge on."""
 FIT = 0.15
-"""Residual of a scale map, in natural logarithms, at which the confidence in its plane is 1 / e."""
+"""Residual of a scale map, in natural logarithms, that lowers the confidence in its plane to 1 / e."""
 FLAT = 1e-9
-"""What is nearer to the picture's middle line than this share of its side, seen as a point at infinity."""
+"""Change of the relative width over the longer side below which a plane is seen from the front.
+
+Such a plane has no horizon, and its tilt is 90 degrees.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """A plane as a pinhole camera sees it: where each pixel of a picture lies on it, and how large things are there.
+    """A plane seen by a pinhole camera: the point of the plane at each pixel, and the size of elements there.
 
-    The camera looks along the picture's middle, (size - 1) / 2. A point of the flattened plane is given in (row, column), in
-    pixels of the picture's middle, which is (0, 0) there: near it the flat plane is the picture, stretched along its slope.
+    The optical axis passes through the middle of the image, (size - 1) / 2. Points of the flattened plane are (row,
+    column) pairs. Their origin is the middle of the image, and their unit is a pixel there. Near the origin, the
+    flattened plane is the image stretched along its slope.
 
     Parameters
     ----------
     shape : (rows, columns)
-        Of the picture.
+        Size of the image in pixels.
     slant : float
-        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
+        Angle between the line of sight and the plane's normal in degrees, 0 (seen from the front) to 88.
     tilt : float
-        Direction in the picture in which depth grows: degrees counter-clockwise from +x with y up, 90 for a floor.
+        Direction in the image along which depth grows, in degrees counter-clockwise from +x with y up. Default: 90, a
+        floor.
     fov : float, optional
-        Degrees that the longer side of the picture spans, 1 to 170. `FOV` where nothing is known: what is far is then
-        as small as it should be only if that is about right.
+        Angle of view of the longer side in degrees, 1 to 170. Distant elements have the right size only if it is about
+        right. Default: `FOV`.
     rotation : float
-        Degrees by which the flattened plane is turned, counter-clockwise: for courses that are to lie level.
+        Rotation of the flattened plane in degrees, counter-clockwise, for example to level courses of bricks. Default:
+        0.
     confidence : float
-        How sure the plane is, 0 to 1; of one that is given, 1.
+        Confidence in the plane, 0 to 1. Default: 1.
 
     Raises
     ------
     InvalidInput
-        Angles outside these ranges.
+        If an angle is out of its range.
 
     Examples
     --------
-    A floor at 60 degrees: its horizon, and the size of what lies at the lower border over that in the middle.
+    The horizon of a floor at 60 degrees, and the width of elements at the lower border relative to the middle:
 
     >>> from texrs import Plane
     >>> floor = Plane((101, 201), slant=60, tilt=90, fov=60)
@@ -95,7 +101,7 @@ class Plane:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
-    # --- other ways to say where it lies -----------------------------------------------------------------------------
+    # --- other constructors ------------------------------------------------------------------------------------------
 
     @classmethod
     def of_horizon(
@@ -106,11 +112,12 @@ class Plane:
         Parameters
         ----------
         shape : (rows, columns)
-            Of the picture.
+            Size of the image in pixels.
         horizon : (2, 2) array_like
-            Two points (row, column), also outside of the picture. The plane is what lies on the side of the picture's middle.
+            Two points (row, column), which may be outside the image. The plane is on the same side as the middle of
+            the image.
         fov : float, optional
-            Degrees that the longer side spans; `FOV` by default.
+            Angle of view of the longer side in degrees, 1 to 170. Default: `FOV`.
 
         Returns
         -------
@@ -119,7 +126,7 @@ class Plane:
         Raises
         ------
         InvalidInput
-            Points that are one, or a horizon through the picture's middle.
+            If the points are equal, or the horizon passes through the middle of the image.
 
         Examples
         --------
@@ -137,28 +144,29 @@ class Plane:
     def of_vanishing_points(
         cls, shape: Sequence[int], points: Array | Sequence[Sequence[float]], *, fov: float | None = None
     ) -> Plane:
-        """Return the plane of two directions at right angles to each other, by the points where their lines meet.
+        """Return the plane of two perpendicular directions, given their vanishing points.
 
         Parameters
         ----------
         shape : (rows, columns)
-            Of the picture.
+            Size of the image in pixels.
         points : (2, 2) array_like
-            Where lines of the one direction meet, and those of the other: (row, column), far outside for lines that are
-            parallel in the picture.
+            Vanishing points (row, column) of the first and the second direction. They are far outside if the lines of
+            a direction are parallel in the image.
         fov : float, optional
-            Degrees that the longer side spans. By default what makes the two directions meet at right angles, where both
-            points lie near enough to say, else `FOV`.
+            Angle of view of the longer side in degrees, 1 to 170. Default: the angle that makes the directions
+            perpendicular, or `FOV` if a point is too far away to determine it.
 
         Returns
         -------
         Plane
-            Turned so that lines to the first point are columns of the flattened plane, or rows where that is nearer.
+            A plane that is rotated so that lines to the first point are columns of the flattened plane, or rows if
+            those are closer.
 
         Raises
         ------
         InvalidInput
-            Points that are one, or in line with the picture's middle.
+            If the points are equal, or on a line with the middle of the image.
 
         Examples
         --------
@@ -178,27 +186,27 @@ class Plane:
     def of_corners(
         cls, shape: Sequence[int], corners: Array | Sequence[Sequence[float]], *, fov: float | None = None
     ) -> Plane:
-        """Return the plane of a rectangle, by where its four corners are seen.
+        """Return the plane of a rectangle, given its four corners in the image.
 
         Parameters
         ----------
         shape : (rows, columns)
-            Of the picture.
+            Size of the image in pixels.
         corners : (4, 2) array_like
-            (row, column) of each, in the order in which one goes around.
+            Positions (row, column) of the corners, in order around the rectangle.
         fov : float, optional
-            Degrees that the longer side spans. By default what makes the corners right angles, where two sides and two others
-            meet near enough to say, else `FOV`.
+            Angle of view of the longer side in degrees, 1 to 170. Default: the angle that makes the corners right
+            angles, or `FOV` if a vanishing point is too far away to determine it.
 
         Returns
         -------
         Plane
-            Turned so that the rectangle lies level.
+            A plane that is rotated so that the rectangle is level.
 
         Raises
         ------
         InvalidInput
-            Corners that are no convex quadrilateral.
+            If the corners do not form a convex quadrilateral.
 
         Examples
         --------
@@ -215,7 +223,7 @@ class Plane:
         after = np.roll(sides, -1, axis=0)
         turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
         if not (np.all(turns > 1e-6) or np.all(turns < -1e-6)):
-            raise InvalidInput("corners: needs the four of a convex shape, in the order in which one goes around")
+            raise InvalidInput("corners: must form a convex quadrilateral; give the corners in order around it")
         lifted = lift(given, size)
         lines = [np.cross(lifted[i], lifted[(i + 1) % 4]) for i in range(4)]
         # Opposite sides meet in a vanishing point.
@@ -227,28 +235,28 @@ class Plane:
     def of_scale_map(
         cls, scale: Array, *, scale_kind: Literal["width", "area"] | None = None, fov: float | None = None
     ) -> Plane:
-        """Return the plane that a scale map is of.
+        """Return the plane that fits a scale map.
 
         Parameters
         ----------
         scale : (H, W) float array
-            How large things are (`texrs.scale_maps`).
+            Scale map (`texrs.scale_maps`).
         scale_kind : {"area", "width"}, optional
-            "area": square roots of areas, as `texrs.scale_maps.from_mask` measures them; "width": widths across the slope, as
-            `texrs.scale_maps.from_angles` gives them. By default what the map says (`texrs.scale_maps.ScaleMap`); of one that
-            does not, areas.
+            Kind of the map. "area": square roots of areas, as `texrs.scale_maps.from_mask` measures them. "width":
+            widths across the slope, as `texrs.scale_maps.from_angles` returns them. Default: the kind of a
+            `texrs.scale_maps.ScaleMap`, else "area".
         fov : float, optional
-            Degrees that the longer side spans; `FOV` by default.
+            Angle of view of the longer side in degrees, 1 to 170. Default: `FOV`.
 
         Returns
         -------
         Plane
-            With a confidence by how well the map fits.
+            The plane. Its confidence depends on how well the map fits.
 
         Raises
         ------
         InvalidInput
-            A map that is no scale map, or whose horizon would lie across the picture's middle.
+            If the map is not a scale map, or its horizon would pass through the middle of the image.
 
         Examples
         --------
@@ -271,13 +279,13 @@ class Plane:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> Plane:
-        """Return the plane that `as_dict` told.
+        """Return the plane of a mapping that `as_dict` returned.
 
         Parameters
         ----------
         given : mapping
-            ``shape`` (rows, columns) in pixels and ``slant`` in degrees; where they are not the usual ones, ``tilt``, ``fov``
-            and ``rotation`` in degrees, and ``confidence``, 0 to 1.
+            ``shape`` (rows, columns) in pixels and ``slant`` in degrees. Optional: ``tilt``, ``fov`` and ``rotation``
+            in degrees, and ``confidence``, 0 to 1.
 
         Returns
         -------
@@ -286,7 +294,7 @@ class Plane:
         Raises
         ------
         InvalidInput
-            Not such a mapping, or a value out of its range.
+            If it is not such a mapping, or a value is out of its range.
 
         Examples
         --------
@@ -298,13 +306,13 @@ class Plane:
         """
         if not isinstance(given, Mapping) or not {"shape", "slant"} <= set(given) <= set(cls.__dataclass_fields__):
             raise InvalidInput(
-                f"plane: needs a mapping with shape, slant, tilt, fov, rotation and confidence, got {given!r}"
+                f"plane: must be a mapping with shape, slant, tilt, fov, rotation and confidence, got {given!r}"
             )
         return cls(**given)
 
     @classmethod
     def _of_directions(cls, size: tuple[int, ...], points: NDArray[np.float64], name: str, fov: float | None) -> Plane:
-        """Return the plane of two vanishing points (2, 3), from the middle, of directions at right angles."""
+        """Return the plane of two homogeneous vanishing points (2, 3), from the middle, of perpendicular directions."""
         long_ = max(size)
         finite = [abs(p[2]) * 50 * long_ > hypot(p[0], p[1]) for p in points]
         if fov is None and all(finite):
@@ -314,10 +322,10 @@ class Plane:
                 found = 2 * degrees(atan(long_ / 2 / squared**0.5))
                 fov = found if 5 <= found <= 150 else None
         plane = cls._of_line(size, np.cross(*points), name, fov)
-        # Where the first direction, and the second at right angles, run on the flattened plane.
+        # Angles of both directions on the flattened plane.
         ways = [plane._affine @ (p[:2] / np.linalg.norm(p)) for p in points]
         angles = [degrees(np.arctan2(-way[0], way[1])) for way in ways]
-        # The one that is nearer to a column, or a row, is laid along it: by the lines that are seen best.
+        # Rotate by the first direction, to the nearer axis: a column or a row.
         off = [(a + 45) % 90 - 45 for a in angles]
         return cls(plane.shape, plane.slant, plane.tilt, plane.fov, to_digits(-off[0]), plane.confidence)
 
@@ -325,13 +333,13 @@ class Plane:
     def _of_line(
         cls, size: tuple[int, ...], line: NDArray[np.float64], name: str, fov: float | None, confidence: float = 1.0
     ) -> Plane:
-        """Return the plane of a horizon, (row, column, 1) from the middle: where its product with a point is 0."""
+        """Return the plane of a horizon: coefficients of a line in (row, column, 1), from the middle of the image."""
         scale = np.linalg.norm(line[:2]) * max(size) + abs(line[2])
         if not np.isfinite(line).all() or scale == 0:
-            raise InvalidInput(f"{name}: the points are one, and have no line")
+            raise InvalidInput(f"{name}: must be different points, got equal ones")
         if abs(line[2]) < 1e-6 * scale:
             raise InvalidInput(
-                f"{name}: the horizon runs through the picture's middle; a crop of the plane has it outside"
+                f"{name}: must give a horizon outside the middle of the image; crop the image to the plane"
             )
         rise = line[:2] / line[2]
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
@@ -339,17 +347,17 @@ class Plane:
         slant = degrees(atan(steep * find_focal(size, angle)))
         if slant > MAX_SLANT:
             raise InvalidInput(
-                f"{name}: the plane is seen edge on, {slant:.1f} degrees; up to {MAX_SLANT:.0f} are allowed"
+                f"{name}: must give a slant of at most {MAX_SLANT:.0f} degrees, got {slant:.1f}; the plane is seen edge on"
             )
         # Depth grows where the scale falls.
         tilt = degrees(np.arctan2(rise[0], -rise[1])) if steep > FLAT / max(size) else 90.0
         return cls((size[0], size[1]), to_digits(slant), to_digits(tilt), to_digits(angle), 0.0, confidence)
 
-    # --- what it says -----------------------------------------------------------------------------------------------
+    # --- properties and maps -----------------------------------------------------------------------------------------
 
     @property
     def principal_point(self) -> Pair:
-        """Row and column of the picture's middle."""
+        """Row and column of the middle of the image."""
         return (self.shape[0] - 1) / 2, (self.shape[1] - 1) / 2
 
     @property
@@ -359,7 +367,7 @@ class Plane:
 
     @property
     def homography(self) -> NDArray[np.float64]:
-        """The matrix (3, 3) that takes (row, column, 1) of the picture to multiples of (row, column, 1) of the flat plane."""
+        """Matrix (3, 3) from (row, column, 1) in the image to homogeneous (row, column, 1) on the flattened plane."""
         move = np.eye(3)
         move[:2, 2] = np.negative(self.principal_point)
         matrix = np.eye(3)
@@ -368,7 +376,7 @@ class Plane:
 
     @property
     def horizon(self) -> tuple[Pair, Pair] | None:
-        """Two points (row, column) of the horizon, a picture's longer side apart; none of a plane seen from the front."""
+        """Two points (row, column) of the horizon, one longer side apart. None for a plane seen from the front."""
         rise = self._rise
         steep = float(rise @ rise)
         if steep < (FLAT / max(self.shape)) ** 2:
@@ -381,28 +389,28 @@ class Plane:
 
     @property
     def vanishing_points(self) -> NDArray[np.float64]:
-        """Where the columns of the flat plane meet in the picture, and where its rows do: (2, 2), (row, column)."""
+        """Vanishing points (row, column) of the columns and of the rows of the flattened plane, (2, 2)."""
         ways = np.concatenate([np.eye(2), np.zeros((2, 1))], axis=1) @ np.linalg.inv(self.homography).T
         tiny = np.where(np.abs(ways[:, 2:]) < 1e-12, 1e-12, ways[:, 2:])
         return np.asarray(ways[:, :2] / tiny, np.float64)
 
     def width(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return how wide things are seen at points, across the slope.
+        """Return the apparent width of elements at points, across the slope.
 
         Parameters
         ----------
         points : (..., 2) array_like
-            Rows and columns, in pixels of the picture.
+            Rows and columns in the image, in pixels.
 
         Returns
         -------
         (...) float64
-            1 in the middle of the picture, 0 at the horizon, less beyond it.
+            Relative widths: 1 in the middle of the image, 0 at the horizon, and negative beyond it.
 
         Raises
         ------
         ValueError
-            Not numbers, or not pairs of them.
+            If the points are not pairs of numbers.
 
         Examples
         --------
@@ -414,23 +422,23 @@ class Plane:
         return 1 + along(as_places(points) - self.principal_point, self._rise)
 
     def scale_map(self, scale_kind: Literal["width", "area"] = "width") -> ScaleMap:
-        """Return how large things are at each pixel.
+        """Return the apparent size of elements at each pixel.
 
         Parameters
         ----------
         scale_kind : {"width", "area"}
-            Widths across the slope, or square roots of areas, which are their power 3/2: along the slope things are
-            foreshortened besides.
+            "width": widths across the slope. "area": square roots of areas, which are widths to the power 1.5 because
+            elements are also foreshortened along the slope. Default: "width".
 
         Returns
         -------
         (H, W) ScaleMap
-            Float32, 1 in the picture's middle; held at .001 at the horizon and beyond.
+            Sizes in float32, 1 in the middle of the image. The minimum is 0.001, at the horizon and beyond it.
 
         Raises
         ------
         InvalidInput
-            No such kind.
+            If the kind is not one of these.
 
         Examples
         --------
@@ -446,22 +454,23 @@ class Plane:
         )
 
     def flatten(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return where points of the picture lie on the flat plane.
+        """Return the points of the flattened plane that are visible at points of the image.
 
         Parameters
         ----------
         points : (..., 2) array_like
-            Rows and columns, in pixels of the picture.
+            Rows and columns in the image, in pixels.
 
         Returns
         -------
         (..., 2) float64
-            In pixels as the middle of the picture shows them, which is the origin; far away beyond the horizon.
+            Rows and columns on the plane, from the middle of the image and in pixels there. Points beyond the horizon
+            get distant positions without meaning.
 
         Raises
         ------
         ValueError
-            Not numbers, or not pairs of them.
+            If the points are not pairs of numbers.
 
         Examples
         --------
@@ -475,7 +484,7 @@ class Plane:
         return transform(self._affine, given - self.principal_point) / wide[..., np.newaxis]
 
     def project(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return where points of the flat plane are seen.
+        """Return the positions in the image of points of the flattened plane.
 
         Parameters
         ----------
@@ -485,12 +494,12 @@ class Plane:
         Returns
         -------
         (..., 2) float64
-            Rows and columns in the picture, in pixels; nan for what lies behind the camera.
+            Rows and columns in the image, in pixels. NaN for points behind the camera.
 
         Raises
         ------
         ValueError
-            Not numbers, or not pairs of them.
+            If the points are not pairs of numbers.
 
         Examples
         --------
@@ -507,7 +516,7 @@ class Plane:
         return np.asarray(seen + self.principal_point, np.float64)
 
     def projection_jacobians(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return the Jacobians of `project` at points of the flat plane.
+        """Return the Jacobians of `project` at points of the flattened plane.
 
         Parameters
         ----------
@@ -517,12 +526,12 @@ class Plane:
         Returns
         -------
         (..., 2, 2) float64
-            Pixels of the picture for one of the plane.
+            Matrices from a step (row, column) on the plane to the step in the image.
 
         Raises
         ------
         ValueError
-            Not numbers, or not pairs of them.
+            If the points are not pairs of numbers.
 
         Examples
         --------
@@ -537,12 +546,13 @@ class Plane:
         return np.asarray(wide * np.einsum("...ij,jk->...ik", bent, self._inverse), np.float64)
 
     def jacobians(self) -> NDArray[np.float64]:
-        """Return the Jacobians of `flatten` at each pixel: how the plane is seen there.
+        """Return the Jacobians of `flatten` at each pixel.
 
         Returns
         -------
         (H, W, 2, 2) float64 array
-            Times a step (row, column) in the picture it is the step on the flat plane; beyond the horizon it means nothing.
+            Matrices from a step (row, column) in the image to the step on the flattened plane. They have no meaning
+            beyond the horizon.
 
         Examples
         --------
@@ -558,12 +568,12 @@ class Plane:
         return np.asarray(self._affine / wide - flat[..., :, np.newaxis] * self._rise / (wide * wide), np.float64)
 
     def as_slope(self) -> Slope | None:
-        """Return it as a map of widths tells it, with what that does not; none where it is seen from the front.
+        """Return the slope of the width map, with the slant and the rotation, which a width map does not contain.
 
         Returns
         -------
         Slope or None
-            Of `texrs.scale_maps`; None of a plane seen from the front.
+            A slope as in `texrs.scale_maps`. None for a plane that is seen from the front.
 
         Examples
         --------
@@ -576,12 +586,13 @@ class Plane:
         return None if found is None else replace(found, lean=cos(radians(self.slant)), rotation=self.rotation)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what makes it anew, as JSON types: `Plane.of` takes it.
+        """Return the plane as JSON types, which `Plane.of` accepts.
 
         Returns
         -------
         dict
-            ``shape`` in pixels, ``slant``, ``tilt``, ``fov`` and ``rotation`` in degrees, ``confidence`` from 0 to 1.
+            ``shape`` in pixels, ``slant``, ``tilt``, ``fov`` and ``rotation`` in degrees, and ``confidence`` from 0 to
+            1.
 
         Examples
         --------
@@ -594,18 +605,18 @@ class Plane:
 
     @property
     def _way(self) -> NDArray[np.float64]:
-        """The direction in the picture in which depth grows, (row, column)."""
+        """Direction in the image along which depth grows, (row, column)."""
         angle = radians(self.tilt)
         return to_grid([-sin(angle), cos(angle)])
 
     @property
     def _rise(self) -> NDArray[np.float64]:
-        """By how much the width grows a pixel."""
+        """Growth of the relative width per pixel, (row, column)."""
         return to_grid(-self._way * (tan(radians(self.slant)) / self.focal))
 
     @property
     def _affine(self) -> NDArray[np.float64]:
-        """The stretch along the slope, and the turn after it."""
+        """Stretch along the slope, followed by the rotation."""
         return to_grid(np.einsum("ij,jk->ik", self._turned, self._stretched(1 / cos(radians(self.slant)))))
 
     @property
@@ -614,7 +625,7 @@ class Plane:
 
     @property
     def _turned(self) -> NDArray[np.float64]:
-        """Counter-clockwise as it is seen: rows grow downwards."""
+        """Rotation matrix, counter-clockwise in the image because rows grow downwards."""
         angle = radians(self.rotation)
         return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
 

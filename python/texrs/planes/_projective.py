@@ -1,4 +1,4 @@
-"""Points and lines of a projective plane, with values whose last bits hang on no processor."""
+"""Points and lines of a projective plane, rounded so that results do not depend on the processor."""
 
 from __future__ import annotations
 
@@ -13,47 +13,50 @@ from texrs._arrays import try_array
 from texrs.errors import InvalidInput
 
 DIGITS = 12
-"""Significant digits of what is found: the last bits hang on the processor."""
+"""Number of significant digits of results. Later digits depend on the processor."""
 GRID = 2.0**40
-"""Of a pixel, and of 1, to which matrices are rounded."""
+"""Inverse of the unit to which matrices are rounded, in pixels or as a plain number."""
 
 
 def find_focal(shape: Sequence[int], fov: float) -> float:
-    """Return the focal length in pixels of a picture whose longer side spans so many degrees."""
+    """Return the focal length in pixels of an image, given the angle of view of its longer side in degrees."""
     return max(shape) / 2 / tan(radians(fov) / 2)
 
 
 def lift(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return points (n, 2) as (n, 3), from the picture's middle."""
+    """Return points (n, 2) in homogeneous coordinates (n, 3), from the middle of the image."""
     centred = points - [(n - 1) / 2 for n in size]
     return np.concatenate([centred, np.ones((len(points), 1))], axis=1)
 
 
 def to_grid(values: Any) -> NDArray[np.float64]:
-    """Return values with their last bits off, which hang on the processor."""
+    """Round values to a grid, because their last bits depend on the processor."""
     return np.asarray(np.rint(np.multiply(values, GRID)) / GRID, np.float64)
 
 
 def as_places(points: object) -> NDArray[np.float64]:
-    """Check points (..., 2) of a picture or of a plane."""
+    """Check points (..., 2) of an image or of a plane."""
     given = try_array(points)
     if given.dtype.kind not in "buif" or given.shape[-1:] != (2,):
         raise InvalidInput(
-            f"points: needs numbers (..., 2), rows and columns, got {given.dtype} of shape {given.shape}"
+            f"points: must be numbers (..., 2), rows and columns, got {given.dtype} of shape {given.shape}"
         )
     return np.asarray(given, np.float64)
 
 
 def along(points: NDArray[np.float64], way: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far points (..., 2) reach along a way, not by a matrix product: its last bits hang on the processor."""
+    """Return the product of points (..., 2) with a direction.
+
+    A matrix product would depend on the processor in its last bits.
+    """
     return np.asarray(points[..., 0] * way[0] + points[..., 1] * way[1], np.float64)
 
 
 def transform(matrix: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points (..., 2) after a matrix (2, 2)."""
+    """Multiply points (..., 2) by a matrix (2, 2)."""
     return np.stack([along(points, row) for row in matrix], axis=-1)
 
 
 def to_digits(value: float) -> float:
-    """Return a number that was found, without the digits that say nothing."""
+    """Round a computed number to `DIGITS` significant digits."""
     return float(f"{value:.{DIGITS}g}")

@@ -1,9 +1,10 @@
-"""How large things are all over a picture: on a plane, on something curved, or anyhow; and how sure that is.
+"""Measure the size of elements all over an image: on a plane, on a curved surface, or on any other.
 
-Where no plane fits, sizes are measured in ways that know nothing of each other: by patterns, fine and coarse (`_patterns`), and
-by masks of what is lighter than its surroundings, with several bounds of what is too fine to count. A mask may mark the gaps in
-one part of a picture and the things in another, or grain where things are large, and then tells sizes the wrong way round; so
-each way has a voice, and what most of them say counts. Where they say nothing in common, nothing is known.
+If no plane fits, several independent methods measure the sizes: fine and coarse patterns (`_patterns`), and masks of
+pixels that are lighter than their surroundings. The masks have several limits of the smallest feature. A single mask
+may be misleading. It may mark gaps in one part of an image and elements in another, or only grain where elements are
+large. Its sizes may then change in the wrong direction. Therefore the result is the mean of the largest group of maps
+that agree. If no maps agree, sizes remain unknown.
 """
 
 from __future__ import annotations
@@ -29,50 +30,59 @@ __all__ = ["SURE", "ScaleEstimate", "Shape", "measure_scale"]
 
 Reals = NDArray[np.float64]
 Shape: TypeAlias = Literal["plane", "curved", "free", "even"]
-"""What sizes are those of."""
+"""Kind of surface to which measured sizes belong."""
 
 SURE = 0.4
-"""Confidence below which it is said that what was found may be wrong."""
+"""Confidence below which a plane or a map is not trusted. Callers then warn."""
 BANDS = 1.0, 1.6, 2.5
-"""Standard deviations of the Gaussians under which patterns are looked at, in samples, where they are of the usual size."""
+"""Standard deviations of the Gaussians for measuring patterns of the usual size, in samples."""
 LADDER, SETTLING = tuple(0.6 * 1.3**k for k in range(9)), 6
-"""Those under which they are measured; and how often each is looked at anew under one that grows with it. Under one that does
-not, small patterns are blurred away, and a third to a half of what sizes change is not seen."""
+"""Standard deviations of the evaluated Gaussians; and number of iterations that adapt the Gaussian to local sizes.
+
+A fixed Gaussian blurs small patterns away and misses a third to a half of the change in size.
+"""
 FINEST, DETAILS = 1 / 400, (1.0, 2.5, 6.0)
-"""Of the shorter side, and at least one pixel: what is too fine to be a feature of a mask; and so many times of it."""
+"""Smallest feature of a mask as a share of the shorter side, at least one pixel; and its multiples, one for each mask.
+"""
 LATTICE = 24
-"""Places along each side, about, where maps are compared."""
+"""Approximate number of positions along each side for comparing maps."""
 APART, LEVEL = 0.6, 0.03
-"""Standard deviation of the difference of two maps up to which they say the same, as a share of that of the map that says more;
-and what it may be in any case, in logarithms."""
+"""Maximum difference of two maps that agree, and the least value of this limit. Both are standard deviations.
+
+The first is a share of the larger standard deviation of the two maps, the second is in natural logarithms.
+"""
 BENT, MORE = 0.04, 0.8
-"""Standard deviation, in logarithms, of what bends off a plane, below which the plane is good enough; and the share of that of
-the plane itself: what is far is blurred, so that steep planes seem to bend."""
+"""Maximum deviation from a plane that is good enough, and the same as a share of the variation of the plane.
+
+Both are standard deviations, the first in natural logarithms. The share is needed because distant parts are blurred,
+so steep planes seem to bend.
+"""
 ROUGH = 0.12
-"""The same of what is off a curved surface."""
+"""Maximum standard deviation from a curved surface that is good enough, in natural logarithms."""
 UNEVEN = 0.6
-"""Logarithm of the ratio of what patterns of two bands say sizes change by, at which the confidence is 1 / e of what it was."""
+"""Logarithm of the ratio between the ranges of size of two bands that lowers the confidence to 1 / e."""
 FEWEST = 24
-"""Windows that say something about a curved surface."""
+"""Minimum number of windows for the fit of a curved surface."""
 TERMS = 6
-"""Of a quadratic surface."""
+"""Number of terms of a quadratic surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaleEstimate:
-    """How large things are in a picture, as it was measured.
+    """Sizes of elements in an image, as measured.
 
     Attributes
     ----------
     scale : (H, W) ScaleMap
-        Of widths on a plane, else of square roots of areas.
+        Scale map. Its kind is "width" if the shape is a plane, else "area". It is also "area" if the image is too
+        small for patterns.
     shape : {"plane", "curved", "free", "even"}
-        What was measured: a plane; a surface whose sizes are quadratic in the picture, as those of a cylinder or a bulge; none
-        of these; or nothing in common, so that all is taken for equally large.
+        Surface that was measured. "plane": a plane. "curved": sizes that are quadratic in the position, as on a
+        cylinder or a bulge. "free": neither. "even": no agreement, so all elements are taken to be equally large.
     plane : Plane or None
-        Of "plane", where it was found.
+        The plane that was found. None for other shapes, and for a plane that only fits the measured sizes.
     confidence : float
-        From 0 to 1: how much what was measured in several ways is alike. 0 of pictures that are too small for more than one.
+        Agreement of the measurements by several methods, 0 to 1. It is 0 if the image is too small for more than one.
 
     Examples
     --------
@@ -89,12 +99,12 @@ class ScaleEstimate:
     confidence: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what is known beside the map, as JSON types: shape, what the map holds, confidence, and the plane or None.
+        """Return everything except the map as JSON types.
 
         Returns
         -------
         dict
-            ``shape``, ``scale_kind``, ``confidence`` from 0 to 1 and ``plane``.
+            ``shape``, ``scale_kind``, ``confidence`` from 0 to 1, and ``plane``, a dict or None.
 
         Examples
         --------
@@ -108,24 +118,24 @@ class ScaleEstimate:
 
 
 def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
-    """Measure how large things are all over a picture.
+    """Measure the size of elements all over an image.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        A texture that is the same all over its surface, each side at least 16.
+        A texture that is homogeneous on its surface, each side at least 16 pixels.
     known : (H, W) bool array, optional
-        Where the picture shows it; all of it by default.
+        Mask of the pixels that show the texture. Default: all pixels.
 
     Returns
     -------
     ScaleEstimate
-        The map, what it is of, and how sure it is.
+        The scale map, the kind of its surface, the plane if there is one, and the confidence.
 
     Raises
     ------
     InvalidInput
-        A picture of one colour, or in which there is too little to be measured.
+        If the image has one colour, or too little detail to be measured.
 
     Examples
     --------
@@ -139,11 +149,12 @@ def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
     size = pixels.shape[0], pixels.shape[1]
     there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
     try:
+        # Measure patterns on the plane, where they are most similar, or on the image if it is uncertain.
         plane = find(pixels, known=there)
         sure = plane.confidence >= SURE
         voices = list_patterns(pixels, there, plane if sure else Plane(size, 0.0))
     except InvalidInput:
-        # Too small, or too little of it is known; a mask may still be found.
+        # The image, or its known part, is too small for patterns. A mask may still be possible.
         plane, sure, voices = None, False, []
     if plane is not None and sure and not bends(plane, voices):
         return ScaleEstimate(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
@@ -153,13 +164,14 @@ def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
             ScaleMap(scale_maps.from_mask(mask, trend="plane", known=there), "area"), "plane", None, 0.0
         )
     places = list_places(size, there)
+    # Compare the sizes from patterns with the sizes from masks, all as smooth surfaces.
     said = [evaluate(v, places, size) for v in voices]
     masks = list_masks(pixels, there)
     said += [evaluate(fit(places, m[places].astype(np.float64), size), places, size) for m in masks]
     agreed, confidence = agree(said)
     confidence = float(f"{confidence * weigh_bands(said[: len(voices)]):.3g}")
     if confidence < SURE and plane is not None and sure:
-        # It may bend, but nobody knows how.
+        # The surface may be bent, but the methods do not agree in its shape, so keep the plane.
         return ScaleEstimate(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
     if confidence < SURE:
         return ScaleEstimate(ScaleMap(np.ones(size, np.float32), "area"), "even", None, confidence)
@@ -168,10 +180,10 @@ def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
 
 
 def list_patterns(pixels: Array, known: Bools, plane: Plane) -> list[Reals]:
-    """Return quadratic surfaces of the logarithms of sizes, as patterns of each band have them, measured on about a plane."""
+    """Return a quadratic surface of log sizes for each band of patterns, measured near a plane."""
     size = pixels.shape[0], pixels.shape[1]
     grey, there, step = prepare(guidance(pixels), known)
-    # Of what is shrunk.
+    # The image was shrunk by the step, so the rise per pixel grows by the step.
     rise = plane._rise * step
     points, sizes = measure_in_sizes(blur_levels(grey), there, rise, LADDER)
     if len(points) < FEWEST:
@@ -184,7 +196,7 @@ def list_patterns(pixels: Array, known: Bools, plane: Plane) -> list[Reals]:
         away = np.zeros(len(points))
         for _ in range(SETTLING):
             ask()
-            # On the plane, where all are about as large.
+            # Take the sizes on the flattened plane, where all patterns have about the same size.
             flat = look_up(sizes, np.log(sigma / LADDER[0]) / np.log(LADDER[1] / LADDER[0]) + away)
             smooth = np.einsum("ni,i->n", terms, fit((rows, columns), flat, size))
             away = (smooth - np.median(smooth)) / np.log(LADDER[1] / LADDER[0])
@@ -193,7 +205,7 @@ def list_patterns(pixels: Array, known: Bools, plane: Plane) -> list[Reals]:
 
 
 def look_up(sizes: Reals, steps: Reals) -> Reals:
-    """Return what each place, a column, has at so many steps of a ladder, between its rungs, and no further than its ends."""
+    """Interpolate a ladder of values at a fractional rung for each position (column), clipped to its ends."""
     at = np.clip(steps, 0, len(sizes) - 1)
     low = np.minimum(at.astype(np.intp), len(sizes) - 2)
     places = np.arange(sizes.shape[1])
@@ -201,7 +213,7 @@ def look_up(sizes: Reals, steps: Reals) -> Reals:
 
 
 def list_masks(pixels: Array, known: Bools) -> list[Floats]:
-    """Return maps of the logarithms of sizes, (H, W), by masks of what is coarser than each detail."""
+    """Return maps (H, W) of log sizes, one for each smallest feature, from masks of the image."""
     found = []
     finest = max(1.0, FINEST * min(pixels.shape[:2]))
     for times in DETAILS:
@@ -209,13 +221,13 @@ def list_masks(pixels: Array, known: Bools) -> list[Floats]:
             mask = scale_maps.auto_mask(pixels, min_feature_size=times * finest, trend="quadratic", known=known)
             found.append(log_single(scale_maps.from_mask(mask, known=known)))
         except InvalidInput:
-            # Nothing is so coarse; others may say something.
+            # No feature is so coarse. Continue with the masks of other limits.
             continue
     return found
 
 
 def list_places(size: tuple[int, int], known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return places of a lattice where the picture is known."""
+    """Return the known positions of a lattice."""
     steps = [max(1, n // LATTICE) for n in size]
     thin = np.zeros(size, np.bool_)
     thin[steps[0] // 2 :: steps[0], steps[1] // 2 :: steps[1]] = True
@@ -225,13 +237,13 @@ def list_places(size: tuple[int, int], known: Bools) -> tuple[NDArray[np.intp], 
 
 
 def list_terms(places: tuple[Array, Array], size: tuple[int, int]) -> Reals:
-    """Return what a quadratic surface is the sum of, (n, 6): 1, y, x, yy, yx, xx, from -1 to 1."""
+    """Return the terms 1, y, x, yy, yx, xx of a quadratic surface, (n, 6), with positions from -1 to 1."""
     y, x = (2 * at / max(1, n - 1) - 1 for at, n in zip(places, size, strict=True))
     return np.stack([np.ones_like(y), y, x, y * y, y * x, x * x], axis=-1)
 
 
 def fit(places: tuple[Array, Array], logs: Reals, size: tuple[int, int]) -> Reals:
-    """Fit a quadratic surface, by weights that let few strays count little."""
+    """Fit a quadratic surface robustly, so that outliers count little."""
     terms = list_terms(places, size)
     weights, found = np.ones(len(logs)), np.zeros(TERMS)
     for _ in range(12):
@@ -240,24 +252,24 @@ def fit(places: tuple[Array, Array], logs: Reals, size: tuple[int, int]) -> Real
         found = np.linalg.solve(normal, np.einsum("ni,n->i", heavy, logs))
         away = np.abs(logs - np.einsum("ni,i->n", terms, found))
         weights = 1 / np.sqrt(1 + (away / max(1.5 * float(np.median(away)), 1e-6)) ** 2)
-    # The last bits of a fit hang on the processor.
+    # Round the result, because the last bits of a fit depend on the processor.
     return np.asarray(np.rint(found * 2.0**20) / 2.0**20, np.float64)
 
 
 def evaluate(surface: Reals, places: tuple[Array, Array], size: tuple[int, int]) -> Reals:
-    """Return the values of a quadratic surface at places, about their mean."""
+    """Return the values of a quadratic surface at positions, minus their mean."""
     values = np.einsum("ni,i->n", list_terms(places, size), surface)
     return np.asarray(values - values.mean(), np.float64)
 
 
 def bends(plane: Plane, voices: list[Reals]) -> bool:
-    """Tell whether patterns of every band say that what is seen is bent off a plane, and all in the same way."""
+    """Return True if the patterns of all bands show the same bend of the surface off a plane."""
     if len(voices) < 2:
         return False
     places = list_places(plane.shape, np.ones(plane.shape, np.bool_))
     flat = np.log(plane.scale_map("area")[places].astype(np.float64))
     off = [evaluate(v, places, plane.shape) - (flat - flat.mean()) for v in voices]
-    # A slope that is off is no bend.
+    # Remove the linear part: an error of the slope is not a bend.
     basis = list_terms(places, plane.shape)[:, :3]
     normal = np.einsum("ni,nj->ij", basis, basis)
     slopes = [np.linalg.solve(normal, np.einsum("ni,n->i", basis, o)) for o in off]
@@ -268,14 +280,14 @@ def bends(plane: Plane, voices: list[Reals]) -> bool:
 
 
 def agree(said: list[Reals]) -> tuple[list[int], float]:
-    """Return which maps say the same, and how sure that is: by how many they are, and how much alike."""
+    """Return the indices of the maps that agree, and a confidence from their number and similarity."""
     if len(said) < 2:
         return list(range(len(said))), 0.0
     apart = np.array([[float((a - b).std()) for b in said] for a in said])
     ranges = np.array([float(a.std()) for a in said])
     near = apart <= np.maximum(LEVEL, APART * np.maximum.outer(ranges, ranges))
     votes = near.sum(axis=1)
-    # Of the most voices the closest.
+    # Choose the map that most maps agree with. If there are several, choose the map closest to the others.
     best = min(range(len(said)), key=lambda k: (-votes[k], float(np.median(apart[k])), k))
     agreed = [int(k) for k in np.nonzero(near[best])[0]]
     if len(agreed) < 2:
@@ -287,9 +299,10 @@ def agree(said: list[Reals]) -> tuple[list[int], float]:
 
 
 def weigh_bands(said: list[Reals]) -> float:
-    """Return how much it counts that patterns of all bands say the same: less where one says more than another.
+    """Return a factor of the confidence, which is lower if one band measures a wider range of sizes than another.
 
-    They see the same few things, so what is only chance is the same to all, but coarse ones see fewer of them.
+    All bands measure the same few elements, so accidental changes of size look the same in all of them. But coarse
+    bands contain fewer patterns, so their range then differs.
     """
     ranges = [max(float(a.std()), LEVEL) for a in said]
     return float(np.exp(-((np.log(max(ranges) / min(ranges)) / UNEVEN) ** 2))) if ranges else 1.0
@@ -302,7 +315,7 @@ def shape_of(
     size: tuple[int, int],
     sure: float,
 ) -> ScaleEstimate:
-    """Return the map of what was agreed on: of a plane where that is enough, else curved, else as masks have it."""
+    """Return the map of the agreed sizes: a plane if it is good enough, else a curved surface, else the masks."""
     surface = fit(places, mean, size)
     every = tuple(np.indices(size).reshape(2, -1))
     curved = np.einsum("ni,i->n", list_terms((every[0], every[1]), size), surface).reshape(size)

@@ -1,4 +1,4 @@
-"""What is said of a plane in a photograph: how it lies, and where it is seen."""
+"""The known facts about a plane in a photograph: its orientation, and the pixels that show it."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ __all__ = ["PlaneView"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlaneView:
-    """How a photograph shows a plane, as far as somebody says: what is not said is found.
+    """A plane in a photograph, as far as it is known. Missing facts are found in the photograph.
 
-    `texrs.rectify`, `texrs.extend` and `texrs.remove` take one, or a `Plane` alone, as ``view``.
+    `texrs.rectify`, `texrs.extend` and `texrs.remove` accept a view, or only a `Plane`, as ``view``.
 
     Parameters
     ----------
     plane : Plane, optional
-        How the plane lies. By default what ``corners``, or ``slant``, says, else it is found (`texrs.planes.find`).
+        The plane. Default: the plane of ``corners`` or ``slant``, else it is found (`texrs.planes.find`).
     corners : four of (row, column), optional
-        Where the corners of a rectangle of the plane are seen, in the order in which one goes around.
+        Positions of the corners of a rectangle on the plane, in order around it.
     slant : float, optional
-        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
+        Angle between the line of sight and the plane's normal in degrees, 0 (seen from the front) to 88.
     tilt : float, optional
-        With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
-        90, a floor.
+        Direction in the image along which depth grows, in degrees counter-clockwise from the right. It requires
+        ``slant``. Default: 90, a floor.
     fov : float, optional
-        Degrees that the longer side of the photograph spans, 1 to 170 (`texrs.io.read_fov`; the command reads it of the
-        file). By default what the corners tell, else 60.
+        Angle of view of the longer side of the photograph in degrees, 1 to 170 (`texrs.io.read_fov`). The command-line
+        program reads it from the file. Default: the angle that the corners determine, else 60.
     ground : (H, W) array, path or Mask, optional
-        Mask of the pixels that show the plane. Default: the ground that is found (`texrs.planes.find_ground`). If the plane is
-        given and the photograph is made flat or larger, the default is all pixels.
+        Mask of the pixels that show the plane. Default: the ground that is found (`texrs.planes.find_ground`). If the
+        plane is given and the photograph is rectified or extended, the default is all pixels.
 
     Raises
     ------
     InvalidInput
-        Options out of their ranges, or two ways to say how the plane lies.
+        If an option is out of its range, or the orientation is given twice.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class PlaneView:
     >>> texrs.PlaneView(slant=35, corners=[[9, 20], [9, 80], [90, 99], [90, 4]])
     Traceback (most recent call last):
         ...
-    texrs.errors.InvalidInput: slant: corners says how the plane lies already
+    texrs.errors.InvalidInput: slant: cannot be combined with corners
 
     """
 
@@ -69,13 +69,13 @@ class PlaneView:
     def __post_init__(self) -> None:
         given = [name for name in ("plane", "corners", "slant") if getattr(self, name) is not None]
         if len(given) > 1:
-            raise InvalidInput(f"{given[1]}: {given[0]} says how the plane lies already")
+            raise InvalidInput(f"{given[1]}: cannot be combined with {given[0]}")
         if self.plane is not None and not isinstance(self.plane, Plane):
-            raise InvalidInput(f"plane: needs a texrs.Plane, got {self.plane!r}")
+            raise InvalidInput(f"plane: must be a texrs.Plane, got {self.plane!r}")
         if self.tilt is not None and self.slant is None:
-            raise InvalidInput("tilt: needs slant")
+            raise InvalidInput("tilt: requires slant; give both")
         if self.plane is not None and self.fov is not None:
-            raise InvalidInput("fov: the plane has one already")
+            raise InvalidInput("fov: cannot be combined with plane, which has its own")
         for name, least, most in (("slant", 0, MAX_SLANT), ("tilt", -1e6, 1e6), ("fov", 1, 170)):
             value = getattr(self, name)
             object.__setattr__(self, name, None if value is None else as_float(value, name, least, most))
@@ -84,12 +84,12 @@ class PlaneView:
 
     @classmethod
     def of(cls, given: PlaneView | Plane | Sequence[PlaneView | Plane] | None) -> PlaneView:
-        """Return a view as it is, one of a plane, or one of which nothing is said.
+        """Return a view, from a view, a plane, or None for a view without known facts.
 
         Parameters
         ----------
         given : PlaneView or Plane, optional
-            What is known of the photograph.
+            The known facts about the photograph.
 
         Returns
         -------
@@ -98,7 +98,7 @@ class PlaneView:
         Raises
         ------
         InvalidInput
-            Something else, or several planes: one is made flat at a time.
+            If it is another type, or a sequence of planes. Only one plane can be rectified at a time.
 
         Examples
         --------
@@ -110,30 +110,30 @@ class PlaneView:
         if given is None or isinstance(given, Plane):
             return cls(plane=given)
         if isinstance(given, list | tuple):
-            raise InvalidInput(f"view: one plane is made flat at a time, got {len(given)}")
+            raise InvalidInput(f"view: must be one plane at a time, got {len(given)}")
         if not isinstance(given, PlaneView):
-            raise InvalidInput(f"view: needs a texrs.PlaneView, or a texrs.Plane, got {given!r}")
+            raise InvalidInput(f"view: must be a texrs.PlaneView or a texrs.Plane, got {given!r}")
         return given
 
     def settle(self, shape: Sequence[int]) -> tuple[Plane | None, Bools | None]:
-        """Return the plane and the ground that are said of a photograph.
+        """Return the plane and the ground in a photograph, as far as they are known.
 
         Parameters
         ----------
         shape : (rows, columns)
-            Of the photograph, in pixels.
+            Size of the photograph in pixels.
 
         Returns
         -------
         plane : Plane or None
-            None: it is to be found.
+            The plane, or None if it must be found.
         ground : (rows, columns) bool or None
-            Where the plane is seen. None: that is to be found.
+            Mask of the pixels that show the plane, or None if it must be found.
 
         Raises
         ------
         InvalidInput
-            A plane or a ground of another shape, a ground that marks nothing, or corners of no convex shape.
+            If the plane or the ground has another shape, the ground marks nothing, or the corners are not convex.
 
         Examples
         --------
@@ -147,9 +147,9 @@ class PlaneView:
         size = rows, columns
         ground = None if self.ground is None else as_mask(self.ground, "ground", size)
         if ground is not None and not ground.any():
-            raise InvalidInput("ground: marks nothing, so the plane is nowhere seen")
+            raise InvalidInput("ground: must mark at least one pixel, got none")
         if self.plane is not None and self.plane.shape != size:
-            raise InvalidInput(f"plane: needs one of a picture of {size[0]} x {size[1]}, got {self.plane!r}")
+            raise InvalidInput(f"plane: must have the shape of the image, {size[0]} x {size[1]}, got {self.plane!r}")
         if self.corners is not None:
             return Plane.of_corners(size, np.asarray(self.corners), fov=self.fov), ground
         if self.slant is not None:
