@@ -98,13 +98,13 @@ def test_measures_know_the_best_and_the_worst() -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"pictures": {}}, "pictures: needs at least one"),
-        ({"tasks": []}, "tasks: needs at least one"),
+        ({"pictures": {}}, "pictures: must contain at least one"),
+        ({"tasks": []}, "tasks: must contain at least one"),
         ({"tasks": ["all"]}, "tasks"),
         ({"side": 8}, "side"),
         ({"side": 96, "size": 64}, "size"),
         ({"programs": {"gimp": "gimp"}}, "must be one of embark, resynthesizer"),
-        ({"programs": {"embark": "/nowhere"}}, "is not a program that can be run"),
+        ({"programs": {"embark": "/nowhere"}}, "embark must be an executable file"),
         ({"pictures": {"small": GRIT[:20]}}, "small"),
     ],
 )

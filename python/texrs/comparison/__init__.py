@@ -1,9 +1,9 @@
-"""Methods x pictures x measures in one page: what texrs makes, beside what other programs make of the same pictures.
+"""Compare results of texrs with results of other programs for the same images, on one page.
 
-Three tasks are compared: more of a texture, a picture without a seam, and a hole that is filled. Each has methods of texrs,
-those of others as far as they are here, and what costs nothing, as copies side by side. What is not here is listed, with how to
-get it. All methods get the same 8-bit RGB pictures, and what they give is judged by its pixels alone, so that no method is
-favoured for what it says of itself. A method that fails is shown as failed.
+There are three tasks: more of a texture, an image without a seam, and a filled hole. For each task, the page shows
+methods of texrs, methods of other programs that are installed, and trivial ones, such as copies side by side. It also
+lists the programs that are not installed and how to get them. All methods get the same 8-bit RGB images. Measures use
+only the pixels of a result, so no method benefits from its own report. A method that fails is shown as failed.
 """
 
 from __future__ import annotations
@@ -29,25 +29,27 @@ from texrs.errors import InvalidInput
 __all__ = ["MEASURES", "METHODS", "PROGRAMS", "TASKS", "Comparison", "compare"]
 
 LEAST, MOST = 48, 1024
-"""Pixels of a side of what is compared."""
+"""Minimum and maximum side of the compared images, in pixels."""
 HOLE = 0.28
-"""Sides of a hole, as a share of those of the picture."""
+"""Sides of the hole as a share of the image's sides."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What methods made of pictures.
+    """Results of all methods for all images.
 
     Attributes
     ----------
     pictures : mapping of str to (H, W, 3) uint8 array
-        What they were given.
+        Images that the methods got, by name.
     results : tuple of Result
-        What each made of each, and how it is measured.
+        Results with their measures, one for each image and method.
     missing : tuple of Missing
-        Methods that are not here, and how to get them.
+        Methods that are not installed, and how to get them.
     timed : bool
-        Whether the page says how long each took.
+        If True, the page reports the time of each method.
+    holes : mapping of str to (H, W) bool array
+        Mask of the hole in each image, by the name of the image. Empty if the task was not done.
 
     """
 
@@ -58,7 +60,7 @@ class Comparison:
     holes: Mapping[str, Bools] = field(default_factory=dict)
 
     def page(self) -> str:
-        """Return a page that holds all of it: HTML that refers to nothing outside itself."""
+        """Return a self-contained HTML page with all results."""
         return make_page(self.pictures, self.holes, self.results, self.missing, timed=self.timed)
 
 
@@ -73,26 +75,28 @@ def compare(
     timed: bool = True,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Let all methods that are here do the tasks on some pictures.
+    """Let all installed methods do the tasks for some images.
 
     Parameters
     ----------
     pictures : mapping of str to (H, W) or (H, W, C) array
-        By their names; each is compared in 8-bit RGB.
+        Images by name. Each is compared in 8-bit RGB.
     tasks : sequence of str
-        Of ``"more"``, ``"tile"`` and ``"hole"``.
+        Tasks from ``"more"``, ``"tile"`` and ``"hole"``. Default: all.
     side : int
-        The middle of each picture is compared, at most so many pixels a side; 48 to 1024.
+        Maximum side of the compared part of each image, its middle, in pixels; 48 to 1024. Default: 128.
     size : int, optional
-        Pixels a side of the larger textures, at least ``side``; by default half as many again.
+        Side of the larger textures in pixels, ``side`` to 2048. Default: 1.5 times ``side``.
     seed : int
-        Seed of all methods that have one.
+        Seed of all methods that have one. Default: 0.
     programs : mapping of str to path, optional
-        Programs that are not found by their usual name: ``"embark"`` and ``"resynthesizer"``.
+        Paths of programs, ``"embark"`` or ``"resynthesizer"``, that have another name than usual or are not in the
+        path.
     timed : bool
-        Whether the page says how long each method took; without it, the same methods give the same bytes.
+        If True, the page reports the time of each method. If False, the same methods give the same bytes. Default:
+        True.
     progress : callable, optional
-        Called as ``progress(stage, share)``; raising stops the work.
+        Called as ``progress(stage, share)`` with the completed share. An exception that it raises stops the work.
 
     Returns
     -------
@@ -101,7 +105,7 @@ def compare(
     Raises
     ------
     InvalidInput
-        No picture, one that is too small, an unknown task or program, or a program that cannot be run.
+        If the images are missing or too small, a task or program is unknown, or a program cannot be run.
 
     Examples
     --------
@@ -114,13 +118,14 @@ def compare(
     """
     chosen = [as_choice(t, "tasks", tuple(TASKS)) for t in tasks]
     if not chosen or not pictures:
-        raise InvalidInput(f"{'tasks' if pictures else 'pictures'}: needs at least one")
+        raise InvalidInput(f"{'tasks' if pictures else 'pictures'}: must contain at least one, got none")
     side = as_int(side, "side", LEAST, MOST)
     size = side * 3 // 2 if size is None else as_int(size, "size", side, 2 * MOST)
     seed = as_seed(seed)
     named = check_programs(programs or {})
     given = {name: take_middle(image, side, name) for name, image in pictures.items()}
     holes = {name: make_hole(image.shape[:2]) for name, image in given.items()} if "hole" in chosen else {}
+    # List the methods before the work starts, so that progress has a known total.
     here, missing = [], []
     for method in METHODS:
         if method.task in chosen:
@@ -134,7 +139,7 @@ def compare(
         if progress is not None:
             progress(f"{name}: {method.name}", at / len(pairs))
         truth = Request(given[name], size, seed, holes.get(name) if method.task == "hole" else None)
-        # What was in the hole is shown to none.
+        # Methods do not get the original pixels of the hole.
         asked = truth if truth.hole is None else replace(truth, picture=blank(truth.picture, truth.hole))
         made, seconds, failure = attempt(do, asked)
         figures = {} if made is None else TASKS[method.task].measure(truth, made)
@@ -145,17 +150,17 @@ def compare(
 
 
 def check_programs(programs: Mapping[str, str]) -> dict[str, str]:
-    """Check that the programs are known, and are there to be run."""
+    """Check that the programs are known and executable; return their absolute paths."""
     for name, path in programs.items():
         if name not in PROGRAMS:
-            raise InvalidInput(f"programs: must be one of {', '.join(PROGRAMS)}; got {name!r}")
+            raise InvalidInput(f"programs: must be one of {', '.join(PROGRAMS)}, got {name!r}")
         if not (os.path.isfile(path) and os.access(path, os.X_OK)):
-            raise InvalidInput(f"programs: {path!r}, which is to be {name}, is not a program that can be run")
+            raise InvalidInput(f"programs: {name} must be an executable file, got {path!r}")
     return {name: os.path.abspath(path) for name, path in programs.items()}
 
 
 def take_middle(image: Array, side: int, name: str) -> Array:
-    """Return the middle of a picture as 8-bit RGB."""
+    """Return the middle of an image as 8-bit RGB."""
     whole = preview(as_image(image, name, minimum=LEAST))
     pixels = whole if whole.ndim == 3 else whole[..., np.newaxis]
     pixels = np.repeat(pixels[..., :1], 3, axis=-1) if pixels.shape[-1] < 3 else pixels[..., :3]
@@ -172,17 +177,17 @@ def make_hole(shape: tuple[int, ...]) -> Bools:
 
 
 def blank(picture: Array, hole: Bools) -> Array:
-    """Return a picture in whose hole is grey."""
+    """Return an image with a grey hole."""
     return np.where(hole[..., np.newaxis], np.uint8(128), picture)
 
 
 def attempt(do: Callable[[Request], Array], request: Request) -> tuple[Array | None, float, str]:
-    """Return what a method makes, the processor seconds that it took, and why it failed, if it did."""
+    """Run a method; return its result, its processor seconds, and the reason if it failed."""
     start = count_seconds()
     try:
         made = do(request)
     except Exception as error:
-        # Of others anything may come; the comparison goes on.
+        # Other programs may raise any exception. The comparison continues.
         return None, count_seconds() - start, (str(error).strip().splitlines() or [type(error).__name__])[0][:160]
     seconds = count_seconds() - start
     made = np.ascontiguousarray(made)

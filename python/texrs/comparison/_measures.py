@@ -1,4 +1,4 @@
-"""Measures of pictures by their pixels alone. Of each, less is better, and 0 is what the example has itself."""
+"""Measures of images from their pixels. Less is better, and 0 is the value of the example itself."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ MEASURES: dict[str, tuple[str, str]] = {
     "error": ("%", "how far the hole is from what was there, of the range; one of many good fillings was there"),
     "rim": ("", "steps along the border of the hole over those of the example, less 1"),
 }
-"""What is measured: its unit, and what it says."""
+"""Unit and description of each measure."""
 OCTAVES = 4
 NEAR = 1 / 8
-"""Shifts of less than this share of a side are of things, not of copies."""
+"""Minimum shift as a share of a side. Smaller shifts match single elements, not copies."""
 Numbers = NDArray[np.float64]
 
 
 def measure_colours(example: Array, made: Array, where: Bools | None = None) -> float:
-    """Return the distance of the colours of a picture, or of what is marked of it, from those of its example."""
+    """Return the distance of the colours of an image, or of its marked part, from the colours of its example."""
     shares = np.linspace(0, 100, 257)
     shown = made[where] if where is not None else made.reshape(-1, made.shape[-1])
     wanted = example.reshape(-1, example.shape[-1])
@@ -43,7 +43,7 @@ def measure_colours(example: Array, made: Array, where: Bools | None = None) -> 
 
 
 def measure_detail(example: Array, made: Array, where: Bools | None = None) -> float:
-    """Return how many octaves the contrast of a picture is off, the mean over sizes of detail."""
+    """Return the error of contrast in octaves, the mean over sizes of detail."""
     wanted, shown = list_bands(example), list_bands(made)
     gaps = []
     for i in range(OCTAVES):
@@ -53,7 +53,7 @@ def measure_detail(example: Array, made: Array, where: Bools | None = None) -> f
 
 
 def list_bands(image: Array) -> list[Numbers]:
-    """Return the lightness of a picture in octaves of detail, the finest first."""
+    """Return the lightness of an image in octaves of detail, the finest first."""
     from scipy.ndimage import gaussian_filter
 
     softer = [find_lightness(image)]
@@ -63,18 +63,18 @@ def list_bands(image: Array) -> list[Numbers]:
 
 
 def find_lightness(image: Array) -> Numbers:
-    """Return the lightness of a picture."""
+    """Return the lightness of an image."""
     lightness: Numbers = image[..., :3].astype(np.float64) @ np.array([0.299, 0.587, 0.114])
     return lightness
 
 
 def measure_repetition(example: Array, made: Array) -> float:
-    """Return how alike a picture is to itself moved, beyond what its example is."""
+    """Return the similarity of an image to itself after a shift, beyond the similarity of its example."""
     return max(0.0, find_echo(made) - max(0.0, find_echo(example)))
 
 
 def find_echo(image: Array) -> float:
-    """Return the greatest correlation of a picture with itself, moved by more than an eighth of a side, where both overlap."""
+    """Return the greatest correlation of an image with itself, shifted by more than an eighth of a side."""
     detail = sum(list_bands(image)[:3])
     height, width = image.shape[:2]
     padded = (2 * height, 2 * width)
@@ -89,7 +89,7 @@ def find_echo(image: Array) -> float:
     other = correlate(ones, np.asarray(detail) ** 2)
     rows, columns = (np.minimum(np.arange(2 * n), 2 * n - np.arange(2 * n)) for n in (height, width))
     far = np.maximum(rows[:, np.newaxis] / height, columns / width)
-    # Half of the picture must overlap with itself, or chance is at work.
+    # Require an overlap of at least a quarter of the image, or chance decides.
     area = (height - np.minimum(rows, height))[:, np.newaxis] * (width - np.minimum(columns, width))
     allowed = (far > NEAR) & (area >= height * width / 4)
     alike = common / np.maximum(np.sqrt(np.maximum(energy, 0) * np.maximum(other, 0)), 1e-9)
@@ -97,7 +97,7 @@ def find_echo(image: Array) -> float:
 
 
 def measure_border(example: Array, made: Array) -> float:
-    """Return how much larger the steps from border to border are than those inside the example."""
+    """Return the excess of the steps between opposite borders over the steps inside the example."""
     ratios = []
     for axis in range(2):
         across = np.abs(made.take(0, axis).astype(float) - made.take(-1, axis)).mean()
@@ -111,12 +111,12 @@ def find_step(image: Array, axis: int) -> float:
 
 
 def measure_error(truth: Array, made: Array, hole: Bools) -> float:
-    """Return the root of the mean squared difference in the hole."""
+    """Return the root of the mean squared difference in the hole, in percent of the range."""
     return float(np.sqrt(((truth[hole].astype(float) - made[hole]) ** 2).mean())) / 255 * 100
 
 
 def measure_rim(truth: Array, made: Array, hole: Bools) -> float:
-    """Return how much larger the steps across the border of a hole are than those of the picture."""
+    """Return the excess of the steps across the border of a hole over the steps of the image."""
     steps, usual = [], []
     for axis in range(2):
         crossing = np.diff(hole.astype(int), axis=axis) != 0

@@ -1,7 +1,7 @@
-"""The methods that are compared: those of texrs, those of others that are here, and what costs nothing.
+"""The compared methods: of texrs, of other programs that are installed, and trivial ones.
 
-Others are called as their own documentation shows, with their own defaults, and with one thread where only that makes the same
-picture again. None of them is part of texrs or linked to it.
+Other programs are called as their documentation shows, with their own defaults. They run with one thread if only this
+makes the result repeatable. None of them is part of texrs or linked to it.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from texrs.tiling import tile
 
 Do = Callable[[Request], Array]
 PATIENCE = 900
-"""Seconds that a program may take."""
+"""Maximum time of a program, in seconds."""
 PROGRAMS = {"embark": "texture-synthesis", "resynthesizer": "resynthesizer-fill"}
-"""Programs of others, and the names under which they are looked for."""
+"""Other programs, and the names of their executables."""
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A method: what it is called, what it does, how it is found, and how to get it."""
+    """A method: its name, its task, a function that finds it, and how to get it."""
 
     name: str
     task: str
@@ -46,12 +46,15 @@ class Method:
 
 
 def always(do: Do) -> Callable[[Mapping[str, str]], Do | None]:
-    """Return a way to find what is always here."""
+    """Return a finder for a method that is always available."""
     return lambda named: do
 
 
 def find_module(name: str, do: Callable[[Any, Request], Array]) -> Callable[[Mapping[str, str]], Do | None]:
-    """Return a way to find what a module does, which is loaded now; of an inner name, as ``cv2.xphoto``, the outer one."""
+    """Return a finder for a method of a module, which it loads.
+
+    For an inner name such as ``cv2.xphoto``, it loads the outer one.
+    """
 
     def find(named: Mapping[str, str]) -> Do | None:
         outer, _, inner = name.partition(".")
@@ -60,7 +63,7 @@ def find_module(name: str, do: Callable[[Any, Request], Array]) -> Callable[[Map
         try:
             module = importlib.import_module(outer)
         except Exception:
-            # It is there, and cannot be loaded here.
+            # The module is installed but cannot be loaded.
             return None
         return partial(do, module) if not inner or hasattr(module, inner) else None
 
@@ -68,7 +71,7 @@ def find_module(name: str, do: Callable[[Any, Request], Array]) -> Callable[[Map
 
 
 def find_program(name: str, do: Callable[[str, Request], Array]) -> Callable[[Mapping[str, str]], Do | None]:
-    """Return a way to find a program: the one that was named, or one in the path."""
+    """Return a finder for a program: the given path, or an executable in the path."""
 
     def find(named: Mapping[str, str]) -> Do | None:
         path = named.get(name) or shutil.which(PROGRAMS[name])
@@ -78,13 +81,13 @@ def find_program(name: str, do: Callable[[str, Request], Array]) -> Callable[[Ma
 
 
 FREE = ("copies", "as it is")
-"""What costs nothing, and stands beside the methods for comparison alone."""
+"""Trivial methods, shown only for comparison."""
 
 # --- what costs nothing ----------------------------------------------------------------------------------------------
 
 
 def put_side_by_side(asked: Request) -> Array:
-    """Repeat the picture."""
+    """Repeat the image."""
     height, width = asked.picture.shape[:2]
     copies = (-(-asked.size // height), -(-asked.size // width), 1)
     return np.tile(asked.picture, copies)[: asked.size, : asked.size]
@@ -94,14 +97,14 @@ def put_side_by_side(asked: Request) -> Array:
 
 
 def run(*words: object) -> None:
-    """Run a program; what it complains of is the error."""
+    """Run a program; raise its error output if it fails."""
     done = subprocess.run([str(w) for w in words], capture_output=True, text=True, timeout=PATIENCE)
     if done.returncode != 0:
-        raise TexrsError(done.stderr.strip() or f"ended with {done.returncode}")
+        raise TexrsError(done.stderr.strip() or f"failed with exit code {done.returncode}")
 
 
 def run_embark(more: bool, program: str, asked: Request) -> Array:
-    """Let Embark's texture-synthesis make a texture, or fill a hole: black is made, white is kept."""
+    """Let Embark's texture-synthesis generate a texture, or fill a hole: black pixels are filled, white ones kept."""
     height, width = (asked.size, asked.size) if more else asked.picture.shape[:2]
     with tempfile.TemporaryDirectory() as folder:
         example, mask, out = (Path(folder, f"{n}.png") for n in ("example", "mask", "out"))
@@ -130,7 +133,7 @@ def run_resynthesizer(program: str, asked: Request) -> Array:
 
 
 def blend_borders(module: Any, asked: Request) -> Array:
-    """Let img2texture fade the borders into each other."""
+    """Let img2texture blend the opposite borders."""
     from PIL import Image
 
     return np.asarray(module.image_to_seamless(Image.fromarray(asked.picture), overlap=0.2).convert("RGB"))
@@ -204,4 +207,4 @@ METHODS = (
     Method("Embark texture-synthesis", "hole", find_program("embark", partial(run_embark, False)), EMBARK),
     Method("Resynthesizer", "hole", find_program("resynthesizer", run_resynthesizer), RESYNTHESIZER),
 )
-"""All methods, in the order in which they are shown."""
+"""All methods, in the order of the page."""

@@ -1,4 +1,4 @@
-"""The page of a comparison: for each task a table of the means, then the pictures with their figures."""
+"""The page of a comparison: for each task a table of the means, then the images with their measures."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ def make_page(
     *,
     timed: bool,
 ) -> str:
-    """Return the page: HTML that refers to nothing outside itself."""
+    """Return a self-contained HTML page."""
     links, parts = [("about", "What is compared")], [section("about", "What is compared", INTRO, explain(timed))]
+    # Each task that was done has a section, with a table and the images.
     for task, about in TASKS.items():
         some = [r for r in results if r.task == task]
         if some:
@@ -61,7 +62,7 @@ def make_page(
 
 
 def explain(timed: bool) -> str:
-    """Say what is measured."""
+    """Return the list of measures and their descriptions."""
     rows = [(name, unit, text) for name, (unit, text) in MEASURES.items()]
     if timed:
         rows.append((SECONDS, "s", "processor seconds, of all threads and programs; what is loaded first counts too"))
@@ -73,7 +74,7 @@ def explain(timed: bool) -> str:
 
 
 def tabulate(results: Sequence[Result], timed: bool) -> str:
-    """Return a table of the means over the pictures, a row for each method."""
+    """Return a table of the means over the images, with a row for each method."""
     names = [*next((r.figures for r in results if r.figures), {}), *([SECONDS] if timed else [])]
     methods = list(dict.fromkeys(r.method for r in results))
     means = {
@@ -101,17 +102,17 @@ def tabulate(results: Sequence[Result], timed: bool) -> str:
 
 
 def read(result: Result, name: str) -> float:
-    """Return one of the figures of a result."""
+    """Return one of the measures of a result."""
     return result.seconds if name == SECONDS else result.figures[name]
 
 
 def find_mean(values: Sequence[float]) -> float | None:
-    """Return the mean, if there is any."""
+    """Return the mean, or None if the list is empty."""
     return float(np.mean(values)) if values else None
 
 
 def show_pictures(pictures: Mapping[str, Array], holes: Mapping[str, Bools], results: Sequence[Result]) -> str:
-    """Return a row for each picture: what was given, and what each method made."""
+    """Return a row for each image: the given image and the result of each method."""
     rows = []
     for name, image in pictures.items():
         hole = holes.get(name)
@@ -130,7 +131,7 @@ def show_pictures(pictures: Mapping[str, Array], holes: Mapping[str, Bools], res
 
 
 def show(image: Array, name: str, method: str, figures: str, *, four: bool = False) -> str:
-    """Return a picture and its figures; ``four`` shows it two by two, for its borders."""
+    """Return an image and its measures. If ``four``, repeat it two by two to show its borders."""
     height, width = image.shape[:2]
     alt = f"{name}: {method}{', two by two' if four else ''}"
     if four:
@@ -142,17 +143,17 @@ def show(image: Array, name: str, method: str, figures: str, *, four: bool = Fal
 
 
 def caption(method: str, figures: str = "") -> str:
-    """Return what stands below a picture."""
+    """Return the caption of an image."""
     return f"<figcaption>{escape(method)}{f'<small>{escape(figures)}</small>' if figures else ''}</figcaption>"
 
 
 def table(rows: str) -> str:
-    """Return a table that is moved sideways where it is too wide, by keys also."""
+    """Return a table that scrolls sideways if it is too wide, also by keys."""
     return f'<div class="wide" tabindex="0"><table>{rows}</table></div>'
 
 
 def link(text: str) -> str:
-    """Show a command as one."""
+    """Return a text as code if it is a command."""
     return code(text) if text.startswith("pip ") and "," not in text else escape(text)
 
 

@@ -1,4 +1,4 @@
-"""What methods gave, and which of them are not here."""
+"""Results of methods, and methods that are not installed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from texrs._typing import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Request:
-    """What a method is asked for: a texture of a size from a picture, or a hole in it filled."""
+    """A request to a method: a texture of a size from an image, or a hole in the image to fill."""
 
     picture: Array
     size: int
@@ -20,20 +20,20 @@ class Request:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """What a method made of a picture.
+    """Result of a method for an image.
 
     Attributes
     ----------
     picture, task, method : str
-        Their names.
+        Names of the image, the task and the method.
     image : (h, w, 3) uint8 array or None
-        What was made.
+        The result, or None if the method failed.
     seconds : float
-        Processor seconds, of all threads and programs.
+        Processor seconds of all threads and programs.
     figures : mapping of str to float
-        What is measured; of each, less is better.
+        Measures of the result by name. Less is better.
     failure : str
-        Why nothing was made.
+        Reason if the method failed, else empty.
 
     """
 
@@ -48,7 +48,7 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """A method that is not here, and how to get it."""
+    """A method that is not installed, and how to get it."""
 
     method: str
     task: str

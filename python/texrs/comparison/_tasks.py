@@ -1,4 +1,4 @@
-"""What is compared, and by which measures."""
+"""The tasks of a comparison, and their measures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from texrs.comparison._results import Request
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A task: its heading, a sentence, and what is measured of a result."""
+    """A task: its heading, a sentence about it, and the function that measures a result."""
 
     title: str
     lead: str
@@ -20,12 +20,12 @@ class Task:
 
 
 def judge_more(asked: Request, made: Array) -> dict[str, float]:
-    """Measure a larger texture, which is to be cyclic."""
+    """Measure a larger texture, which should be tileable."""
     return judge_tile(asked, made) | {"repetition": m.measure_repetition(asked.picture, made)}
 
 
 def judge_tile(asked: Request, made: Array) -> dict[str, float]:
-    """Measure a picture that is to have no seam."""
+    """Measure an image that should have no seam."""
     return {
         "colours": m.measure_colours(asked.picture, made),
         "detail": m.measure_detail(asked.picture, made),
@@ -34,7 +34,7 @@ def judge_tile(asked: Request, made: Array) -> dict[str, float]:
 
 
 def judge_hole(asked: Request, made: Array) -> dict[str, float]:
-    """Measure what a hole was filled with."""
+    """Measure a filled hole."""
     assert asked.hole is not None
     return {
         "error": m.measure_error(asked.picture, made, asked.hole),
@@ -53,4 +53,4 @@ TASKS = {
     ),
     "hole": Task("A hole filled", "A square in the middle was taken out, and is filled.", judge_hole),
 }
-"""By the names that options have for them."""
+"""Tasks by the names that options use."""

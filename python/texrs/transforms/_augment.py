@@ -1,4 +1,4 @@
-"""Other pictures of the same texture, with their labels and boxes."""
+"""New images of the same texture, with their labels and boxes."""
 
 from __future__ import annotations
 
@@ -18,29 +18,31 @@ from texrs.source_map import SourceMap
 from texrs.transforms._boxes import follow_boxes
 
 SHORTEST = 16
-"""Least side of a picture."""
+"""Minimum side of an image, in pixels."""
 LARGE = 128
-"""Least side from which on things are found on half of the samples: where they end is then known to a pixel, in a third of
-the time."""
+"""Minimum side, in pixels, of images whose elements are found at half the resolution.
+
+Outlines are then accurate to a pixel, in a third of the time.
+"""
 
 
 class Augmented(NamedTuple):
-    """What `TextureAugment` returns.
+    """An augmented image with its labels and boxes, as `TextureAugment` returns it.
 
     Attributes
     ----------
     image : (H, W) or (H, W, C) array
-        In the shape and dtype of the picture.
+        New image, in the shape and dtype of the given image.
     mask : (H, W) or (H, W, C) array, or None
-        Looked up at the nearest pixel: no label that was not there.
+        New labels, copied from the nearest pixels, so that no other labels occur.
     boxes : (n, 4) float64, or None
-        Those that survive, (left, top, right, bottom) in pixels, see `follow_boxes`.
+        Boxes that survive, (left, top, right, bottom) in pixels. See `follow_boxes`.
     which : (n,) int, or None
-        Which of the boxes that were given each follows from, from 0.
+        Index of the given box that each box follows from, starting at 0.
     source_map : SourceMap
-        Where each pixel comes from: whatever else is in register follows with ``source_map.render``.
+        Source of each pixel. Other aligned maps follow with ``source_map.render``.
     seed : int
-        The seed that was used. The same seed gives the same sample again.
+        Seed of this result. The same seed gives the same result.
 
     Examples
     --------
@@ -53,21 +55,21 @@ class Augmented(NamedTuple):
     """
 
     image: Array
-    """In the shape and dtype of the picture."""
+    """New image, in the shape and dtype of the given image."""
     mask: Array | None
-    """Looked up at the nearest pixel: no label that was not there."""
+    """New labels, copied from the nearest pixels, so that no other labels occur."""
     boxes: NDArray[np.float64] | None
-    """Those that survive, see `follow_boxes`."""
+    """Boxes that survive. See `follow_boxes`."""
     which: NDArray[np.intp] | None
-    """Which of the boxes that were given each follows from."""
+    """Index of the given box that each box follows from."""
     source_map: SourceMap
-    """Where each pixel comes from: whatever else is in register follows with ``source_map.render``."""
+    """Source of each pixel. Other aligned maps follow with ``source_map.render``."""
     seed: int
-    """The seed that was used. The same seed gives the same sample again."""
+    """Seed of this result. The same seed gives the same result."""
 
 
 def find_things(image: Exemplar) -> ElementOptions:
-    """Return how the elements of a picture are found: of a large one by their labels, on half of its samples."""
+    """Return options for finding elements. For a large image, they contain labels found at half the resolution."""
     pixels = image.pixels
     if image.labels or min(image.shape) < LARGE or pixels.dtype.kind not in "uf":
         return ElementOptions()
@@ -76,36 +78,36 @@ def find_things(image: Exemplar) -> ElementOptions:
     small = Exemplar(np.rint(means).astype(pixels.dtype) if pixels.dtype.kind == "u" else means)
     found = small.segment()
     if found.kind != "components" or found.lattice is not None or found.courses is not None:
-        # What keeps to lines is to keep to them exactly.
+        # Elements in a lattice or in courses must stay exactly in line, so find them at full resolution.
         return ElementOptions()
     rows, columns = (np.arange(n) * m // n for n, m in zip(image.shape, half, strict=True))
     return ElementOptions(labels=found.elements[np.ix_(rows, columns)])
 
 
 class TextureAugment:
-    """Lay a picture anew from pieces of itself, joined along minimum cuts; labels and boxes follow.
+    """Rearrange an image from pieces of itself, joined along minimum cuts. Labels and boxes follow.
 
-    For pictures of textures: surfaces, materials, tissue, fields, defects on them. What is far apart in a picture comes to lie
-    side by side, seams avoid what would show them, and things stay whole where they can (`texrs.design` with
-    ``motion="keep"``).
-    No pixel is made up, and none is interpolated.
+    Use it for images of textures, such as surfaces, materials, tissue, fields, and defects on them. Distant parts of
+    an image become neighbours. Seams avoid visible places, and elements stay whole if possible (`texrs.design` with
+    ``motion="keep"``). Every pixel is a copy of a pixel of the image, without interpolation.
 
-    Each call without a seed gives another sample. The operating system draws its seed, so forked workers also differ. The same
-    picture and seed give the same result in any process and with any number of threads. The interpreter lock is
-    released while the kernels work, so that threads serve as well as processes, and forked and spawned workers are alike. In a
-    loader with a worker a core, `texrs.threads` or the environment variable ``RAYON_NUM_THREADS=1`` keeps workers out of each
-    other's way. What is known of a picture is kept for a while, so that its second result takes a fraction of the first's
-    time. Things of a picture of 128 pixels a side and more are found on half of its samples, which is as good and faster.
+    Each call without a seed gives another sample. The operating system draws its seed, so forked workers also differ.
+    The same image and seed give the same result in any process and with any number of threads. The kernels release the
+    interpreter lock, so threads work as well as processes, forked or spawned. If a loader has one worker per core, set
+    `texrs.threads` or the environment variable ``RAYON_NUM_THREADS=1``, so that workers do not compete. The analysis
+    of an image is cached for a while, so its second result takes a fraction of the time of the first. Elements of
+    images of at least 128 pixels a side are found at half the resolution, which is as good and faster.
 
     Parameters
     ----------
     min_visible : float
-        Share of a box's area that must be seen in one piece for a box to survive, 0 to 1; see `follow_boxes`.
+        Minimum share of a box's area that must be visible in one piece for the box to survive, 0 to 1. See
+        `follow_boxes`. Default: 0.5.
 
     Raises
     ------
     InvalidInput
-        A share out of range.
+        If the share is out of its range.
 
     See Also
     --------
@@ -136,19 +138,19 @@ class TextureAugment:
         boxes: Array | None = None,
         seed: int | None = None,
     ) -> Augmented:
-        """Return another picture of the same size, with its labels and its boxes.
+        """Return another image of the same size, with its labels and boxes.
 
         Parameters
         ----------
         image : (H, W) or (H, W, C) array, or Exemplar
-            Any real dtype, each side at least 16; whatever `texrs.Exemplar` takes.
+            Image of any real dtype that `texrs.Exemplar` accepts, each side at least 16 pixels.
         mask : (H, W) or (H, W, C) array, optional
-            Labels in register, any dtype.
+            Labels of the pixels, any dtype. Default: none.
         boxes : (n, 4 or more) array_like, optional
-            left, top, right, bottom in pixels; what stands behind stays with the box.
+            Boxes: left, top, right, bottom in pixels. Further columns stay with their box. Default: none.
         seed : int, optional
-            Seed of the sample, 0 to 2^64 - 1. The same seed gives the same result. Default: a new seed for each call, which
-            is in the result.
+            Seed of the sample, 0 to 2^64 - 1. The same seed gives the same result. Default: a new seed for each call,
+            which is part of the result.
 
         Returns
         -------
@@ -158,15 +160,16 @@ class TextureAugment:
         Raises
         ------
         InvalidInput
-            Not a picture, a mask of another size, or no boxes but something else.
+            If the input is not an image, the mask has another size, or the boxes have another shape.
 
         """
         known = as_exemplar(image, "image", minimum=SHORTEST)
-        # A generator of this process would be copied into each forked worker, and all workers would return the same samples.
+        # Draw the seed from the operating system. A generator of this process would be copied into each forked worker,
+        # and all workers would return the same samples.
         number = randbits(64) if seed is None else as_seed(seed)
         labels = None if mask is None else as_ndarray(mask, "mask")
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
-            raise InvalidInput(f"mask: needs the size of the image, {known.shape}, got {labels.shape[:2]}")
+            raise InvalidInput(f"mask: must have the size of the image, {known.shape}, got {labels.shape[:2]}")
         things = known.cached("things of an augmented picture", lambda: find_things(known))
         source = design(known, known.shape, seed=number, wrap=False, motion="keep", elements=things).source_map
         shown = source.render(known.image, interpolation="nearest")

@@ -1,4 +1,4 @@
-"""Boxes that follow what they are around."""
+"""Boxes around objects, moved with the pixels of an image."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from texrs.source_map import SourceMap
 from texrs.source_map._pixels import label_pieces
 
 LOOSE = 0.5
-"""Pixels by which neighbours may miss the step that their frame says, and still show one piece."""
+"""Maximum deviation of adjacent pixels of one piece from the step of their frame, in pixels."""
 
 
 def follow_boxes(
     source: SourceMap, boxes: Array, min_visible: float = 0.5
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return the boxes around what is seen of boxes through a source map.
+    """Return the boxes around the visible parts of boxes after a source map is applied.
 
-    Neighbouring pixels that are neighbours in the exemplar too are one piece of it. Wherever a piece shows at least the share
-    ``min_visible`` of a box's area, it gets a box: the smallest around the pixels of the piece that come from inside the box.
-    So a thing that is copied twice has two boxes, one that is cut off a smaller one, and one of which too little is left none.
-    A box is as tight as it was: where it was loose, so is what follows from it.
+    Adjacent pixels that are also adjacent in the exemplar belong to one piece. A piece that shows at least the share
+    ``min_visible`` of a box's area gets a box. This is the smallest box around the pixels of the piece that come from
+    inside the original. An object that is copied twice therefore has two boxes. A box of an object that is cut off is
+    smaller, and an object with too small a part has none. Boxes stay as tight or as loose as the given ones.
 
     Parameters
     ----------
     source : SourceMap
-        Of a picture from one picture.
+        Source map of an image from one exemplar.
     boxes : (n, 4 or more) array_like
-        left, top, right, bottom in pixels of the exemplar, from the outer edges: the whole picture is 0, 0, columns, rows.
-        What stands behind stays with the box, as a class.
+        Boxes: left, top, right, bottom in pixels of the exemplar, measured from the outer edges. The whole image is 0,
+        0, columns, rows. Further columns, such as a class, stay with their box.
     min_visible : float
-        Share of a box's area, as far as it lies in the picture, that must be seen in one piece; 0 to 1.
+        Minimum share of the part of a box inside the image that must be visible in one piece, 0 to 1. Default: 0.5.
 
     Returns
     -------
     (m, 4 or more) float64
-        Boxes in pixels of the output, in the order of those that they follow from, then of rows.
+        Boxes in pixels of the output, ordered by their original box, then by their first pixel.
     (m,) int
-        Which box each follows from.
+        Index of the original box of each box.
 
     Raises
     ------
     InvalidInput
-        A volume, a map from several exemplars, or no boxes but something else.
+        If the map is of a volume or of several exemplars, or the boxes have another shape.
 
     Examples
     --------
@@ -61,16 +61,17 @@ def follow_boxes(
     """
     as_instance(source, "source", SourceMap)
     if source.axes != 2 or len(source.shapes) != 1:
-        raise InvalidInput("source: needs the map of a picture from one exemplar")
+        raise InvalidInput("source: must map an image into one exemplar")
     given = as_array(boxes, "boxes", np.float64)
     given = given.reshape(0, 4) if given.size == 0 and given.ndim < 2 else given
     if given.ndim != 2 or given.shape[1] < 4:
-        raise InvalidInput(f"boxes: needs shape (n, 4) or (n, 4 and more), got {given.shape}")
+        raise InvalidInput(f"boxes: must have shape (n, 4 or more), got {given.shape}")
     check_finite(given, "boxes")
     share = as_float(min_visible, "min_visible", 0, 1)
     count, piece = _find_pieces(source)
-    # A pixel covers half of one to each side of its middle, and boxes count from the edge.
+    # Boxes count from the edge of a pixel, coordinates from its middle.
     row, column = (source.coordinates[..., axis].ravel() + 0.5 for axis in range(2))
+    # A pixel of the output covers this area of the exemplar.
     area = np.abs(np.linalg.det(source.jacobians().astype(np.float64))).ravel()
     rows, columns = source.shapes[0]
     width = source.shape[1]
@@ -84,6 +85,7 @@ def follow_boxes(
             continue
         seen = np.bincount(piece[inside], area[inside], count)
         y, x = np.divmod(inside, width)
+        # Each piece that shows enough of the box gets a box of its own.
         for one in dict.fromkeys(piece[inside].tolist()):
             if seen[one] < share * (right - left) * (bottom - top):
                 continue
@@ -95,7 +97,7 @@ def follow_boxes(
 
 
 def _find_pieces(source: SourceMap) -> tuple[int, NDArray[np.int32]]:
-    """Return how many pieces of the exemplar are seen, and of which one each pixel is."""
+    """Return the number of pieces of the exemplar, and the index of the piece that each pixel shows."""
     frames, joined = source.jacobians(), []
     for axis in range(2):
         step = np.diff(source.coordinates, axis=axis)

@@ -1,4 +1,4 @@
-"""`texrs.transforms.TextureAugment` as a transform of albumentations, which is to be installed."""
+"""`texrs.transforms.TextureAugment` as a transform of albumentations, which must be installed."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ def __dir__() -> list[str]:
 
 
 class TextureAugment(DualTransform):  # type: ignore[misc]
-    """Lay pictures anew from pieces of themselves, in a pipeline of albumentations: images, masks and boxes.
+    """Rearrange images, masks and boxes from pieces of themselves, in a pipeline of albumentations.
 
-    The pipeline's own generator draws the seeds, so ``Compose(..., seed=...)`` decides the samples. Each worker process has
-    a copy of this generator in the same state. The seed also depends on the name of the process, which its parent counts.
-    Workers differ, and so do the workers of the next epoch. Boxes become several if an element is copied several times, and
-    their labels follow.
+    The pipeline's own generator draws the seeds, so ``Compose(..., seed=...)`` decides the samples. Each worker
+    process has a copy of this generator in the same state. The seed also depends on the name of the process, which
+    its parent counts. Workers therefore differ, and so do the workers of the next epoch. An element that is copied several
+    times has several boxes, and their labels follow.
 
     Parameters
     ----------
     min_visible : float
-        See `texrs.transforms.follow_boxes`.
+        Minimum visible share of a box, 0 to 1. See `texrs.transforms.follow_boxes`. Default: 0.5.
     p : float
-        How often it is done.
+        Probability of applying the transform, 0 to 1. Default: 0.5.
 
     """
 
     _targets = (Targets.IMAGE, Targets.MASK, Targets.BBOXES)
 
     class InitSchema(DualTransform.InitSchema):  # type: ignore[misc]
-        """What the options may be."""
+        """Types of the options, which albumentations checks."""
 
         min_visible: float
 
@@ -59,7 +59,7 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
         return {"source": self._augment(image, seed=seed).source_map}
 
     def apply(self, img: Array, *, source: Any, **params: Any) -> Array:
-        """Return the picture, laid anew."""
+        """Return the rearranged image."""
         return np.asarray(source.render(img, interpolation="nearest"))
 
     def apply_to_mask(self, mask: Array, *, source: Any, **params: Any) -> Array:
@@ -67,7 +67,7 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
         return np.asarray(source.render(mask, interpolation="nearest"))
 
     def apply_to_bboxes(self, bboxes: Array, *, source: Any, **params: Any) -> Array:
-        """Return the boxes that survive, in shares of the picture's sides as they came."""
+        """Return the boxes that survive, as shares of the image's sides as albumentations passes them."""
         rows, columns = source.shape
         scale = np.concatenate([[columns, rows, columns, rows], np.ones(bboxes.shape[1] - 4)])
         boxes, _ = follow_boxes(source, bboxes * scale, self.min_visible)

@@ -1,4 +1,4 @@
-"""`texrs.transforms.TextureAugment` as a transform of torchvision (v2), which is to be installed."""
+"""`texrs.transforms.TextureAugment` as a transform of torchvision (v2), which must be installed."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def __dir__() -> list[str]:
 
 
 class TextureAugment(v2.Transform):  # type: ignore[misc]
-    """Lay pictures anew from pieces of themselves, in a pipeline of torchvision: images, masks and boxes.
+    """Rearrange images, masks and boxes from pieces of themselves, in a pipeline of torchvision.
 
-    Seeds are drawn from torch's generator, so that `torch.manual_seed`, and the seed that a loader gives each worker, say what
-    comes. A plain tensor ``"labels"`` in a dictionary, as long as the boxes, follows them.
+    Torch's generator draws the seeds. `torch.manual_seed`, and the seed that a loader gives each worker, therefore
+    decide the samples. A plain tensor ``"labels"`` of a dictionary, as long as the boxes, follows them.
 
     Parameters
     ----------
     min_visible : float
-        See `texrs.transforms.follow_boxes`.
+        Minimum visible share of a box, 0 to 1. See `texrs.transforms.follow_boxes`. Default: 0.5.
 
     """
 
@@ -41,10 +41,10 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         self._augment = Augment(min_visible)
 
     def make_params(self, flat_inputs: list[Any]) -> dict[str, Any]:
-        """Return the source map of this sample, and which boxes survive."""
+        """Return the source map of this sample, and the boxes that survive with their indices."""
         pictures = [each for each in flat_inputs if not isinstance(each, tv_tensors.Mask | tv_tensors.BoundingBoxes)]
         if not pictures:
-            raise InvalidInput("inputs: needs a picture, got none")
+            raise InvalidInput("inputs: must contain an image, got none")
         seed = int(torch.randint(2**62, ()).item())
         source = self._augment(_to_array(pictures[0]), seed=seed).source_map
         params: dict[str, Any] = {"source": source, "boxes": None, "index": None}
@@ -55,7 +55,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         return params
 
     def transform(self, inpt: Any, params: dict[str, Any]) -> Any:
-        """Return a picture, a mask or boxes as they follow."""
+        """Return an image, a mask or boxes after the transform."""
         if isinstance(inpt, tv_tensors.BoundingBoxes):
             corners = tv_tensors.BoundingBoxes(
                 torch.from_numpy(params["boxes"]).to(inpt.dtype),
@@ -70,7 +70,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         return tv_tensors.wrap(made, like=inpt) if isinstance(inpt, tv_tensors.TVTensor) else made
 
     def forward(self, *inputs: Any) -> Any:
-        """Transform all that is in a sample by one map, and let labels follow the boxes."""
+        """Transform all parts of a sample by one source map, and let labels follow the boxes."""
         given = inputs if len(inputs) > 1 else inputs[0]
         flat, spec = tree_flatten(given)
         wanted = self._needs_transform_list(flat)
@@ -80,17 +80,17 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
 
 
 def _to_array(picture: Any) -> Any:
-    """Return a tensor as an array with its channels last; anything else as it is."""
+    """Return a tensor as an array with its channels last. Other inputs are returned unchanged."""
     if not isinstance(picture, torch.Tensor):
         return picture
     if picture.ndim not in (2, 3):
-        raise InvalidInput(f"inputs: needs one picture (C, H, W) at a time, got shape {tuple(picture.shape)}")
+        raise InvalidInput(f"inputs: must be one image (C, H, W) at a time, got shape {tuple(picture.shape)}")
     array = picture.detach().cpu().as_subclass(torch.Tensor).numpy()
     return array if picture.ndim == 2 else np.moveaxis(array, 0, -1)
 
 
 def _follow_labels(sample: Any, index: Any) -> Any:
-    """Return a sample whose labels are those of the boxes that survive."""
+    """Return a sample with the labels of the boxes that survive."""
     if index is None:
         return sample
     if isinstance(sample, dict):
