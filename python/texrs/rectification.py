@@ -31,7 +31,7 @@ from texrs.tiling import tile
 __all__ = ["rectify"]
 
 SHARP = 0.5
-"""Minimum number of photograph pixels in each texture pixel for a sharp result, along the direction with the fewest."""
+"""Minimum number of photograph pixels per texture pixel for a sharp result, along the direction with the fewest."""
 SMALLEST = 32
 """Minimum side of the flat texture, in pixels."""
 LEAST = 0.05
@@ -97,7 +97,8 @@ def rectify(
 
         Report:
 
-        - ``plane``: ``slant``, ``tilt``, ``fov`` and ``turn`` in degrees, the ``shape`` of the image and the ``confidence``.
+        - ``plane``: ``slant``, ``tilt``, ``fov`` and ``rotation`` in degrees, the ``shape`` of the image in pixels and
+          the ``confidence``, 0 to 1.
         - ``found``: Whether the plane was found in the image.
         - ``resolution``: Pixels of the texture for one pixel in the middle of the photograph.
         - ``sharp``: Share of the flattened plane that is sharp enough.

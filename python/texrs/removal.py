@@ -109,8 +109,8 @@ def remove(
         - ``match_lighting``: Whether slow changes of light were followed.
         - ``seed``: The seed.
         - ``margin``: Pixels that were added around the mask.
-        - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in the
-          image.
+        - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in
+          the image.
         - ``ground``: For each plane, the share of the image where it is visible.
         - ``beyond``: Share of the image that was filled without a plane.
 

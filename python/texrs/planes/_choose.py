@@ -55,7 +55,7 @@ def see(pixels: Array, view: PlaneView) -> Seen:
 
 
 def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
-    """Return the plane, None if uncertain or seen from the front, and whether it was found; warn if it is uncertain."""
+    """Return the plane, None if uncertain or seen from the front, and whether it was found; warn if uncertain."""
     if said is not None:
         return (None if said.slant < FLAT else said), False
     try:

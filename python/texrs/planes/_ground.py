@@ -45,8 +45,7 @@ FAR = 4.0
 ROUNDS = 20
 """Number of steps of the robust fit."""
 BINS, FINE = 12, 0.012
-"""Bins per colour channel; and standard deviation of the windows for comparing colours, as a share of the shorter side.
-"""
+"""Bins per colour channel; and standard deviation of windows for comparing colours, as a share of the shorter side."""
 DOUBT = 2.0
 """Width of the band along a border where colours decide, as a multiple of the windows' standard deviation."""
 PART, USUAL = 0.08, 0.25

@@ -75,7 +75,7 @@ def blur_levels(grey: Floats) -> list[Floats]:
 
 
 def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, rounds: int = ROUNDS) -> tuple[Reals, float]:
-    """Refine the rise of the relative width per pixel, (2,), from a first guess; return it and the remaining deviation.
+    """Refine a first guess of the rise (2,) of the relative width per pixel; return it and the remaining deviation.
 
     A fit underestimates the change where patterns are blurred, so plain rounds would need many steps in one direction.
     The step is therefore extrapolated from the last two rounds (Anderson mixing).
@@ -101,7 +101,7 @@ def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, round
 
 
 def measure_windows(levels: list[Floats], known: Bools, rise: Reals, sigma: float) -> tuple[Reals, Reals]:
-    """Return points (n, 2) of the plane, in pixels from the middle of the image, and N around each point, (n, 2, 2)."""
+    """Return points (n, 2) of the plane, in pixels from the image's middle, and N around each point, (n, 2, 2)."""
     return _Flat(levels, known, rise).measure(sigma)
 
 
@@ -131,7 +131,7 @@ def _hasten(change: Reals, moved: Reals, differs: Reals) -> Reals:
 
 
 class _Flat:
-    """An image flattened by a horizon. Its samples are at low + index / resolution, in pixels of the image's middle."""
+    """An image flattened by a horizon. Its samples are at low + index / resolution, in pixels of the middle."""
 
     def __init__(self, levels: list[Floats], known: Bools, rise: Reals) -> None:
         middle = [(n - 1) / 2 for n in known.shape]

@@ -312,7 +312,7 @@ class Plane:
 
     @classmethod
     def _of_directions(cls, size: tuple[int, ...], points: NDArray[np.float64], name: str, fov: float | None) -> Plane:
-        """Return the plane of two homogeneous vanishing points (2, 3), from the middle, of perpendicular directions."""
+        """Return the plane of perpendicular directions, by their homogeneous vanishing points (2, 3) from the middle."""
         long_ = max(size)
         finite = [abs(p[2]) * 50 * long_ > hypot(p[0], p[1]) for p in points]
         if fov is None and all(finite):
