@@ -67,20 +67,20 @@ def rectify(
     view : PlaneView or Plane, optional
         Position of the plane in the photograph, as far as it is known. The rest is found.
     resolution : float, optional
-        Pixels of the texture for one pixel in the middle of the photograph, 0.05 to 8. By default the mean scale of
-        the photograph.
+        Pixels of the texture for one pixel in the middle of the photograph, 0.05 to 8. Default: the median scale of
+        the visible plane, or less if the flattened plane would be too large.
     size : int or (rows, columns), optional
-        Size of the texture, in pixels. By default the largest sharp rectangle. A larger size is grown by example, and
-        a smaller one is its middle.
+        Size of the texture, in pixels. A larger size than the largest sharp rectangle is grown by example, and a
+        smaller one is its middle. Default: the rectangle.
     wrap : bool or (rows, columns), optional
         Axes along which the texture will be tileable (`texrs.tile`). Default: none.
     seed : int
-        Seed of the growth.
+        Seed of the growth. Default: 0.
     interpolation : {"cubic", "linear", "nearest"}
-        Interpolation between pixels of the photograph.
+        Interpolation between pixels of the photograph. Default: "cubic".
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
-        the work. True shows a bar.
+        the work. True shows a bar. Default: no reports.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def rectify(
         - ``resolution``: Pixels of the texture for one pixel in the middle of the photograph.
         - ``sharp``: Share of the flattened plane that is sharp enough.
         - ``rectangle``: (rows, columns) of the largest sharp rectangle.
-        - ``grown``: How the rest was made, in words.
+        - ``grown``: Method that made the result from the rectangle: ``"nothing"``, ``"tile"`` or ``"design"``.
         - ``wrap``: Whether the result repeats along (rows, columns).
         - ``seed``: The seed.
         - ``interpolation``: Interpolation between pixels of the photograph.
@@ -192,7 +192,7 @@ def _list_points(ground: Bools) -> NDArray[np.intp]:
 
 
 def _choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float:
-    """Return the requested resolution, or the mean resolution of the visible plane."""
+    """Return the requested resolution, or the median scale of the visible plane."""
     width = plane.width(_list_points(ground))
     if np.count_nonzero(width > LEAST) < SMALLEST:
         raise InvalidInput(

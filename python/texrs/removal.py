@@ -71,18 +71,18 @@ def remove(
         least visible. Default: 1/40 of the shorter side, or 1/12 for planes with separate elements. Only pixels that a
         seam encloses change.
     patch_size : int, optional
-        Side of the patches in pixels, as in `texrs.inpaint`.
+        Side of the patches in pixels, 4 to the shorter side, as in `texrs.inpaint`. Default: chosen as there.
     screening : float, optional
         Weight of the values in the colour correction of the filled pixels, as in `texrs.inpaint`. None or 0: no
-        correction.
+        correction. Default: 0.1.
     match_lighting : bool
         If True, slow changes of light are followed, such as towards a window. The light of the source is divided out,
-        and the light of the target is multiplied in.
+        and the light of the target is multiplied in. Default: True.
     seed : int
-        Seed that chooses among the possible results.
+        Seed that chooses among the possible results. Default: 0.
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
-        the work. True shows a bar.
+        the work. True shows a bar. Default: no reports.
 
     Returns
     -------
