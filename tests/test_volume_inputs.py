@@ -268,3 +268,30 @@ def test_an_orientation_that_a_format_does_not_take_over_is_reported(
         lost = "its orientation, origin and unit are not kept" in capsys.readouterr().err
         assert lost is (name != "o.nii")
         np.testing.assert_allclose(tio.read_spacing(tmp_path / name) or 0, (1.6, 0.7, 0.7), rtol=1e-6)
+
+
+def test_calls_use_the_spacing_that_a_file_states(tmp_path):
+    """A field, statistics and comparisons use it, as the command line does; a derived array has none."""
+    path, steps = tmp_path / "balls.nrrd", (1.6, 0.7, 0.7)
+    tio.write_volume(path, texrs.samples.particles((32, 32, 32)).image, spacing=steps)
+    volume = tio.read_volume(path)
+    phase = tmp_path / "phase.nrrd"
+    tio.write_volume(phase, np.asarray(volume[..., 0] > 128, np.uint8), spacing=steps)
+    mask = tio.read_volume(phase)
+    counted = [texrs.volume.component_statistics(m).mean for m in (mask, mask.copy())]
+    assert counted[0] == pytest.approx(counted[1] * np.prod(steps))
+    for measure in (
+        texrs.volume.two_point_correlation,
+        texrs.volume.lineal_path_function,
+        texrs.volume.autocorrelation,
+    ):
+        np.testing.assert_array_equal(measure(mask, 6), measure(mask.copy(), 6, spacing=steps))
+    text = texrs.volume.compare(volume, volume.copy()).text
+    assert text == texrs.volume.compare(volume.copy(), volume.copy(), spacing=steps).text
+    turned = texrs.fields.rotation(30, "yz")
+    made = texrs.solid(volume, 16, field=turned, quality="fast")
+    assert made.report["spacing"] == list(steps)
+    told = texrs.solid(np.array(volume), 16, field=turned, quality="fast", spacing=steps)
+    np.testing.assert_array_equal(made.image, told.image)
+    assert texrs.SolidTexture(volume, quality="fast").spacing == steps
+    assert texrs.solid(np.array(volume), 16, quality="fast").report.get("spacing") is None

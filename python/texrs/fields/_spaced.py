@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_tuple
+from texrs._notices import assume
 from texrs.fields._field import Field
 from texrs.fields._matrices import Matrices
+from texrs.io import _origins
 
-__all__ = ["Spaced", "as_distances", "space"]
+__all__ = ["Spaced", "as_distances", "find_distances", "space"]
 
 _AXES = "(row, column)", "(plane, row, column)"
 
@@ -59,6 +61,20 @@ def space(field: Field, spacing: Sequence[float] | None) -> Field:
     steps = as_distances(spacing, field.axes)
     field._check_steps(steps)
     return field if all(s == 1 for s in steps) else Spaced(field, steps)
+
+
+def find_distances(spacing: Sequence[float] | None, value: object, axes: int) -> Sequence[float] | None:
+    """Return the given distances between voxels, or else those that the file of a volume states, and report these.
+
+    The volume is a path, an array as `texrs.io.read_volume` returned it, or an exemplar made from one of them. None if
+    nothing is stated.
+    """
+    if spacing is not None or axes != 3:
+        return spacing
+    stated, name = _origins.find_spacing(value)
+    if stated is not None and stated != (1.0, 1.0, 1.0):
+        assume(f"{name}: voxels of {' x '.join(f'{s:g}' for s in stated)} (plane, row, column), as the file states")
+    return stated
 
 
 def as_distances(spacing: Sequence[float] | None, axes: int) -> tuple[float, ...]:

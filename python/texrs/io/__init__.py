@@ -295,13 +295,14 @@ def read_volume(
         return _raw.make_raw(name, shape, dtype).read(limit)
     kind = detect_kind(name)
     if kind == "slices":
-        return _series.read_series(name, READ_IMAGES, limit, lambda path, most: read(path, limit=most))
+        slices = _series.read_series(name, READ_IMAGES, limit, lambda path, most: read(path, limit=most))
+        return _origins.mark(slices, name, False)
     if kind not in READERS:
         raise FileError(
             f"{name}: is a {kind} file, which holds one image; "
             "volumes are .npy, .npz, .vti, NRRD, NIfTI, Zarr, .raw, TIFF or folders of numbered slices"
         )
-    return READERS[kind](name, limit)
+    return _origins.mark(READERS[kind](name, limit), name, False)
 
 
 def write(

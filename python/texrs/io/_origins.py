@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import weakref
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from texrs._typing import Array
+from texrs.errors import TexrsError
+from texrs.io._grids import read_spacing
 
 _READ: dict[int, tuple[weakref.ref[Array], str, bool]] = {}
 """By the identity of an array: the array, its file, and whether the file has a palette."""
@@ -31,3 +35,16 @@ def carry(array: object, copy: Array) -> None:
     known = find(array) if isinstance(array, np.ndarray) else None
     if known is not None:
         mark(copy, Path(known[0]), known[1])
+
+
+def find_spacing(value: object) -> tuple[tuple[float, float, float] | None, str]:
+    """Return the distances between voxels that the file of a volume states, and the name of that file.
+
+    The value is a path, an array that was read from a file, or an object whose ``image`` is such an array.
+    """
+    array = value if isinstance(value, np.ndarray) else getattr(value, "image", None)
+    known = find(array) if isinstance(array, np.ndarray) else None
+    path = os.fspath(value) if isinstance(value, str | os.PathLike) else "" if known is None else known[0]
+    with suppress(TexrsError):  # The file may be gone. Its reader reports files that are not readable.
+        return (read_spacing(path), os.path.basename(path)) if path else (None, "")
+    return None, ""

@@ -14,7 +14,7 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.fields import Field
-from texrs.fields._spaced import space
+from texrs.fields._spaced import find_distances, space
 from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
 from texrs.volume._values import check_field, guess_axes, turn_in_space
@@ -175,7 +175,8 @@ def compare(
         Number of axes, 2 or 3. By default from the shape: up to 4 along the last of three axes are channels.
     spacing : sequence of float, optional
         Distances between samples along each axis, for both. Correlations, paths, sizes and orientations are then in
-        space, and the field is in space. Frequencies stay in samples. Default: 1.
+        space, and the field is in space. Frequencies stay in samples. Default: the spacing that the file of the
+        exemplar states, else 1.
 
     Returns
     -------
@@ -199,6 +200,7 @@ def compare(
     known = 3 if axes is None else as_int(axes, "axes", 2, 3)
     first, second = as_ndarray(exemplar, "exemplar", axes=known), as_ndarray(output, "output", axes=known)
     count = as_int(guess_axes(first) if axes is None else axes, "axes", 2, 3)
+    spacing = find_distances(spacing, exemplar, count)
     first, second = (as_image(a, n, minimum=16, axes=count) for a, n in ((first, "exemplar"), (second, "output")))
     if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
         raise InvalidInput(

@@ -17,7 +17,7 @@ from texrs._arrays import as_int
 from texrs._show import brief
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.fields._spaced import as_distances
+from texrs.fields._spaced import as_distances, find_distances
 from texrs.volume._values import as_colours, as_region, by_distance, correlate, drop_first, drop_last
 
 __all__ = [
@@ -262,7 +262,8 @@ def two_point_correlation(
         Longest step in pixels, at least 1. Steps longer than a side give NaN.
     spacing : sequence of float, optional
         Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
-        interpolated between steps. Default: 1.
+        interpolated between steps. Default: the spacing that the file of the volume
+        states, else 1.
 
     Returns
     -------
@@ -283,7 +284,8 @@ def two_point_correlation(
     array([0.5 , 0.26, 0.  , 0.24, 0.5 ])
 
     """
-    return by_distance(correlate(as_region(mask), as_int(reach, "reach", 1, 2**20), np.logical_and), spacing)
+    phase, far = as_region(mask), as_int(reach, "reach", 1, 2**20)
+    return by_distance(correlate(phase, far, np.logical_and), find_distances(spacing, mask, phase.ndim))
 
 
 def lineal_path_function(
@@ -299,7 +301,8 @@ def lineal_path_function(
         Longest step in pixels, at least 1. Steps longer than a side give NaN.
     spacing : sequence of float, optional
         Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
-        interpolated between steps. Default: 1.
+        interpolated between steps. Default: the spacing that the file of the volume
+        states, else 1.
 
     Returns
     -------
@@ -327,7 +330,7 @@ def lineal_path_function(
             if step:
                 path = drop_last(path, axis, 1) & drop_first(phase, axis, step)
             out[axis, step] = path.mean()
-    return by_distance(out, spacing)
+    return by_distance(out, find_distances(spacing, mask, phase.ndim))
 
 
 def component_statistics(
@@ -342,7 +345,8 @@ def component_statistics(
     least : int
         Minimum size of a piece in pixels or voxels, at least 1. Smaller pieces are grain and are not counted.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Sizes and the density are then in its unit. Default: 1.
+        Distances between samples along each axis. Sizes and the density are then in its unit. Default: the spacing
+        that the file of the volume states, else 1.
 
     Returns
     -------
@@ -367,7 +371,7 @@ def component_statistics(
     phase, low = as_region(mask), as_int(least, "least", 1, 2**40)
     pieces, count = label(phase)
     sizes: NDArray[Any] = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
-    cell = float(np.prod(as_distances(spacing, phase.ndim)))
+    cell = float(np.prod(as_distances(find_distances(spacing, mask, phase.ndim), phase.ndim)))
     sizes = sizes[sizes >= low] * cell
     if not len(sizes):
         return ComponentStatistics(0, 0.0, np.nan, np.nan, (np.nan,) * 9)

@@ -15,7 +15,7 @@ from texrs._arrays import as_bool, as_float, as_int, as_wrap, try_array
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
-from texrs.fields._spaced import as_distances, space
+from texrs.fields._spaced import as_distances, find_distances, space
 from texrs.volume._values import as_values, by_distance, check_field, correlate, drop_first, drop_last, turn_in_space
 
 __all__ = [
@@ -45,7 +45,8 @@ def autocorrelation(
         Longest step in pixels, at least 1. Steps longer than a side give NaN.
     spacing : sequence of float, optional
         Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
-        interpolated between steps. Default: 1.
+        interpolated between steps. Default: the spacing that the file of the volume
+        states, else 1.
 
     Returns
     -------
@@ -69,7 +70,7 @@ def autocorrelation(
     v, far = as_values(values), as_int(reach, "reach", 1, 2**20)
     v = v - v.mean(dtype=np.float64)
     variance = max(float((v * v).mean(dtype=np.float64)), 1e-30)
-    return by_distance(correlate(v, far, np.multiply) / variance, spacing)
+    return by_distance(correlate(v, far, np.multiply) / variance, find_distances(spacing, values, v.ndim))
 
 
 def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = False) -> float:
@@ -247,7 +248,8 @@ def texture_normal(values: ArrayLike, *, spacing: Sequence[float] | None = None)
     values : array_like
         Values (H, W) or (D, H, W), such as a `lightness`.
     spacing : sequence of float, optional
-        Distances between samples along each axis. The direction is in space. Default: 1.
+        Distances between samples along each axis. The direction is in space. Default: the spacing that the file of the
+        volume states, else 1.
 
     Returns
     -------
@@ -267,7 +269,8 @@ def texture_normal(values: ArrayLike, *, spacing: Sequence[float] | None = None)
     True
 
     """
-    tensor = _measure_structure(as_values(values), 0.0, spacing)
+    v = as_values(values)
+    tensor = _measure_structure(v, 0.0, find_distances(spacing, values, v.ndim))
     if not np.isfinite(tensor).all():
         raise InvalidInput("values: are so large that their products are infinite")
     vectors = np.linalg.eigh(tensor.reshape(-1, *tensor.shape[-2:]).mean(axis=0))[1]
@@ -302,7 +305,8 @@ def orientation_errors(
     step : int
         Distance in pixels between measured points along each axis.
     spacing : sequence of float, optional
-        Distances between samples along each axis. The field, the normal and the angles are in space. Default: 1.
+        Distances between samples along each axis. The field, the normal and the angles are in space. Default: the
+        spacing that the file of the volume states, else 1.
 
     Returns
     -------
@@ -327,7 +331,7 @@ def orientation_errors(
     each = as_int(step, "step", 1, 2**20)
     if min(v.shape) <= 2 * edge:
         raise InvalidInput(f"margin: {edge} on both sides leaves nothing of {v.shape}")
-    turned = check_field(field, v.ndim)
+    turned, spacing = check_field(field, v.ndim), find_distances(spacing, values, v.ndim)
     turned = None if turned is None else space(turned, spacing)
     n = texture_normal(v, spacing=spacing) if normal is None else try_array(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:

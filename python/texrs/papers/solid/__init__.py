@@ -135,8 +135,8 @@ def solid(
         nearest sample.
     spacing : (plane, row, column) float, optional
         Voxel size along each axis of the exemplar and of the result, in any unit. The field rotates and scales the
-        texture in space, not in voxels, and its places and lengths are in this unit. Default: voxels are cubes of side
-        1.
+        texture in space, not in voxels, and its places and lengths are in this unit. Default: the spacing that the
+        exemplar's file states, else 1.
     memory_limit : int, optional
         Maximum bytes of the work. By default the limits in force (`texrs.limits`).
     progress : callable or True, optional

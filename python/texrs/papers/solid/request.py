@@ -16,7 +16,7 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field, FieldLike
 from texrs.fields import as_field as make_field
-from texrs.fields._spaced import as_distances
+from texrs.fields._spaced import as_distances, find_distances
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.materials import Material
 from texrs.papers.solid.memory_check import LARGER, check_region
@@ -92,6 +92,7 @@ class Request:
         spacing: Sequence[float] | None = None,
     ) -> Request:
         """Return the checked arguments of a call, or raise an error."""
+        spacing = find_distances(spacing, exemplar, axes)
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
         region = Region.whole(as_size(size, axes=axes, way=LARGER[axes]), as_wrap(wrap, axes=axes, usual=False))
         as_method(method, None, "paper", "paper-compensated")

@@ -21,7 +21,7 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field, FieldLike
 from texrs.fields._field import as_points
-from texrs.fields._spaced import as_distances
+from texrs.fields._spaced import as_distances, find_distances
 from texrs.growth import Windows
 from texrs.growth.engine import Places
 from texrs.kernels.gather import gather
@@ -61,6 +61,7 @@ class Texture(Endless):
         cache_bytes: int = 256 << 20,
         memory_limit: int | None = None,
     ) -> None:
+        spacing = find_distances(spacing, exemplar, self.axes)
         self._material = exemplar if isinstance(exemplar, Material) else None
         shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
         known = as_exemplar(shown, axes=self.axes, minimum=COARSEST)

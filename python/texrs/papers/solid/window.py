@@ -98,7 +98,8 @@ class SolidTexture(Texture):
         Interpolation between the exemplar's samples. None is "cubic". Labels always use the nearest sample.
     spacing : (plane, row, column) float, optional
         Voxel size along each axis, in any unit. The field rotates in space, where voxels need not be cubes. Its places
-        and lengths are in the same unit. Windows and points stay in voxels. Default: 1.
+        and lengths are in the same unit. Windows and points stay in voxels. Default: the spacing that
+        the exemplar's file states, else 1.
     cache_bytes : int
         Memory for finished parts in bytes, 0 or more. Neighbours of computed parts are then cheap.
     memory_limit : int, optional
