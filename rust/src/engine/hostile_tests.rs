@@ -1,4 +1,4 @@
-//! Whatever numbers a caller passes, the engine returns places or an error: no panic, and nothing that overflows.
+//! Extreme arguments: for all numbers, the engine returns places or an error, without a panic or an overflow.
 
 use proptest::prelude::*;
 
@@ -42,15 +42,17 @@ fn exemplar<const D: usize>(wrap: bool) -> Appearance<D> {
     Appearance::new(&colours, grid, 1, 1).unwrap()
 }
 
-/// Mostly what is usual, sometimes one of what is not.
+/// Draws mostly usual numbers, sometimes a huge one.
 fn count(usual: std::ops::Range<usize>) -> impl Strategy<Value = usize> {
     prop_oneof![6 => usual, 1 => prop::sample::select(HUGE.to_vec())]
 }
 
+/// Draws mostly usual costs, sometimes an extreme one.
 fn real() -> impl Strategy<Value = f64> {
     prop_oneof![6 => 0.0..2.0, 1 => prop::sample::select(ODD.to_vec())]
 }
 
+/// Draws origins, some of them near the ends of the allowed range.
 fn origin() -> impl Strategy<Value = i32> {
     prop_oneof![
         4 => -20..20,
@@ -72,6 +74,7 @@ fn numbers() -> impl Strategy<Value = Numbers> {
     )
 }
 
+/// Creates a region from numbers.
 fn region<const D: usize>(numbers: &Numbers) -> Result<Region<D>> {
     let (shape, origin, wrap) = numbers;
     let grid = Grid::new(
@@ -79,14 +82,14 @@ fn region<const D: usize>(numbers: &Numbers) -> Result<Region<D>> {
         std::array::from_fn(|a| wrap[a]),
     )?;
     let region = Region::new(grid, std::array::from_fn(|a| origin[a]))?;
-    // What is allowed but large would only take long.
+    // Skip large regions: they are valid, but would take long.
     if region.grid.len() > 4096 {
         return Err(Error::value("shape", "not tried"));
     }
     Ok(region)
 }
 
-/// Places of all kinds, and frames: one or one a point, of any numbers.
+/// Draws places and frames with arbitrary numbers. There is one frame, or one for each point.
 fn draw<const D: usize>(region: &Region<D>, seed: u64) -> (Vec<Place<D>>, Vec<[[i16; D]; D]>) {
     let (points, noise) = (region.grid.len().min(1000), Noise::new(seed));
     let word = |i: usize, k: usize| noise.words([i as u32, k as u32, 0, 0])[0];
@@ -212,7 +215,7 @@ proptest! {
         let options = blocks::Options {
             cell, rounds: rounds.min(1 << 20), candidates, contrast, continuation, repetition, seed, margin,
         };
-        // Only the errors are of interest where the work would be long.
+        // Skip valid options that would take long; only errors matter there.
         if rounds.saturating_mul(candidates) < 100 || rounds > 1 << 15 || candidates > 1 << 15 {
             let _ = start::<2>(&place, &options, wrap, plain);
             let _ = start::<3>(&place, &options, wrap, plain);
@@ -310,7 +313,7 @@ fn exemplars_that_places_cannot_address_are_refused() {
         let grid = Grid::new([9; 2], [false; 2]).unwrap();
         assert!(Appearance::new(&[0.5; 81], grid, 1, radius).is_err());
     }
-    // The number of samples times channels comes round to none.
+    // The number of samples times channels overflows to zero.
     let grid = Grid::new([1 << 31, 1 << 31], [true; 2]).unwrap();
     assert!(Appearance::new(&[], grid, 4, 1).is_err());
 }

@@ -110,7 +110,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             Frames::Dense(_) => None,
         };
         let classes = self.classes();
-        // The turn in which each point last changed, counted from 1.
+        // Number of each point's last turn with a change, counted from 1; 0 before.
         let mut changed = vec![0u32; places.len()];
         let turns = self.options.passes << D;
         monitor.expect(turns as u64);

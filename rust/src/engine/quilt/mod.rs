@@ -1,14 +1,16 @@
-//! A quilt in the making: patches cut in one by one, each the one that shows and repeats the least.
+//! Image quilting: patches are cut in one by one, each chosen for an invisible seam and little repetition.
 //!
-//! Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001. For each window in turn:
+//! The method is by Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001. For each
+//! window in turn:
 //!
-//! 1. *pool*: the places that fit what is there already best, looked for at half the size (`pool`);
-//! 2. *charge*: each for what others show already, and for going on with what lies beside it (`penalties`);
-//! 3. *refine*: the best few, to the pixel;
-//! 4. *cut*: all of these are cut in by the stitcher, and the cheapest stays.
+//! 1. *pool*: find the places that fit the present content best, at half the size (`pool`);
+//! 2. *charge*: add a penalty if other patches show the same place, or if the patch continues its neighbour exactly
+//!    (`penalties`);
+//! 3. *refine*: improve the best few to the exact pixel;
+//! 4. *cut*: let the stitcher cut in each of them, and keep the cheapest.
 //!
-//! Departures are told where the verb is, `texrs.quilting`. Windows of a wave lie apart and are chosen side by side, each as if it
-//! were the first of them.
+//! The documentation of `texrs.quilting` lists the departures from the paper. The windows of a wave do not overlap.
+//! They are chosen in parallel, from the texture before the wave.
 
 mod penalties;
 mod pool;
@@ -25,53 +27,53 @@ use pool::halve;
 use window::Around;
 pub use window::{Span, Window};
 
-/// A pixel that shows nothing yet.
+/// The place of a pixel that shows nothing yet.
 const FREE: u32 = u32::MAX;
-/// Matches of the pool that are cut in.
+/// Number of matches of the pool that are cut in.
 const CANDIDATES: usize = 3;
-/// Use is counted in cells of so many pixels a side, and overlaps are compared on as many rows and columns.
+/// Side in pixels of the cells whose use is counted. Overlaps are compared at the same spacing.
 const CELL: usize = 8;
 
-/// A picture that patches are taken from.
+/// An image that patches are taken from, such as the exemplar or its mirror image.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// `rows * columns * channels` colours.
+    /// The colours, `rows * columns * channels`.
     pub colours: Vec<f32>,
-    /// Rows and columns.
+    /// Number of rows and columns.
     pub shape: [usize; 2],
-    /// The lattice that it repeats on, a shift (row, column) in each column, where the texture has it too.
+    /// The lattice that the image repeats on, if the texture keeps it. Each column is a shift (row, column).
     pub lattice: Option<[[f64; 2]; 2]>,
 }
 
-/// What is known of the pixels of all pictures, which stand in one row.
+/// Properties of the pixels of all images, concatenated.
 #[derive(Debug, Clone)]
 pub struct Pixels {
-    /// From which exemplar each comes.
+    /// Index of the exemplar that each pixel is from.
     pub exemplar: Vec<u16>,
-    /// From where.
+    /// Coordinates of each pixel in that exemplar.
     pub coordinates: Vec<[f32; 2]>,
-    /// Whether it shows the exemplar, and not its mirror image.
+    /// True if a pixel shows the exemplar itself, false if it shows a mirror image.
     pub hands: Vec<bool>,
-    /// Number of the cell of the exemplars that it shows.
+    /// Number of the exemplar cell that each pixel is in.
     pub cells: Vec<u32>,
 }
 
-/// What a quilt is asked for.
+/// Options of a quilt.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// Rows and columns of the texture.
     pub size: [usize; 2],
-    /// Along which axes it is cyclic.
+    /// True for each periodic axis.
     pub wrap: [bool; 2],
     /// Rows and columns of all patches.
     pub patch: [usize; 2],
-    /// Whether the pictures repeat on a lattice.
+    /// If true, the images repeat on a lattice.
     pub regular: bool,
-    /// The axis along which patches keep the places that they have in the pictures.
+    /// The axis along which patches keep their coordinates from the images. By default none.
     pub fixed: Option<usize>,
 }
 
-/// The texture in the making.
+/// A texture that is being quilted.
 pub struct Quilt<'a> {
     options: Options,
     samples: &'a Samples,
@@ -79,24 +81,24 @@ pub struct Quilt<'a> {
     pixels: Pixels,
     channels: usize,
     whole: Index,
-    /// At half the size; where an axis is fixed all places are compared exactly.
+    /// The images at half the size. None if an axis is fixed: then all places are compared exactly.
     half: Option<Index>,
-    /// The place in the row that each pixel shows, or [`FREE`].
+    /// The position of the pixel that each pixel shows among those of all images, or [`FREE`].
     place: Vec<u32>,
     label: Vec<u32>,
     seams: Vec<[f32; 2]>,
-    /// Patches that show each cell.
+    /// Number of patches that show each cell.
     used: Vec<u32>,
     pastes: u32,
 }
 
-/// What is known of a picture beside its colours.
+/// Properties of an image except its colours.
 struct Place {
     shape: [usize; 2],
-    /// Where it begins in the row.
+    /// Position of its first pixel among those of all images.
     first: usize,
     lattice: Option<[[f64; 2]; 2]>,
-    /// From where in it to where in the texture its first patch has gone.
+    /// Offset from the place of its first patch in the image to the place in the texture.
     step: Option<[f64; 2]>,
 }
 
@@ -108,10 +110,10 @@ struct Chosen {
 }
 
 impl<'a> Quilt<'a> {
-    /// An empty texture.
+    /// Creates an empty texture.
     ///
     /// # Errors
-    /// Pictures that patches do not fit into, or arrays of other sizes than theirs.
+    /// Returns an error if patches do not fit into an image, or if the sizes of arrays do not match.
     pub fn new(
         pictures: Vec<Picture>,
         pixels: Pixels,
@@ -121,7 +123,10 @@ impl<'a> Quilt<'a> {
         let points = memory::product("size", &options.size)?;
         let count: usize = pictures.iter().map(|p| p.shape[0] * p.shape[1]).sum();
         let Some(first) = pictures.first().filter(|p| !p.colours.is_empty()) else {
-            return Err(Error::value("pictures", "needs one at least"));
+            return Err(Error::value(
+                "pictures",
+                "must contain at least one image with pixels, got none",
+            ));
         };
         let channels = first.colours.len() / (first.shape[0] * first.shape[1]).max(1);
         memory::room("a quilt", points, 20)?;
@@ -137,17 +142,21 @@ impl<'a> Quilt<'a> {
         }
         let fits = |p: &Picture| (0..2).all(|a| (1..=p.shape[a]).contains(&options.patch[a]));
         if let Some(bad) = pictures.iter().find(|p| !fits(p)) {
-            let message = format!("{:?} does not fit into {:?}", options.patch, bad.shape);
+            let message = format!(
+                "must be from 1 to {1:?} on each side, got {0:?}",
+                options.patch, bad.shape
+            );
             return Err(Error::value("patch", message));
         }
         if options.fixed.is_some_and(|axis| axis > 1) {
-            return Err(Error::value("fixed", "an axis, 0 or 1, is allowed"));
+            return Err(Error::value("fixed", "must be axis 0 or 1"));
         }
         let exemplar = |data: Vec<f32>, shape| Exemplar {
             data: data.into(),
             shape,
             allowed: None,
         };
+        // Build the search index at half the size, where a search costs much less.
         let half = match options.fixed {
             Some(_) => None,
             None => {
@@ -159,6 +168,7 @@ impl<'a> Quilt<'a> {
                 Some(Index::new(smaller.collect(), channels, patch)?)
             }
         };
+        // Concatenate the images.
         let mut begin = 0;
         let mut places = Vec::new();
         let mut exemplars = Vec::new();
@@ -189,16 +199,19 @@ impl<'a> Quilt<'a> {
         })
     }
 
-    /// Lays a patch, whole: the first one.
+    /// Copies the first patch, without a cut.
     ///
     /// # Errors
-    /// A window that does not fit, or a place at which there is no such patch.
+    /// Returns an error if the window does not fit, or if there is not such a patch at the place.
     pub fn lay_first(&mut self, window: &Window, picture: usize, at: [usize; 2]) -> Result<()> {
         self.check(window)?;
         let patch = self.options.patch;
         let there = self.pictures.get(picture);
         if !there.is_some_and(|p| (0..2).all(|a| at[a] + patch[a] <= p.shape[a])) {
-            return Err(Error::value("place", format!("no patch lies at {at:?}")));
+            return Err(Error::value(
+                "place",
+                format!("must leave room for a patch of {patch:?}, got {at:?}"),
+            ));
         }
         let found = Match {
             cost: 0.0,
@@ -210,10 +223,10 @@ impl<'a> Quilt<'a> {
         Ok(())
     }
 
-    /// Cuts a patch into each window of some waves.
+    /// Cuts a patch into each window of the waves.
     ///
     /// # Errors
-    /// A window that does not fit, or a monitor that was cancelled.
+    /// Returns an error if a window does not fit, or if the monitor was cancelled.
     pub fn paste(&mut self, waves: &[Vec<Window>], monitor: &Monitor) -> Result<()> {
         monitor.expect(waves.len() as u64);
         for wave in waves {
@@ -225,6 +238,7 @@ impl<'a> Quilt<'a> {
                     around,
                     pasted,
                 } = chosen?;
+                // Write the results in order, after all windows of the wave have chosen.
                 let (bounds, size) = (&around.bounds, self.options.size);
                 for (i, seam) in bounds.points(size).zip(&pasted.seams) {
                     self.seams[i] = *seam;
@@ -241,20 +255,24 @@ impl<'a> Quilt<'a> {
         Ok(())
     }
 
-    /// The place in the row that each pixel shows, and the number of the patch.
+    /// Returns the pixel that each pixel shows, as a position among those of all images, and the number of its patch.
     pub fn into_map(self) -> (Vec<u32>, Vec<u32>) {
         (self.place, self.label)
     }
 
+    /// Returns an error if a window does not fit.
     fn check(&self, window: &Window) -> Result<()> {
         if window.fits(self.options.size, self.options.patch) {
             return Ok(());
         }
-        let message = format!("{window:?} is none of a texture of {:?}", self.options.size);
+        let message = format!(
+            "must contain windows that fit into a texture of {:?}, got {window:?}",
+            self.options.size
+        );
         Err(Error::value("waves", message))
     }
 
-    /// The places in the row that a match copies: of each `step`-th row and column.
+    /// Returns the positions of the pixels that a match copies, in each `step`-th row and column.
     fn places(&self, found: &Match, step: usize) -> impl Iterator<Item = u32> + use<'_> {
         let picture = &self.pictures[found.exemplar];
         let (width, [rows, columns]) = (picture.shape[1], self.options.patch);
@@ -265,11 +283,12 @@ impl<'a> Quilt<'a> {
         })
     }
 
-    /// Lays a patch, or what of it is taken.
+    /// Copies the pixels of a patch that are taken.
     fn lay(&mut self, window: &Window, found: &Match, take: impl Fn(usize) -> bool) {
         let corner = window.corner();
         let step = [found.row, found.column];
         let step = [0, 1].map(|a| corner[a] as f64 - step[a] as f64);
+        // The first patch of an image fixes the lattice that the others should agree with.
         self.pictures[found.exemplar].step.get_or_insert(step);
         let places: Vec<u32> = self.places(found, 1).collect();
         let points = window.bounds().points(self.options.size);
@@ -279,6 +298,7 @@ impl<'a> Quilt<'a> {
                 self.label[i] = self.pastes;
             }
         }
+        // Count the use of each cell once for each patch.
         let mut cells: Vec<u32> = self
             .places(found, CELL)
             .map(|place| self.pixels.cells[place as usize])
@@ -291,7 +311,8 @@ impl<'a> Quilt<'a> {
         self.pastes += 1;
     }
 
-    /// Cuts the most promising matches into what is there, and returns the one that shows and repeats the least.
+    /// Cuts the most promising matches into the present content. Returns the one with the least visible seam and the
+    /// least repetition.
     fn choose(&self, window: &Window, monitor: &Monitor) -> Result<Chosen> {
         let bounds = window.bounds();
         let old: Vec<u32> = bounds
@@ -301,10 +322,12 @@ impl<'a> Quilt<'a> {
         let known = window.known();
         let colours = self.colours(&old);
         let pool = self.find_pool(&colours, &known, window, monitor)?;
+        // Choose the candidates by misfit and penalty, and improve them to the exact pixel.
         let mut penalties = Penalties::of(self, window, &pool, &old, &known);
         let best = penalties.promising(CANDIDATES);
         let matches: Vec<Match> = best.iter().map(|&k| pool[k]).collect();
         let exact = self.refine(&matches, &colours, &known)?;
+        // Let the stitcher cut each candidate in, with a margin of one pixel for the gradients.
         let around = window.around(self.options.size, self.options.wrap);
         let points: Vec<usize> = around.bounds.points(self.options.size).collect();
         let shown: Vec<u32> = points.iter().map(|&i| self.place[i]).collect();
@@ -332,7 +355,7 @@ impl<'a> Quilt<'a> {
         })
     }
 
-    /// What each pixel of a window and beside it would show of a match; beside the match the first sample of all.
+    /// Returns the position of the pixel that a match copies to each pixel of the bounds. Outside the window it is 0.
     fn spread(&self, found: &Match, around: &Around) -> Vec<u32> {
         let [_, width] = around.bounds.shape();
         let [top, left] = around.inner;
@@ -344,7 +367,7 @@ impl<'a> Quilt<'a> {
         all
     }
 
-    /// The colours of places; of those that are free any.
+    /// Returns the colours of places. Free places get an arbitrary colour.
     fn colours(&self, places: &[u32]) -> Vec<f32> {
         let last = self.pixels.cells.len() - 1;
         let mut colours = Vec::with_capacity(places.len() * self.channels);
@@ -354,6 +377,7 @@ impl<'a> Quilt<'a> {
         colours
     }
 
+    /// Returns the colour of a pixel, by its position among those of all images.
     fn colour(&self, place: usize) -> &[f32] {
         let which = self.pictures.partition_point(|p| p.first <= place) - 1;
         let at = (place - self.pictures[which].first) * self.channels;

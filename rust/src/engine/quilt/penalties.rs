@@ -1,29 +1,32 @@
-//! What matches are charged for beside what they do not fit.
+//! The penalties of matches, which are added to the costs of their misfit.
 
 use super::{CELL, Quilt, Window};
 use crate::kernels::patch_search::Match;
 
-/// Charge for showing what all other patches show, in units of a match that is better than all but this share: where few
-/// places fit, as between things on plain ground, others would tear what they are put on. And on a lattice, where all places are
-/// much alike and must meet exactly, in units of a typical match.
+/// Penalty of a patch that shows the same as all other patches, in units of a good match. Few places fit if elements
+/// are on a plain background, and a patch from elsewhere would cut them.
 const REPETITION: f64 = 10.0;
+/// Share of matches that count as good.
 const GOOD: f64 = 0.1;
+/// The same penalty on a lattice, in units of a typical match: all places are similar there, and must meet exactly.
 const ON_LATTICE: f64 = 2.5;
-/// Charge for going on with the piece of the exemplar that lies there already, in units of a typical match.
+/// Penalty of a patch that continues the patch of the exemplar next to it, in units of a typical match.
 const CONTINUATION: f64 = 2.0;
-/// How far a patch of what repeats on a lattice may be out of step, in shifts of the lattice, and by what factor a match that is
-/// in step may be worse: where a lattice is only about regular, what fits is more than what is in step.
+/// Largest deviation of a patch from the lattice, in units of the lattice's shorter shift.
 const IN_STEP: f64 = 0.15;
+/// Largest cost of the matches that agree with the lattice, as a factor of the best cost. If a lattice is irregular,
+/// the fit is more important.
 const AS_WELL: f64 = 1.3;
-/// Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels: a cell, or the axis
-/// of a mirror could lie between two lines that are compared.
+/// Largest share of the overlap where a patch may show the mirror image of the present content.
 const MIRRORED: f64 = 0.02;
+/// Distance in pixels within which two pixels count as the same place. It is a cell, because the axis of a mirror may
+/// be between two lines that are compared.
 const NEAR: f32 = 8.0;
 
-/// The penalties of a pool of matches, and which of them may be taken.
+/// The penalties of a pool of matches, and the matches that are allowed.
 pub(super) struct Penalties {
     costs: Vec<f64>,
-    /// A typical match.
+    /// Cost of a typical match.
     usual: f64,
     penalties: Vec<f64>,
     free: Vec<usize>,
@@ -31,6 +34,7 @@ pub(super) struct Penalties {
 }
 
 impl Penalties {
+    /// Computes the penalties of a pool.
     pub(super) fn of(
         quilt: &Quilt<'_>,
         window: &Window,
@@ -44,12 +48,13 @@ impl Penalties {
         sorted.sort_by(f64::total_cmp);
         let [good, usual] = [GOOD, 0.5].map(|share| quantile(&sorted, share));
         let usual = if usual == 0.0 { 1.0 } else { usual };
+        // Express the repetition penalty in units of a typical match as well.
         let unit = if regular {
             ON_LATTICE
         } else {
             REPETITION * (if good == 0.0 { usual } else { good }) / usual
         };
-        // The samples that are looked at: which of them are known, and what they show.
+        // Sample the window at the spacing of cells, and find the pixels that are shown there.
         let [rows, columns] = window.shape();
         let looked = || {
             let lines = (0..rows).step_by(CELL);
@@ -61,6 +66,7 @@ impl Penalties {
         let mut turned = Vec::with_capacity(pool.len());
         for m in pool {
             let (mut used, mut alike, mut mirrored) = (0u64, 0u32, 0u32);
+            // Compare the match with the present content where both are known.
             for (here, &there) in quilt.places(m, CELL).zip(&seen) {
                 used += u64::from(quilt.used[quilt.pixels.cells[here as usize] as usize]);
                 let Some(there) = there else { continue };
@@ -74,6 +80,7 @@ impl Penalties {
             penalties.push(unit * repetition + CONTINUATION * (f64::from(alike) / count));
             turned.push(f64::from(mirrored) / count);
         }
+        // Exclude matches that mirror their surroundings, if there are others.
         let mut free: Vec<usize> = (0..pool.len()).filter(|&k| turned[k] <= MIRRORED).collect();
         if free.is_empty() {
             free = (0..pool.len()).collect();
@@ -87,7 +94,7 @@ impl Penalties {
         }
     }
 
-    /// The most promising matches, the best first.
+    /// Returns the most promising matches, the best first.
     pub(super) fn promising(&self, count: usize) -> Vec<usize> {
         let merit = |k: usize| self.costs[k] / self.usual + self.penalties[k];
         let mut best = self.free.clone();
@@ -96,8 +103,8 @@ impl Penalties {
         best
     }
 
-    /// From here on what a match does not fit is charged too, where a seam through plain ground would not tell a place that is
-    /// out of step.
+    /// Adds the misfit of matches to their penalties if the images repeat on a lattice. There a seam through a plain
+    /// background does not reveal a patch that deviates from the lattice.
     pub(super) fn finish(&mut self) {
         if self.regular {
             for (charge, cost) in self.penalties.iter_mut().zip(&self.costs) {
@@ -106,7 +113,7 @@ impl Penalties {
         }
     }
 
-    /// Which of some matches shows and repeats the least, whose seams cost so much.
+    /// Returns the match with the least visible seam and the least repetition, from the costs of seams.
     pub(super) fn cheapest(&self, matches: &[usize], seams: &[f64]) -> usize {
         let mut sorted = seams.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -129,7 +136,7 @@ impl Penalties {
 }
 
 impl Quilt<'_> {
-    /// Whether two places show nearly the same place of an exemplar.
+    /// Returns whether two pixels are from nearly the same place of an exemplar.
     fn is_near(&self, here: u32, there: u32) -> bool {
         let last = self.pixels.cells.len() - 1;
         let [a, b] = [here, there].map(|place| (place as usize).min(last));
@@ -140,13 +147,14 @@ impl Quilt<'_> {
             && (p[1] - q[1]).abs() <= NEAR
     }
 
+    /// Returns whether both pixels show an exemplar itself, or both a mirror image.
     fn is_of_one_hand(&self, here: u32, there: u32) -> bool {
         let hands = &self.pixels.hands;
         hands[here as usize] == hands[(there as usize).min(hands.len() - 1)]
     }
 }
 
-/// Those of some matches that are in step with what their pictures show elsewhere, if these match as well.
+/// Keeps only the matches that agree with the lattice of their image, if their costs are not much higher.
 fn keep_in_step(
     quilt: &Quilt<'_>,
     pool: &[Match],
@@ -179,7 +187,7 @@ fn keep_in_step(
     }
 }
 
-/// How far a step is from the next shift of a lattice, in units of its shorter shift.
+/// Returns the distance of a step from the nearest lattice shift, in units of the lattice's shorter shift.
 fn out_of_step(lattice: &[[f64; 2]; 2], moved: [f64; 2]) -> f64 {
     let [[a, b], [c, d]] = *lattice;
     let whole = a * d - b * c;
@@ -187,7 +195,7 @@ fn out_of_step(lattice: &[[f64; 2]; 2], moved: [f64; 2]) -> f64 {
         (d * moved[0] - b * moved[1]) / whole,
         (a * moved[1] - c * moved[0]) / whole,
     ];
-    // The nearest shift is one of the four around.
+    // The nearest lattice shift is one of the four around the step.
     let mut rest = f64::INFINITY;
     for [i, j] in [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]] {
         let shift = [times[0].floor() + i, times[1].floor() + j];
@@ -200,11 +208,12 @@ fn out_of_step(lattice: &[[f64; 2]; 2], moved: [f64; 2]) -> f64 {
     rest / norm([a, c]).min(norm([b, d]))
 }
 
+/// Returns the length of a vector.
 fn norm([x, y]: [f64; 2]) -> f64 {
     (x * x + y * y).sqrt()
 }
 
-/// The value below which a share of others lies that are sorted, as NumPy has it.
+/// Returns a quantile of sorted values, with linear interpolation as in NumPy.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let at = (sorted.len() - 1) as f64 * share;
     let low = at.floor() as usize;

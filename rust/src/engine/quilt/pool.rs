@@ -1,15 +1,15 @@
-//! What fits where a patch is to lie: looked for at half the size, then exactly around the few that are taken.
+//! The search for matches of a window: first at half the size, then exactly around the best few.
 
 use super::{Quilt, Window};
 use crate::Result;
 use crate::foundation::par::Monitor;
 use crate::kernels::patch_search::{Match, Pick, Query};
 
-/// Matches that are looked at for what they repeat; more on a lattice, where many are out of step.
+/// Number of matches whose penalties are computed. A lattice needs more, because many matches deviate from it.
 const POOL: [usize; 2] = [48, 96];
 
 impl Quilt<'_> {
-    /// Matches of a patch that are apart, to within a pixel.
+    /// Finds matches that are some distance apart, each exact to a pixel.
     pub(super) fn find_pool(
         &self,
         colours: &[f32],
@@ -23,6 +23,7 @@ impl Quilt<'_> {
             return self.compare_all(colours, known, window, count);
         };
         let smaller = halve(colours, shape, self.channels);
+        // A smaller pixel counts only if all four of its pixels are known.
         let weight = halve(&weigh(known), shape, 1);
         let weight: Vec<f32> = weight
             .iter()
@@ -39,6 +40,7 @@ impl Quilt<'_> {
             ratio: f64::INFINITY,
         };
         let mut pool = half.best(&query, &pick, monitor)?;
+        // Return to the full size. The position is then exact to a pixel.
         for m in &mut pool {
             let most = self.most(m.exemplar);
             m.row = (2 * m.row).min(most[0]);
@@ -47,13 +49,13 @@ impl Quilt<'_> {
         Ok(pool)
     }
 
-    /// The last place of a patch in a picture.
+    /// Returns the last place of a patch in an image.
     fn most(&self, picture: usize) -> [usize; 2] {
         let shape = self.pictures[picture].shape;
         [0, 1].map(|a| shape[a] - self.options.patch[a])
     }
 
-    /// The best matches of a patch that keeps its place along the fixed axis.
+    /// Returns the best matches of a patch that keeps its coordinate along the fixed axis.
     fn compare_all(
         &self,
         colours: &[f32],
@@ -83,6 +85,7 @@ impl Quilt<'_> {
             .best_among(&self.query(colours, &weight), &every, &pick)
     }
 
+    /// Returns a query at the full size.
     fn query<'a>(&self, colours: &'a [f32], weight: &'a [f32]) -> Query<'a> {
         Query {
             patch: colours,
@@ -91,7 +94,7 @@ impl Quilt<'_> {
         }
     }
 
-    /// The best match within a pixel of each of some of the pool.
+    /// Returns the best match within a pixel of each given match.
     pub(super) fn refine(
         &self,
         matches: &[Match],
@@ -111,6 +114,7 @@ impl Quilt<'_> {
                 .collect()
         };
         let places: Vec<Vec<[usize; 3]>> = matches.iter().map(near).collect();
+        // Score each place once, although those of near matches overlap.
         let mut every = places.concat();
         every.sort_unstable();
         every.dedup();
@@ -123,7 +127,7 @@ impl Quilt<'_> {
         let scored = self
             .whole
             .best_among(&self.query(colours, &weight), &every, &pick)?;
-        // By rising cost, so that the first one that lies near is the best.
+        // Scores are sorted by cost, so the first one that is near is the best.
         let best = |near: &Vec<[usize; 3]>| {
             scored
                 .iter()
@@ -138,11 +142,12 @@ impl Quilt<'_> {
     }
 }
 
+/// Returns the weight 1 for known pixels, and 0 for the others.
 fn weigh(known: &[bool]) -> Vec<f32> {
     known.iter().map(|&k| f32::from(u8::from(k))).collect()
 }
 
-/// An image at half its size, each pixel the mean of four; an odd last line is left out.
+/// Returns an image at half the size. Each pixel is the mean of four; an odd last line is omitted.
 pub(super) fn halve(image: &[f32], shape: [usize; 2], channels: usize) -> Vec<f32> {
     let ([rows, columns], width) = (shape.map(|n| n / 2), shape[1] * channels);
     let mut half = Vec::with_capacity(rows * columns * channels);

@@ -6,7 +6,7 @@ use crate::foundation::hash::Noise;
 
 const SIDE: usize = 40;
 
-/// Blobs of noise, as one picture of one exemplar.
+/// Returns a smooth noise image of one exemplar.
 fn picture(seed: u64) -> (Picture, Pixels, Samples) {
     let noise = Noise::new(seed);
     let colours: Vec<f32> = (0..SIDE * SIDE)
@@ -50,7 +50,7 @@ fn options(fixed: Option<usize>) -> Options {
     }
 }
 
-/// Two by two patches.
+/// Returns the windows of two by two patches.
 fn windows() -> [Window; 4] {
     let span = |second: bool| Span {
         start: if second { 12 } else { 0 },

@@ -1,46 +1,48 @@
-//! Where patches lie.
+//! The windows of patches in a texture.
 
-/// The part of an axis that a patch covers, and its overlaps with patches that lie there already.
+/// The extent of a patch along an axis, and its overlaps with earlier patches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Span {
-    /// The first point.
+    /// The first pixel.
     pub start: usize,
-    /// Points.
+    /// Number of pixels.
     pub extent: usize,
-    /// Overlap at its beginning.
+    /// Overlap at the start, in pixels.
     pub before: usize,
-    /// Overlap at its end.
+    /// Overlap at the end, in pixels.
     pub after: usize,
 }
 
-/// Rows and columns that a patch covers.
+/// The rows and columns that a patch covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window(pub [Span; 2]);
 
-/// A box of a texture; it may reach over the ends of cyclic axes.
+/// A box of a texture. It may cross the ends of periodic axes.
 pub(super) struct Box2 {
     ends: [[i64; 2]; 2],
 }
 
-/// A window and the pixels beside it, as far as there are others.
+/// A window with a margin of one pixel, as far as there are pixels.
 pub(super) struct Around {
     pub bounds: Box2,
-    /// Where the window begins in it.
+    /// Offset of the window in the bounds.
     pub inner: [usize; 2],
-    /// Axes around which the window goes, so that beside it there is only itself.
+    /// Axes whose whole period the window spans, so that it is its own neighbour.
     closed: [bool; 2],
 }
 
 impl Box2 {
+    /// Returns the number of rows and columns.
     pub(super) fn shape(&self) -> [usize; 2] {
         self.ends.map(|[low, high]| (high - low) as usize)
     }
 
+    /// Returns the number of pixels.
     pub(super) fn len(&self) -> usize {
         self.shape().iter().product()
     }
 
-    /// Its points in a texture of a size, around the edges.
+    /// Returns the positions of its pixels in a texture of a size. Ends wrap around.
     pub(super) fn points(&self, size: [usize; 2]) -> impl Iterator<Item = usize> + use<> {
         let [rows, columns] = self.ends;
         let around = |i: i64, axis: usize| i.rem_euclid(size[axis] as i64) as usize;
@@ -53,7 +55,7 @@ impl Box2 {
 }
 
 impl Window {
-    /// Whether it is one of a texture and of its patches.
+    /// Returns whether the window fits into the texture and has the size of patches.
     pub(super) fn fits(&self, size: [usize; 2], patch: [usize; 2]) -> bool {
         (0..2).all(|a| {
             let span = &self.0[a];
@@ -65,6 +67,7 @@ impl Window {
         })
     }
 
+    /// Returns the first row and column.
     pub(super) fn corner(&self) -> [usize; 2] {
         self.0.map(|span| span.start)
     }
@@ -73,6 +76,7 @@ impl Window {
         self.0.map(|span| span.extent)
     }
 
+    /// Returns the box of the window.
     pub(super) fn bounds(&self) -> Box2 {
         Box2 {
             ends: self
@@ -81,7 +85,7 @@ impl Window {
         }
     }
 
-    /// What other patches cover.
+    /// Returns the pixels of the window that earlier patches cover.
     pub(super) fn known(&self) -> Vec<bool> {
         let [rows, columns] = self.0.map(|s| {
             let line = move |i: usize| i < s.before || i >= s.extent - s.after;
@@ -92,7 +96,8 @@ impl Window {
             .collect()
     }
 
-    /// The middle, which the patch covers in any case: what no other does, or else where its overlaps meet.
+    /// Returns whether a pixel is in the core, which the patch always covers. The core is the part outside the
+    /// overlaps or, if there is none, the place where the overlaps meet.
     fn is_core(&self, point: [usize; 2]) -> bool {
         (0..2).all(|a| {
             let s = &self.0[a];
@@ -101,7 +106,7 @@ impl Window {
         })
     }
 
-    /// With the pixels beside it.
+    /// Adds a margin of one pixel.
     pub(super) fn around(&self, size: [usize; 2], wrap: [bool; 2]) -> Around {
         let mut around = Around {
             bounds: self.bounds(),
@@ -126,14 +131,14 @@ impl Window {
 }
 
 impl Around {
-    /// What the patch of a window covers of it, and what it must.
+    /// Returns the pixels of the bounds that the patch may cover, and those that it must cover.
     pub(super) fn masks(&self, window: &Window, shown: &[u32]) -> (Vec<bool>, Vec<bool>) {
         let ([rows, columns], width) = (window.shape(), self.bounds.shape()[1]);
         let (mut mask, mut core) = (vec![false; shown.len()], vec![false; shown.len()]);
         for r in 0..rows {
             for c in 0..columns {
                 let i = (self.inner[0] + r) * width + self.inner[1] + c;
-                // Where it goes around it meets itself, so its ends stay what they are.
+                // If the window spans the period, the patch meets itself, so its end lines are kept.
                 let end = self.closed[0] && (r == 0 || r + 1 == rows)
                     || self.closed[1] && (c == 0 || c + 1 == columns);
                 mask[i] = !end || shown[i] == super::FREE;

@@ -1,8 +1,8 @@
-//! Image files in memory: PNG, TIFF and Radiance HDR, 8 and 16 bit and float, with limits.
+//! Image files in memory: PNG, TIFF and Radiance HDR with 8-bit, 16-bit and float samples, and with limits.
 //!
-//! Python's libraries read and write the other formats. They do not read PNG and LZW-compressed TIFF of 16 bits and several
-//! channels, or HDR. Only this file names the image crate. Samples are bytes in native order, so that one path serves every
-//! sample type and converts nothing. Three measures make hostile files harmless:
+//! Python's libraries read and write the other formats. They do not support HDR, or PNG and LZW-compressed TIFF with
+//! 16 bits and several channels. Only this module uses the image crate. Samples are bytes in native order, so one path
+//! handles every sample type without conversions. Three measures make hostile files harmless:
 //!
 //! 1. The header's pixels and bytes are compared with the limit before anything is decoded.
 //! 2. The output is reserved with an allocation that may fail, instead of one that ends the process.
@@ -18,25 +18,25 @@ use image::{ColorType, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError
 
 use crate::{Error, Result};
 
-/// Bytes that a decoded image may have for each pixel of the limit: four floats.
+/// Number of bytes that a decoded image may have for each pixel of the limit: four floats.
 pub const BYTES_PER_PIXEL: u64 = 16;
 
-/// What a PNG decoder may hold besides its rows: colour profiles and text.
+/// Memory in bytes that a PNG decoder may use in addition to its rows, for colour profiles and text.
 const PNG_EXTRAS: u64 = 32 << 20;
 
 /// The file formats of this module.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Portable Network Graphics: 8 and 16 bit, one to four channels.
+    /// Portable Network Graphics: 8 and 16 bits, one to four channels.
     Png,
-    /// TIFF, the first page: 8 and 16 bit and float.
+    /// TIFF, the first page: 8 bits, 16 bits and float.
     Tiff,
     /// Radiance RGBE: three channels of float with a shared exponent.
     Hdr,
 }
 
 impl Format {
-    /// The format whose signature a file bears.
+    /// Returns the format of a file by its signature.
     pub fn of_content(file: &[u8]) -> Option<Self> {
         match file {
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some(Self::Png),
@@ -47,19 +47,19 @@ impl Format {
     }
 }
 
-/// What one sample is.
+/// The type of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sample {
-    /// Unsigned, 8 bit.
+    /// Unsigned integer of 8 bits.
     U8,
-    /// Unsigned, 16 bit.
+    /// Unsigned integer of 16 bits.
     U16,
-    /// IEEE single.
+    /// IEEE float of 32 bits.
     F32,
 }
 
 impl Sample {
-    /// Its size in bytes.
+    /// Returns the size of a sample in bytes.
     pub const fn size(self) -> usize {
         match self {
             Self::U8 => 1,
@@ -74,15 +74,16 @@ impl Sample {
 pub struct Decoded {
     /// The samples.
     pub bytes: Vec<u8>,
-    /// What one sample is.
+    /// The type of the samples.
     pub sample: Sample,
     /// Rows, columns, channels.
     pub shape: [usize; 3],
-    /// The Exif orientation that is still to be applied, 1 (upright) to 8.
+    /// The Exif orientation that the caller must apply, from 1 (upright) to 8.
     pub orientation: u8,
 }
 
-/// Decodes a file, at most `limit` pixels and [`BYTES_PER_PIXEL`] bytes for each of them. `name` is for messages.
+/// Decodes a file of at most `limit` pixels and [`BYTES_PER_PIXEL`] bytes for each of them. `name` is used in
+/// messages.
 pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
     let format =
         Format::of_content(file).ok_or_else(|| fail(name, "not a PNG, TIFF or HDR file"))?;
@@ -100,7 +101,7 @@ pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
         }
         Format::Tiff => budget.read(tiff::TiffDecoder::new(Cursor::new(file))),
         Format::Hdr => {
-            // The lenient reader takes the signature for a comment, and so knows #?RGBE as well as #?RADIANCE.
+            // The lenient reader treats the signature as a comment, so it accepts #?RGBE as well as #?RADIANCE.
             let decoder = hdr::HdrDecoder::new_nonstrict(Cursor::new(file));
             if let Ok(decoder) = &decoder {
                 rgbe(name, &decoder.metadata())?;
@@ -110,8 +111,9 @@ pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
     })
 }
 
-/// Encodes `pixels` (native byte order, `shape` = rows, columns, channels) without loss, but for HDR, which keeps eight
-/// bits of each pixel's largest channel. A combination that the format cannot hold is refused, never converted.
+/// Encodes `pixels` (native byte order, `shape` = rows, columns, channels) without loss. The exception is HDR, which
+/// keeps eight bits of each pixel's largest channel. A combination that the format does not support is an error;
+/// nothing is converted.
 pub fn encode(
     name: &str,
     format: Format,
@@ -120,6 +122,7 @@ pub fn encode(
     pixels: &[u8],
 ) -> Result<Vec<u8>> {
     let [rows, cols, channels] = shape;
+    // Check the shape first: the image crate panics if the number of bytes is wrong.
     let bytes = [rows, cols, channels, sample.size()]
         .iter()
         .try_fold(1usize, |product, &side| product.checked_mul(side));
@@ -133,7 +136,7 @@ pub fn encode(
     let (Ok(height), Ok(width)) = (u32::try_from(rows), u32::try_from(cols)) else {
         return Err(Error::value(
             "pixels",
-            format!("{rows} x {cols} is too large for an image file"),
+            format!("must have sides below 2^32, got {rows} x {cols}"),
         ));
     };
     let unheld = || {
@@ -147,7 +150,7 @@ pub fn encode(
         let mut out = Cursor::new(Vec::new());
         match format {
             Format::Png => {
-                // On photographs, 4 to 8 times as fast as the default level, for 3 to 12 % more bytes.
+                // Level 2 is 4x to 8x faster than the default level on photographs, and files are 3 to 12 % larger.
                 let encoder = png::PngEncoder::new_with_quality(
                     &mut out,
                     png::CompressionType::Level(2),
@@ -165,12 +168,12 @@ pub fn encode(
     })
 }
 
-/// The orientation, 1 (upright) to 8, that an Exif block (without its "Exif" preamble) asks for.
+/// Returns the orientation, 1 (upright) to 8, from an Exif block without its "Exif" preamble.
 pub fn exif_orientation(exif: &[u8]) -> u8 {
     image::metadata::Orientation::from_exif_chunk(exif).map_or(1, |o| o.to_exif())
 }
 
-/// The Exif block of a PNG file, which may also stand behind the pixels, where the decoder has no eye for it.
+/// Returns the Exif block of a PNG file. It may be after the pixels, where the decoder does not look.
 fn png_exif(file: &[u8]) -> Option<&[u8]> {
     let mut at = 8;
     loop {
@@ -184,7 +187,7 @@ fn png_exif(file: &[u8]) -> Option<&[u8]> {
     }
 }
 
-/// Radiance files may hold XYZ instead of RGB.
+/// Returns an error if a Radiance file contains XYZ instead of RGB.
 fn rgbe(name: &str, metadata: &hdr::HdrMetadata) -> Result<()> {
     let format = metadata
         .custom_attributes
@@ -199,7 +202,7 @@ fn rgbe(name: &str, metadata: &hdr::HdrMetadata) -> Result<()> {
     }
 }
 
-/// The image crate's name for samples that the format gives back as they came.
+/// Returns the image crate's name for a combination that the format restores exactly.
 fn color(format: Format, sample: Sample, channels: usize) -> Option<ExtendedColorType> {
     use ExtendedColorType as C;
     match (format, sample, channels) {
@@ -217,14 +220,14 @@ fn color(format: Format, sample: Sample, channels: usize) -> Option<ExtendedColo
     }
 }
 
-/// The limit in force for one file.
+/// The limit for one file.
 struct Budget<'a> {
     name: &'a str,
     limit: u64,
 }
 
 impl Budget<'_> {
-    /// Refuses an image that is empty, or larger than the limit in pixels or bytes.
+    /// Returns an error if an image is empty, or has more pixels or bytes than the limit.
     fn check(&self, rows: u64, cols: u64, bytes_per_pixel: u64) -> Result<()> {
         if rows == 0 || cols == 0 {
             let message = format!("the image has {rows} rows and {cols} columns");
@@ -245,8 +248,8 @@ impl Budget<'_> {
         Ok(())
     }
 
-    /// An empty vector with memory for `bytes`. Decoders reserve memory of their own in a way that ends the process when
-    /// there is none, so what they will need is asked for here first, and let go of.
+    /// Returns an empty vector with memory for `bytes`. Call it before a decoder allocates: that would end the process
+    /// if memory is short, and this returns an error. The vector can be dropped at once.
     fn memory(&self, bytes: u64) -> Result<Vec<u8>> {
         let short = || Error::Limit {
             what: self.name.to_owned(),
@@ -259,14 +262,14 @@ impl Budget<'_> {
         Ok(buffer)
     }
 
-    /// Zeros for an image that has passed [`Budget::check`].
+    /// Returns zeros for an image that has passed [`Budget::check`].
     fn zeros(&self, bytes: u64) -> Result<Vec<u8>> {
         let mut buffer = self.memory(bytes)?;
         buffer.resize(bytes as usize, 0);
         Ok(buffer)
     }
 
-    /// Width and height that a PNG file announces, checked before its decoder is made.
+    /// Checks the width and height in the header of a PNG file, before its decoder is created.
     fn png(&self, file: &[u8]) -> Result<()> {
         match file.get(12..24) {
             Some([b'I', b'H', b'D', b'R', size @ ..]) => {
@@ -277,7 +280,8 @@ impl Budget<'_> {
         }
     }
 
-    /// Memory for a few rows and for what is not pixels: an embedded profile must not unfold to gigabytes.
+    /// Returns limits that allow memory for a few rows and metadata. They stop an embedded profile that expands to
+    /// gigabytes.
     fn png_limits(&self, file: &[u8]) -> image::Limits {
         let width = file
             .get(16..20)
@@ -287,7 +291,7 @@ impl Budget<'_> {
         limits
     }
 
-    /// Decodes what a decoder of the image crate has announced.
+    /// Decodes an image with a decoder of the image crate.
     fn read(&self, decoder: ImageResult<impl ImageDecoder>) -> Result<Decoded> {
         let mut decoder = decoder.map_err(|error| speak(self.name, &error))?;
         let (cols, rows) = decoder.dimensions();
@@ -295,6 +299,7 @@ impl Budget<'_> {
         self.check(rows.into(), cols.into(), color.bytes_per_pixel().into())?;
         let bytes = decoder.total_bytes();
         let mut limits = image::Limits::no_limits();
+        // Decoders may hold a second copy of the image.
         limits.max_alloc = Some(bytes.saturating_mul(2).saturating_add(PNG_EXTRAS));
         decoder
             .set_limits(limits)
@@ -308,10 +313,11 @@ impl Budget<'_> {
                 return Err(fail(self.name, message));
             }
         };
-        // Metadata that cannot be read is no reason to refuse the picture.
+        // Ignore unreadable metadata: the image itself may be fine.
         let orientation = decoder
             .orientation()
             .map_or(1, |orientation| orientation.to_exif());
+        // Test whether memory for the decoder's copies and the result is free.
         drop(self.memory(bytes.saturating_mul(3))?);
         let mut pixels = self.zeros(bytes)?;
         decoder
@@ -326,6 +332,7 @@ impl Budget<'_> {
     }
 }
 
+/// Returns an error for a file.
 fn fail(name: &str, message: impl Into<String>) -> Error {
     Error::File {
         path: name.to_owned(),
@@ -333,7 +340,7 @@ fn fail(name: &str, message: impl Into<String>) -> Error {
     }
 }
 
-/// What the image crate says, in one line.
+/// Converts an error of the image crate to one line.
 fn speak(name: &str, error: &ImageError) -> Error {
     match error {
         ImageError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
@@ -341,8 +348,8 @@ fn speak(name: &str, error: &ImageError) -> Error {
         }
         ImageError::Limits(error) => Error::Limit {
             what: name.to_owned(),
-            needed: format!("more memory than its size explains ({error})"),
-            limit: "a few rows and 32 MiB beside the pixels".to_owned(),
+            needed: format!("more memory than its pixels explain ({error})"),
+            limit: "a few rows and 32 MiB in addition to the pixels".to_owned(),
         },
         error => fail(
             name,
@@ -355,9 +362,10 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs a decoder or an encoder; its panic becomes an error and is not printed.
+/// Runs a decoder or an encoder. Its panic becomes an error and is not printed.
 fn caught<R>(name: &str, work: impl FnOnce() -> Result<R>) -> Result<R> {
     static HOOK: Once = Once::new();
+    // Install the hook once for the process. It prints the panics of all threads that are not inside this function.
     HOOK.call_once(|| {
         let loud = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
@@ -369,7 +377,7 @@ fn caught<R>(name: &str, work: impl FnOnce() -> Result<R>) -> Result<R> {
     let before = QUIET.replace(true);
     let outcome = panic::catch_unwind(AssertUnwindSafe(work));
     QUIET.set(before);
-    outcome.unwrap_or_else(|_| Err(fail(name, "the file is corrupt: its decoder gave up")))
+    outcome.unwrap_or_else(|_| Err(fail(name, "the file is corrupt: its decoder failed")))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 
 const LIMIT: u64 = 1 << 20;
 
-/// Bytes that are no NaN in any sample type, and no constant.
+/// Returns bytes that are not NaN in any sample type, and not constant.
 fn pixels(shape: [usize; 3], sample: Sample) -> Vec<u8> {
     let values = (0..shape.iter().product()).map(|i: usize| (i * 37 + 5) % 251);
     values
@@ -107,7 +107,7 @@ fn limits_are_kept_before_decoding() {
         let outcome = decode("a file", &file, 80);
         assert!(matches!(outcome, Err(Error::Limit { .. })), "{format:?}");
     }
-    // Only the header of a PNG that would need 2.5 gigapixels.
+    // Write only the header of a PNG that would need 2.5 gigapixels.
     let mut bomb = written(Format::Png, Sample::U8, [1, 1, 1]);
     bomb[16..24].copy_from_slice(&[0, 0, 0xc3, 0x50, 0, 0, 0xc3, 0x50]);
     let outcome = decode("a file", &bomb, 1 << 28);
