@@ -429,9 +429,9 @@ def test_blending_can_be_left_out(designed):
         ({"wrap": True, "band": 0}, "band"),
         ({"wrap": True, "band": 2.5}, "band"),
         ({"wrap": True, "within": np.ones((3, 3), bool)}, "within"),
-        ({"wrap": True, "within": np.zeros((96, 128), bool)}, "within: marks nothing, so there is nothing to correct"),
+        ({"wrap": True, "within": np.zeros((96, 128), bool)}, "within: must mark at least one pixel, got none"),
         ({"wrap": True, "known": np.ones((3, 3), bool)}, "known"),
-        ({"wrap": True, "known": [np.ones((64, 64), bool)] * 2}, "known: needs a mask for each of 1"),
+        ({"wrap": True, "known": [np.ones((64, 64), bool)] * 2}, "known: must be a mask for each of 1"),
         ({"wrap": True, "map_type": "height"}, "map_type"),
     ],
 )

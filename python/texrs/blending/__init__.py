@@ -1,12 +1,13 @@
-"""Seams that disappear: the colours of a composite corrected so that its differences are those of the exemplar.
+"""Blending: correct the colours of a composite so that its seams disappear.
 
-Section 3.6 (Eq. 5 and 6) of Shen, Jin, Mao and Feng, "Completion-based texture design using deformation", 2006, after
-Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. As printed, the differences wanted are those of the
-composite itself, whose solution is the composite; here they come from the sources on both sides of a seam. Where a seam runs
-along the outline of a thing the step across it is right, and stays: evened out, it would leave a fog around the thing.
+The method is section 3.6 (Eq. 5 and 6) of Shen, Jin, Mao and Feng, "Completion-based texture design using
+deformation", 2006. It follows Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. The paper's target
+differences, as printed, are those of the composite itself, so the composite would be the solution. Here the target
+differences come from the sources on both sides of a seam. If a seam follows the outline of an element, the step across
+it is correct and is kept. Otherwise a fog around the element would remain.
 
-The correction depends on the source map and on one map of the exemplar alone, so it can be made for each map of a
-material: colours, heights, normals, in any dtype.
+The correction depends only on the source map and on one map of the exemplar. It therefore works for each map of a
+material (colours, heights, normals) in any dtype.
 """
 
 from __future__ import annotations
@@ -46,8 +47,11 @@ from texrs.source_map import RenderOptions, SourceMap
 __all__ = ["SCREENING", "Visibility", "apply", "blend", "measure_visibility"]
 
 SCREENING = 0.15
-"""Weight of the values: with less, rare colours drift by three grey levels and more, with this by two; seams show 1 to
-2 % more than with 0.1."""
+"""Default weight of the values.
+
+Rare colours drift by two grey levels with this weight, and by three or more with smaller ones. Seams are 1 to 2 % more
+visible than with 0.1.
+"""
 
 
 def blend(
@@ -70,69 +74,74 @@ def blend(
 ) -> Array:
     """Render a map of the exemplar through a source map, and correct its values so that seams disappear.
 
-    Minimises ``sum((v[q] - v[p] - g[p, q]) ** 2) + screening * sum((v - I) ** 2)`` over neighbours p, q, for each
-    channel by itself, where I is ``source.render(exemplars)`` [1]_. Where the source continues from p to q the
-    difference wanted, g, is that of I. Across a seam it is the mean of what the sources of p and of q would show there,
-    of those that lie inside their exemplar: ``I(S(p) + J(p) e) - I(S(p))`` and ``I(S(q)) - I(S(q) - J(q) e)``; 0 where
-    neither does. Where the seam runs along the outline of a thing, which one of the sources shows there itself, g goes over to
-    the step that there is; outlines are those of all channels together.
+    The result v minimises ``sum((v[q] - v[p] - g[p, q]) ** 2) + screening * sum((v - I) ** 2)`` [1]_. The sums are
+    over neighbours p, q, in each channel, and I is ``source.render(exemplars)``. If the source continues from p to q,
+    the target difference g is the difference of I.
+
+    Across a seam, g is the mean of the differences that the sources of p and q have: ``I(S(p) + J(p) e) - I(S(p))``
+    and ``I(S(q)) - I(S(q) - J(q) e)``. Only differences inside the exemplars count; g is 0 if neither is inside. A
+    seam follows the outline of an element if one of the sources itself shows the step across it, and then g is the actual
+    step. Outlines are detected in all channels together.
 
     Parameters
     ----------
     source : SourceMap
-        Of a picture, shape (H, W).
-    exemplars : array, or a sequence of one an exemplar
-        Any map of the exemplar's height and width: (h, w) or (h, w, C).
+        Source map of an image, (H, W).
+    exemplars : array, or a sequence of one per exemplar
+        Any map of the exemplar, of its height and width: (h, w) or (h, w, C).
     wrap : bool or (rows, columns)
-        Axes along which the picture is cyclic. Along the others the outermost pixels keep their values,
-        unless ``within`` says which do.
+        Axes along which the image is periodic. Along other axes, the outermost pixels keep their values, unless
+        ``within`` selects the corrected pixels.
     screening : float
-        Weight of the values against the differences, at least 0; 0 is the paper's. Colours drift over about
-        ``screening ** -0.5`` pixels: 0.01 makes the transitions of smooth exemplars softer.
+        Weight of the values relative to the differences, at least 0. The paper uses 0. Colours drift over about
+        ``screening ** -0.5`` pixels: 0.01 makes the transitions of smooth exemplars softer. Default: 0.15.
     band : int, optional
-        Correct only what is at most this many pixels from a seam; all else keeps its values. By default everything.
+        Maximum distance of corrected pixels from a seam, in pixels, at least 1. All others keep their values. Default:
+        unlimited.
     within : (H, W) bool or integers, path or Mask, optional
-        Mask of the pixels that are corrected, such as the hole of an image that was filled. All others keep their values.
-    known : (h, w) bool or integers, or a sequence of one an exemplar, optional
-        What of the exemplars may be looked at beyond a seam. By default all.
+        Mask of the pixels to correct, such as the filled hole of an image. All others keep their values. Default: all.
+    known : (h, w) bool or integers, or a sequence of one per exemplar, optional
+        Masks of the exemplar pixels that may be used beyond a seam. Default: all.
     across : bool
-        Whether values are corrected also where two exemplars meet. `texrs.design` does not: flowers on moss end at an edge,
-        and one would stain the other.
+        If True, also correct seams between two exemplars. `texrs.design` uses False: flowers end at the edge of moss,
+        and the two would stain each other. Default: True.
     parts : (H, W) integers, optional
-        What each pixel belongs to, as a floor or a wall: nothing is corrected where two of these meet.
+        Part of each pixel, such as floor or wall. Nothing is corrected where two parts meet. Default: one part.
     outlines : bool
-        Whether the step across a seam stays where it is the outline of a thing. False: all steps are evened out, as the
-        paper does.
+        If True, keep the step across a seam that follows the outline of an element. If False, smooth all steps, as the
+        paper does. Default: True.
     interpolation : {"cubic", "linear", "nearest"}
-        As in `SourceMap.render`.
+        Interpolation, as in `SourceMap.render`. Default: "cubic".
     antialias : bool
-        As in `SourceMap.render`.
+        If True, smooth the exemplar where it is reduced, as in `SourceMap.render`. Default: False.
     map_type, green
-        As in `SourceMap.render`. The slopes of normals are corrected, and normals get unit length again; only the channels that
-        store normals are corrected.
+        Type of the map and direction of y, as in `SourceMap.render`. For normals, the slopes are corrected, then
+        normals get unit length again. Only the channels that store normals are corrected.
     progress : callable or True, optional
-        Called as ``progress("blend", share)``, with the share that is done; raising stops the work. True shows a bar.
+        Function called as ``progress("blend", share)`` with the completed share; raising stops the work. True shows a
+        bar.
 
     Returns
     -------
     (H, W) or (H, W, C) array
-        In the dtype of the exemplar, within the range of its values in each channel; integers are rounded.
+        Image in the dtype of the exemplar, within the range of its values in each channel. Integers are rounded.
 
     Raises
     ------
     InvalidInput
-        The map of a volume; another number of exemplars, or of another size, than the map was made from; an option out
-        of range.
+        The source map is of a volume, an option is out of range, or the number or size of the exemplars differs from
+        the source map.
 
     Notes
     -----
-    Some values have no meaning between them, and come back as `SourceMap.render` gives them: the last of two or of four
-    channels (transparency), and whatever is bool, signed integers or ``interpolation="nearest"`` (labels).
+    Some values cannot be interpolated, so they are returned as `SourceMap.render` gives them. These are the last of
+    two or of four channels (transparency), bool and signed integers, and all values with ``interpolation="nearest"``
+    (labels).
 
-    Pictures of more than 2^22 pixels are solved in overlapping strips of rows, so that beside the result at most
-    0.4 GB are needed, if the screening lets corrections die out within a strip: at 0.01, up to 2^15 pixels wide, at
-    0.001, up to 2^13. Others, as all without screening, are solved whole, one channel after another: 8 bytes a pixel,
-    and 24 for normals.
+    Images of more than 2^22 pixels are solved in overlapping strips of rows, if the screening makes corrections decay
+    within a strip. This holds up to a width of 2^15 pixels at 0.01, and of 2^13 at 0.001. It then needs at most 0.4 GB
+    in addition to the result. Other images, such as all without screening, are solved whole, one channel after
+    another. They need 8 bytes per pixel, and 24 for normals.
 
     References
     ----------
@@ -141,7 +150,7 @@ def blend(
 
     Examples
     --------
-    Two parts of a ramp meet in a step of 40. The ramp goes on across it:
+    Two parts of a ramp meet in a step of 40. After blending, the ramp continues across it:
 
     >>> import numpy as np
     >>> import texrs
@@ -158,25 +167,27 @@ def blend(
     progress = listen(progress)
     as_instance(source, "source", SourceMap)
     if source.axes != 2:
-        raise InvalidInput("source: a picture is needed, got the source map of a volume")
+        raise InvalidInput("source: must be the source map of an image, got that of a volume")
     cyclic, across, outlines = as_wrap(wrap), as_bool(across, "across"), as_bool(outlines, "outlines")
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
     if inside is not None and not inside.any():
-        raise InvalidInput("within: marks nothing, so there is nothing to correct")
+        raise InvalidInput("within: must mark at least one pixel, got none")
     apart = None if parts is None else as_array(parts, "parts", np.uint16, source.shape)
     several = [as_ndarray(e, "exemplars") for e in as_list(exemplars)]
     result = source.render(several, interpolation=interpolation, antialias=antialias, map_type=map_type, green=green)
     shown = None if known is None else as_known(known, source.shapes)
+    # Values that cannot be interpolated are not corrected.
     samples = Samples.scale([as_image(e) for e in several], map_type)
     if samples is None or interpolation == "nearest":
         return result
     turned: Literal["colour", "vector", "slope"] = "slope" if map_type == "normal" else map_type
-    # Seen with a channel axis; what is written to it is written to the result.
+    # This view with a channel axis shares memory with the result, so writing to it changes the result.
     pixels = result.reshape((*source.shape, -1))
     strips = list(divide_strips(source.shape, cyclic[0], weight))
     groups = samples.group_channels(len(strips), math.prod(source.shape), map_type)
+    # Look up the seams of a strip once for all its groups of channels.
     steps = [(part, channels) for part in strips for channels in groups]
     seen: list[Seam] = []
     for number, (part, channels) in enumerate(steps):
@@ -186,6 +197,7 @@ def blend(
             rows = take_rows(source, part.rows)
             look = Look(samples, shown, rows, across, own, outlines, interpolation, turned, green)
             seen = [look.find_seams(axis, closed[axis]) for axis in range(2)]
+        # A strip without seams needs no correction.
         if any(len(seam.lack) for seam in seen):
             report = None if progress is None else _scale_progress(progress, number, len(steps))
             marked = None if inside is None else inside[part.rows]
@@ -205,34 +217,35 @@ def apply(
     finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
-    """Look a map up through a source map, and finish it as the verb that made the source map finished its picture.
+    """Render a map through a source map, with the same finish as the image of the verb that created the source map.
 
-    The type of the map is stated here; `texrs.apply` takes it from the name of a file.
+    Specify the type of the map here. `texrs.apply` infers it from the name of a file.
 
     Parameters
     ----------
     source : SourceMap
-        Source map of a picture or a volume.
-    exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one an exemplar
-        Any map of the exemplar's height and width (and depth), any dtype and channels.
+        Source map of an image or a volume.
+    exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one per exemplar
+        Any map of the exemplar, of its height and width (and depth), with any dtype and channels.
     map_type : {"colour", "normal", "vector", "label"}
-        Meaning of the values (see `texrs.apply`).
+        Meaning of the values (see `texrs.apply`). Default: "colour".
     green : {"up", "down"}
-        Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX).
+        Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: "up".
     finish : RenderOptions, optional
-        Another finish than that of the map.
+        Finish. Default: the finish of the source map.
     progress : callable or True, optional
-        Called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a bar.
+        Function called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a
+        bar.
 
     Returns
     -------
     array
-        Shape of the output with the map's channels, in the map's dtype.
+        Map in its own dtype and channels, with the shape of the output.
 
     Raises
     ------
     InvalidInput
-        Another number of exemplars, or of another size, than the map was made from; an unknown type of map.
+        The number or size of the exemplars differs from those of the source map, or the type of the map is unknown.
 
     Examples
     --------
@@ -262,7 +275,7 @@ def _look_up(
     green: Literal["up", "down"],
     progress: Progress | None,
 ) -> Array:
-    """Look maps up and correct their seams, in even light or with light that is followed if the finish says so."""
+    """Look maps up and correct their seams. The finish decides about even light, or light that is reapplied."""
     if map_type == "label":
         return source.render(several, interpolation="nearest")
     if how is not None and how.flatten_lighting and map_type == "colour":
@@ -286,7 +299,7 @@ def _even_out(
     green: Literal["up", "down"],
     progress: Progress | None,
 ) -> Array:
-    """Look a map up, and correct its seams if they are to be."""
+    """Look a map up, and correct its seams if the finish requests it."""
     if how is None or how.screening is None:
         rest: dict[str, Any] = {} if how is None else {"interpolation": how.interpolation, "antialias": how.antialias}
         return source.render(exemplars, map_type=map_type, green=green, **rest)
@@ -310,19 +323,21 @@ def _even_out(
 
 
 def _follow_light(source: SourceMap, exemplar: Array, how: RenderOptions, progress: Progress | None) -> Array:
-    """Look a map up in even light, and give what is new the light of where it is shown."""
+    """Look a map up in even light, then apply the light of the new place to new pixels."""
     assert how.light is not None
     assert how.within is not None
     pixels = as_image(exemplar)
     rows, columns = pixels.shape[:2]
     owner = np.zeros(source.shape, np.uint16) if how.parts is None else how.parts
     y, x = (np.arange(n) - o for n, o in zip((rows, columns), how.light, strict=True))
+    # Measure the light of each part in the exemplar, which may be offset from the image.
     own = owner[np.ix_(np.clip(y, 0, source.shape[0] - 1), np.clip(x, 0, source.shape[1] - 1))]
     known = np.ones((rows, columns), np.bool_) if how.known is None else how.known[0]
     parts = [(own == number) & known for number in range(int(owner.max()) + 1)]
     lights = measure_lights(pixels, parts)
     if all(light is None for light in lights):
         return _even_out(source, exemplar, how, "colour", "up", progress)
+    # Blend without light, then multiply the new pixels by the light of their part.
     even = _even_out(source, divide_out(pixels, lights, parts), how, "colour", "up", progress)
     result = source.render(exemplar, interpolation=how.interpolation, antialias=how.antialias)
     shown = result.reshape((*source.shape, -1))
@@ -343,8 +358,8 @@ def _scale_progress(progress: Progress, number: int, steps: int) -> Callable[[fl
 
 
 def as_known(value: object, shapes: Sequence[tuple[int, ...]]) -> list[Floats]:
-    """Check masks of the exemplars; 1 is what they have."""
+    """Check the masks of the exemplars, and return them as 0 or 1."""
     several = as_list(value)
     if len(several) != len(shapes):
-        raise InvalidInput(f"known: needs a mask for each of {len(shapes)} exemplars, got {len(several)}")
+        raise InvalidInput(f"known: must be a mask for each of {len(shapes)} exemplars, got {len(several)}")
     return [as_mask(k, "known", shape).astype(np.float32) for k, shape in zip(several, shapes, strict=True)]

@@ -1,4 +1,4 @@
-"""What is added to a picture so that its seams disappear, solved for in strips of rows."""
+"""The correction of an image that makes its seams disappear, solved in strips of rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from texrs.blending._seams import Seam, wrap_rows
 from texrs.kernels.poisson import Boundary, spread
 
 REACH = 9.0
-"""Strips overlap by this over the root of the screening, in pixels: corrections fall to exp(-9) there."""
+"""Margin of a strip in pixels, times the square root of the screening. Corrections decay to exp(-9) over it."""
 
 
 def solve_correction(
@@ -28,10 +28,11 @@ def solve_correction(
     within: Bools | None,
     progress: Callable[[float], object] | None,
 ) -> Floats:
-    """Return what must be added to some channels of the composite, (H, W, C) in [0, 1].
+    """Return the correction, (H, W, C), to add to some channels of the composite, whose values are in [0, 1].
 
-    With v = I + c the differences wanted of c are g less those of I: nothing but at seams.
+    With v = I + c, the target differences of c are g minus the differences of I. They are 0 except at seams.
     """
+    # Add the divergence of the missing differences: it is the right-hand side of the equations.
     flow = np.zeros((*shape, channels.stop - channels.start), np.float32)
     near = np.zeros(shape if band is not None else (0, 0), bool)
     for seam in seen:
@@ -54,7 +55,7 @@ def _choose_boundary(wrap: bool, free: bool) -> Boundary:
 
 
 def _mark_close(near: Bools, band: int, wrap: tuple[bool, bool]) -> Bools:
-    """Mark what is at most ``band`` pixels from a marked pixel, around cyclic axes."""
+    """Mark all pixels at most ``band`` pixels from a marked pixel, across the border of periodic axes."""
     from scipy.ndimage import distance_transform_edt
 
     pads = [min(band, n) if w else 0 for n, w in zip(near.shape, wrap, strict=True)]
@@ -66,18 +67,18 @@ def _mark_close(near: Bools, band: int, wrap: tuple[bool, bool]) -> Bools:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strip:
-    """Rows that are solved together."""
+    """Rows that are solved together, with margins."""
 
     rows: slice | NDArray[np.intp]
     kept: slice
-    """The rows whose result is kept."""
+    """Rows of the image whose result is kept."""
     inner: slice
-    """Where they lie among ``rows``."""
+    """Positions of the kept rows in ``rows``."""
     cyclic: bool
 
 
 def divide_strips(shape: tuple[int, ...], wrap: bool, screening: float) -> Iterator[Strip]:
-    """Divide a picture into strips of rows, each with a margin in which corrections from beyond it die out."""
+    """Divide an image into strips of rows, with margins where corrections from outside decay."""
     height, width = shape
     margin = math.ceil(REACH / math.sqrt(screening)) if screening > 0 else height
     rows = max(_values.STRIP // width, 2 * margin)

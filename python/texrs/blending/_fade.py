@@ -1,4 +1,4 @@
-"""A filling that fades into the image around it."""
+"""Fade of a filling into the image around it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from texrs._typing import Array
 
 
 def fade_in(made: Array, own: object, weight: NDArray[np.uint8], map_type: str) -> Array:
-    """Mix what is looked up with the exemplar at the same place, in the band where the weight is between 0 and 255.
+    """Mix a rendered map with the exemplar at the same place, in the band where the weight is between 0 and 255.
 
-    Labels and signed integers have no values between them, so the larger weight decides. Normals keep their length.
+    Labels, bools and signed integers cannot be interpolated, so the larger weight decides. Normals keep unit length.
     """
     at = np.nonzero((weight > 0) & (weight < 255))
     result = made.copy()
-    # A view with a channel axis: a value that is written to it is written to the result.
+    # This view with a channel axis shares memory with the result, so writing to it changes the result.
     shown, there = result.reshape((*weight.shape, -1)), as_image(own, "exemplars", axes=weight.ndim)[at]
     share = (weight[at] / 255)[:, np.newaxis]
     if map_type == "label" or made.dtype.kind in "bi":

@@ -1,4 +1,4 @@
-"""Where the source of a picture does not go on, and what its sources show on both sides of there."""
+"""Seams of a source map, and the values that the sources show on both sides of them."""
 
 from __future__ import annotations
 
@@ -14,42 +14,45 @@ from texrs.blending._values import Samples
 from texrs.source_map import SourceMap
 
 ALONG = 2.0
-"""Standard deviation, in pixels, of the window along a seam in which outlines are looked for."""
+"""Standard deviation, in pixels, of the window along a seam that is used to detect outlines."""
 REACH = 8
-"""Pixels from which on the window is empty."""
+"""Radius of the window, in pixels."""
 BELL = np.exp(-0.5 * np.square(np.arange(REACH + 1) / ALONG))
-# Rounded: of exponentials the last bits hang on the processor.
+# Round, because the last bits of exponentials depend on the processor.
 WINDOW = np.round(BELL / (2 * BELL.sum() - 1), 15).tolist()
-"""What pixels count, by how far away they are."""
+"""Weights of the window by distance. They sum to 1 over both directions."""
 OUTLINE = (0.35, 0.6)
-"""Share of the step across a seam that one of its sources shows itself, from which on it may be an outline of a thing, and
-from which on it surely is. Where noise is cut, it shows up to a quarter."""
+"""Shares of the step across a seam that one of its sources shows itself.
+
+Above the first it may be an outline of an element, above the second it certainly is. Where noise is cut, the share is
+up to 0.25.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """A source map with what is looked up through it."""
+    """A source map with the exemplars, and the options of the look-up."""
 
     samples: Samples
     known: list[Floats] | None
     source: SourceMap
     across: bool
-    """Whether there is a seam where two exemplars meet."""
+    """If True, there are seams where two exemplars meet."""
     parts: NDArray[np.uint16] | None
-    """(H, W): what each pixel belongs to; there is no seam where two of these meet."""
+    """Part of each pixel, (H, W). Borders of parts are not seams."""
     outlines: bool
-    """Whether outlines of things keep their step."""
+    """If True, outlines of elements keep their step."""
     interpolation: Interpolation
     map_type: Literal["colour", "vector", "slope"]
     green: Literal["up", "down"]
 
     def look_beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:
-        """Return what the sources of pixels show ``step`` pixels on along an axis, and whether the exemplar has that."""
+        """Return the values ``step`` pixels further along an axis in the pixels' sources, and whether they exist."""
         source = self.source
         frames = _list_frames(source, at)
         places = source.coordinates[at] + np.float32(step) * frames[..., axis]
         which = source.exemplar[at]
-        # Coordinates of a mirrored or turned copy carry rounding.
+        # Allow for rounding, which the coordinates of mirrored or rotated copies contain.
         last = np.array(source.shapes, np.float32)[which] - 1
         inside: Bools = np.all((places >= -1e-3) & (places <= last + np.float32(1e-3)), axis=-1)
         row = SourceMap(
@@ -67,7 +70,7 @@ class Look:
         return shown[0], inside
 
     def find_seams(self, axis: int, wrap: bool) -> Seam:
-        """Return the seams that cross an axis: the differences wanted less those of the picture."""
+        """Return the seams across an axis, with the target differences minus the differences of the image."""
         at, after = list_seams(self.source, axis, wrap)
         if not self.across:
             same = self.source.exemplar[at] == self.source.exemplar[after]
@@ -81,6 +84,7 @@ class Look:
         there, _ = self.look_beside(after, axis, 0)
         ahead, forward = self.look_beside(at, axis, 1)
         behind, backward = self.look_beside(after, axis, -1)
+        # Average the differences of both sources, as far as the exemplar has them.
         own = ((ahead - here) * forward[:, np.newaxis], (there - behind) * backward[:, np.newaxis])
         known = np.maximum(forward.astype(np.float32) + backward, 1)[:, np.newaxis]
         step = there - here
@@ -93,21 +97,21 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seam:
-    """Pairs of neighbours that seams part."""
+    """Pairs of neighbours on both sides of a seam."""
 
     at: tuple[Array, ...]
     after: tuple[Array, ...]
     lack: Floats
-    """What the differences from ``at`` to ``after`` lack, (n, C) in [0, 1]."""
+    """Target differences from ``at`` to ``after`` minus the actual ones, (n, C), for values in [0, 1]."""
 
 
 def measure_outlines(
     step: Floats, own: tuple[Floats, Floats], at: tuple[Array, ...], shape: tuple[int, ...], *, cyclic: bool
 ) -> Floats:
-    """Return how surely each pair of neighbours lies on an outline of a thing that occludes what is beyond, 0 to 1.
+    """Return how certainly each pair of neighbours is on an outline of an element that covers others, 0 to 1.
 
-    There one of the sources shows most of the step itself. Both are summed up along the seam: in noise a single
-    pair may agree by chance.
+    On an outline, one of the sources shows most of the step itself. The steps are summed along the seam, because in
+    noise a single pair may agree by chance.
     """
     points = np.stack(at, axis=1, dtype=np.int64)
 
@@ -121,7 +125,7 @@ def measure_outlines(
 
 
 def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """Return the pixels before the seams that cross an axis, and those after them, each as (rows, columns)."""
+    """Return the pixels before and after the seams across an axis, each as (rows, columns)."""
     parted = ~source.is_coherent(axis, wrap=wrap)
     if not wrap:
         np.moveaxis(parted, axis, 0)[-1] = False
@@ -139,7 +143,7 @@ def _list_frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32
 
 
 def wrap_rows(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
-    """Return rows of a picture that is cyclic, without a copy where they do not cross its end."""
+    """Return rows of a periodic image, as a slice without a copy if they do not cross its end."""
     return slice(first, last) if first >= 0 and last <= height else np.arange(first, last) % height
 
 

@@ -1,4 +1,4 @@
-"""The values of exemplars, brought to [0, 1] and back."""
+"""Conversion of the exemplars' values to [0, 1] and back."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from texrs.errors import InvalidInput
 from texrs.source_map._vectors import stores_z
 
 STRIP = 2**22
-"""Pixels that are solved at once; up to four times as many where corrections reach far."""
+"""Maximum pixels that are solved at once. It is four times as large if corrections reach far."""
 STEEPEST = 4.0
-"""Slope beyond which steeper ones count no more: 76 degrees."""
+"""Maximum slope, 76 degrees. Steeper slopes are clipped."""
 FLATTEST = 0.2
-"""Least height of a normal that a slope is taken of."""
+"""Minimum z of a normal when its slope is computed."""
 BAND = 64
-"""Rows whose values are converted at once."""
+"""Number of rows that are converted at once."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """The exemplars' values in [0, 1], so that the solver's precision does not depend on their range."""
+    """Values of the exemplars in [0, 1], so that the solver's precision does not depend on their range."""
 
     images: list[Floats]
     low: float
     span: float
     channels: int
-    """How many channels are corrected."""
+    """Number of channels to correct."""
     least: Array
     most: Array
-    """Range of each channel."""
+    """Smallest and largest value of each channel."""
     stored: int = 3
-    """How many channels of normals are stored: 2 if z is not."""
+    """Number of channels that store normals: 2 if z is not stored."""
 
     @classmethod
     def scale(cls, exemplars: Sequence[Array], map_type: str) -> Samples | None:
-        """Scale them; None where no values between theirs make sense."""
+        """Scale the values to [0, 1]. Return None if they cannot be interpolated, or are constant."""
         dtype, channels = exemplars[0].dtype, exemplars[0].shape[-1]
         if map_type != "colour":
-            # Half way is no slope, or no step, so that they can be turned as they are.
+            # Map a slope or step of 0 to 0.5, so that vectors can be rotated in this form.
             top = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0
             channels = 3 if map_type == "normal" and stores_z(exemplars) else 2
             low = -top if dtype.kind != "u" and min(float(e[..., :channels].min()) for e in exemplars) < 0 else 0.0
             high = top
             if map_type == "normal":
-                # Slopes add up where heights do; normals do not.
+                # Correct slopes instead of normals: slopes add up like heights, but normals do not.
                 shown = [_scale_slopes(e[..., :channels], low, high) for e in exemplars]
                 return cls(shown, low, high - low, 2, np.full(3, low), np.full(3, high), channels)
         else:
@@ -71,13 +71,13 @@ class Samples:
         )
 
     def group_channels(self, strips: int, pixels: int, map_type: str) -> list[slice]:
-        """Return the channels that are solved together: all, but one by one where a large picture is one strip."""
+        """Return the channels to solve together: one at a time for a large image in one strip, otherwise all."""
         if strips > 1 or pixels <= STRIP or map_type != "colour":
             return [slice(0, self.channels)]
         return [slice(c, c + 1) for c in range(self.channels)]
 
     def correct(self, pixels: Array, correction: Floats, channels: slice, map_type: str) -> None:
-        """Add a correction to channels of pixels in the exemplar's own values, in place."""
+        """Add a correction to channels of pixels, in the exemplar's own values and in place."""
         exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
         for rows in divide_rows(len(pixels)):
             change = correction[rows].astype(exact)
@@ -90,7 +90,7 @@ class Samples:
             mine[...] = np.rint(value) if pixels.dtype.kind in "ui" else value
 
     def _tilt(self, values: Array, change: Array) -> Array:
-        """Return normals whose slopes are changed; those of no change are as they were."""
+        """Return normals with changed slopes. Normals without a change keep their exact values."""
         vector = _add_z(2 * (values - self.low) / self.span - 1)
         slope = vector[..., :2] / np.maximum(vector[..., 2:], FLATTEST) + change * (2 * STEEPEST)
         tilted = np.concatenate([slope, np.ones_like(slope[..., :1])], axis=-1)
@@ -101,7 +101,7 @@ class Samples:
 
 
 def _add_z(vector: Array) -> Array:
-    """Return vectors with the z that unit length gives, if they have none."""
+    """Return vectors with z. A missing z follows from unit length."""
     if vector.shape[-1] > 2:
         return vector
     z = np.sqrt(np.maximum(1 - (vector * vector).sum(axis=-1, keepdims=True), 0))
@@ -109,7 +109,7 @@ def _add_z(vector: Array) -> Array:
 
 
 def _scale_slopes(normals: Array, low: float, high: float) -> Floats:
-    """Return the slopes of normals, (rows, columns, 2): the steepest that count are 0 and 1, none is half way."""
+    """Return the slopes of normals, (rows, columns, 2): 0 and 1 are the steepest, 0.5 is level."""
     result = np.empty((*normals.shape[:2], 2), np.float32)
     for rows in divide_rows(len(normals)):
         vector = _add_z(2 * (normals[rows].astype(np.float64) - low) / (high - low) - 1)
@@ -119,7 +119,7 @@ def _scale_slopes(normals: Array, low: float, high: float) -> Floats:
 
 
 def _scale(image: Array, low: float, high: float) -> Floats:
-    """Bring ``low`` to ``high`` to [0, 1], a band of rows at a time."""
+    """Scale the range ``low`` to ``high`` to [0, 1], a band of rows at a time."""
     result = np.empty(image.shape, np.float32)
     for rows in divide_rows(len(image)):
         result[rows] = (image[rows].astype(np.float64) - low) / (high - low)
@@ -127,5 +127,5 @@ def _scale(image: Array, low: float, high: float) -> Floats:
 
 
 def divide_rows(rows: int) -> Iterator[slice]:
-    """Divide rows so that what is made of them in float64 stays small."""
+    """Divide rows into bands, so that temporary arrays in float64 stay small."""
     return (slice(first, min(first + BAND, rows)) for first in range(0, rows, BAND))

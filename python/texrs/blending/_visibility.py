@@ -1,4 +1,4 @@
-"""How visible the seams of a picture are."""
+"""Measurement of the visibility of seams."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
 LOOK = 2**22
-"""Pixels whose seams are measured, and four times as many as those of an exemplar that they are compared with."""
+"""Maximum pixels of an image whose seams are measured. Exemplars are sampled at a quarter of this number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Visibility:
-    """How the differences across seams compare with the exemplar's own.
+    """Differences across seams, relative to the differences within the exemplar.
 
     Attributes
     ----------
     edges : int
-        Pairs of neighbours that a seam parts, of those that were looked at.
+        Number of measured pairs of neighbours that a seam separates.
     mean : float
-        Mean difference across seams over the exemplar's mean difference.
+        Mean difference across seams, divided by the exemplar's mean difference.
     outliers : float
-        Share of the differences across seams that exceed the 99th percentile of the exemplar's; 0.01 is what the
-        exemplar itself has.
+        Share of the differences across seams above the 99th percentile of the exemplar's differences. The exemplar
+        itself has 0.01.
 
     """
 
@@ -43,28 +43,29 @@ class Visibility:
 def measure_visibility(
     source: SourceMap, exemplars: Array | Sequence[Array], image: Array, *, wrap: bool | Sequence[bool]
 ) -> Visibility:
-    """Measure how visible the seams of a picture are.
+    """Measure how visible the seams of an image are.
 
     Parameters
     ----------
     source : SourceMap
-        Of the picture, shape (H, W).
-    exemplars : array, or a sequence of one an exemplar
-        What the picture was made from.
+        Source map of the image, (H, W).
+    exemplars : array, or a sequence of one per exemplar
+        Exemplars that the image was synthesised from.
     image : (H, W) or (H, W, C) array
-        The picture, corrected or not. Its first three channels count, or the first one of two.
+        Image, corrected or not. Its first three channels are measured, or the first one of two.
     wrap : bool or (rows, columns)
-        Axes along which the picture is cyclic.
+        Axes along which the image is periodic.
 
     Returns
     -------
     Visibility
-        All 0 where there is no seam, or where the exemplar is constant.
+        Differences across the seams. ``mean`` and ``outliers`` are 0 without a seam, or if the exemplar is
+        constant.
 
     Notes
     -----
-    Of a picture of more than 2^22 pixels, bands of rows spread over it are looked at; of an exemplar of more than 2^20,
-    rows spread over it.
+    For an image of more than 2^22 pixels, only bands of rows spread over it are measured. For an exemplar of more than
+    2^20 pixels, only rows spread over it are.
 
     Examples
     --------
@@ -79,13 +80,14 @@ def measure_visibility(
     several = [as_image(e, "exemplars") for e in as_list(exemplars)]
     pixels = as_image(image)
     if pixels.shape[:2] != source.shape:
-        raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
+        raise InvalidInput(f"image: must have the size of the source map, {source.shape}, got {pixels.shape[:2]}")
     count = min(3, pixels.shape[-1] - (pixels.shape[-1] == 2))
     own = np.concatenate([_measure_steps(e[..., :count], axis) for e in several for axis in range(2)])
     height, width = source.shape
     across = []
+    # Sample a large image evenly, by bands of rows.
     for band in list(divide_rows(height))[:: -(-height * width // LOOK)]:
-        # With the row after it, for the differences that leave the band.
+        # Include the row after the band, which the differences across its end need.
         last = min(band.stop + 1, height + cyclic[0])
         rows = wrap_rows(band.start, last, height)
         piece, shown = take_rows(source, rows), pixels[rows, :, :count]
@@ -102,7 +104,7 @@ def measure_visibility(
 
 
 def _measure_steps(image: Array, axis: int) -> NDArray[np.float64]:
-    """Return the sizes of an exemplar's differences along an axis; of rows spread over a large one."""
+    """Return the absolute differences of an exemplar along an axis, from a sample of the rows if it is large."""
     every = -(-image.shape[0] * image.shape[1] // (LOOK // 4))
     before = image[::every] if axis == 1 else image[:-1:every]
     after = before[:, 1:] if axis == 1 else image[1::every]
