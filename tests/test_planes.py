@@ -70,7 +70,7 @@ def test_a_rectangle_lies_level(turn: float) -> None:
         (lambda: Plane((64, 64), 89), "slant: must be a number"),
         (lambda: Plane((64, 64), float("nan")), "slant"),
         (lambda: Plane((0, 64), 10), "shape"),
-        (lambda: Plane((64, 64), 10, fov=0.5), "fov: needs a number"),
+        (lambda: Plane((64, 64), 10, fov=0.5), "fov: must be a number"),
         (
             lambda: Plane.of_corners((64, 64), [[0, 0], [9, 9], [0, 9], [9, 0]]),
             "corners: must form a convex quadrilateral",
