@@ -42,7 +42,7 @@ def test_densities_are_kept(grit, pebbles, density, seed):
     [said] = result.report["density"]
     assert covered(result, 1) == pytest.approx(density, rel=0.03)
     assert (said["asked"], said["reached"]) == (density, pytest.approx(covered(result, 1), abs=1e-4))
-    assert said["things"] == np.unique(result.source_map.label[result.source_map.exemplar == 1]).size > 3
+    assert said["elements"] == np.unique(result.source_map.label[result.source_map.exemplar == 1]).size > 3
 
 
 def test_things_are_whole_and_apart(grit, pebbles):

@@ -437,8 +437,8 @@ def lay_tiles(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
 def test_a_proposed_layout_is_jointed_where_the_picture_falls_into_cells() -> None:
     image, middles = lay_tiles((192, 192))
     away = _proposal.measure_distance((192, 192), middles, (41, 41), (False, False))
-    thing, _ = _proposal.compare_things(to_lab(image), away, middles)
-    assert thing >= _proposal.THING
+    thing, _ = _proposal.compare_elements(to_lab(image), away, middles)
+    assert thing >= _proposal.CLEAR
     layout, sure = _proposal._choose_layout(image, away, middles, None)
     assert layout != Layout.DISJOINT
     assert sure <= 1

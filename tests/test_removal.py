@@ -314,7 +314,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     for more, words in (
         (["--slant", "50"], "--slant: needs one for each of 2 grounds"),
         (["--slant", "fifty", "--slant", "3"], "--slant: needs a number, or found"),
-        (["--ground", "found", "--ground", "found"], "--ground: of several"),
+        (["--ground", "found", "--ground", "found"], "--ground: must be given for all but one"),
     ):
         assert main([*said, *more]) == 2
         assert re.search(words, capsys.readouterr().err)

@@ -16,7 +16,7 @@ from texrs.kernels import seam
 from texrs.tiling import REFUSED, _closed
 from texrs.tiling._joints import Choice, find_joint, make_levels
 from texrs.tiling._maps import lay_out
-from texrs.tiling._whole_elements import find_things
+from texrs.tiling._whole_elements import find_whole_elements
 
 GENERATED = ("bark", "beans", "bricks", "dots", "leaves_and_flowers", "net", "pebbles", "scales", "weave", "grit")
 PHOTOGRAPHS = ("brick", "grass", "gravel", "coffee")
@@ -77,7 +77,7 @@ def test_a_joint_followed_from_a_small_picture_is_about_as_cheap_as_the_cheapest
     image = picture(name, 160)
     most = image.shape[1] // 2
     found = find_joint(
-        make_levels(guidance(as_image(image)), find_things(guidance(as_image(image))).depth),
+        make_levels(guidance(as_image(image)), find_whole_elements(guidance(as_image(image))).depth),
         1,
         Choice(25, most),
         closed=False,
@@ -108,7 +108,7 @@ def test_few_cuts_are_made_at_the_full_size(monkeypatch):
 @pytest.mark.parametrize("name", ["beans", "pebbles"])
 def test_cuts_spare_the_inside_of_things(name):
     guide = guidance(as_image(picture(name)))
-    # Light things on dark ground.
+    # Light elements on dark ground.
     depth = np.clip((guide.mean(axis=-1) - 0.35) / 0.1, 0, 1).astype(np.float32)
     deep = []
     for given in (0 * depth, depth):

@@ -93,7 +93,7 @@ class SideBySide:
     def do(
         self,
         work: Callable[[T, Watch], R],
-        things: Sequence[T],
+        items: Sequence[T],
         watch: Callable[[int, float], object] | None = None,
     ) -> list[R]:
         """Return the results of the tasks, in order.
@@ -102,7 +102,7 @@ class SideBySide:
         ----------
         work : callable
             Called with an item and a function that it calls with the completed share.
-        things : sequence
+        items : sequence
             Items. Each is an independent task.
         watch : callable, optional
             Called only from this thread, with the number of a running task and its share. An exception stops the work.
@@ -113,14 +113,14 @@ class SideBySide:
             Exception of the first failed task in order. No other task continues.
 
         """
-        if self._pool is None or len(things) < 2:
+        if self._pool is None or len(items) < 2:
             return [
-                work(thing, lambda share, number=number: None if watch is None else watch(number, share))  # type: ignore[misc]
-                for number, thing in enumerate(things)
+                work(item, lambda share, number=number: None if watch is None else watch(number, share))  # type: ignore[misc]
+                for number, item in enumerate(items)
             ]
-        shares, stopped = dict.fromkeys(range(len(things)), 0.0), Event()
+        shares, stopped = dict.fromkeys(range(len(items)), 0.0), Event()
 
-        def do_one(number: int, thing: T) -> R:
+        def do_one(number: int, item: T) -> R:
             def tell(share: float) -> None:
                 if stopped.is_set():
                     raise Cancelled("stopped, because another task failed")
@@ -128,12 +128,12 @@ class SideBySide:
 
             tell(0.0)
             with threads(self._count):
-                return work(thing, tell)
+                return work(item, tell)
 
         futures: list[Future[R]] = []
         try:
-            for number, thing in enumerate(things):
-                futures.append(self._pool.submit(copy_context().run, do_one, number, thing))
+            for number, item in enumerate(items):
+                futures.append(self._pool.submit(copy_context().run, do_one, number, item))
             left = set(futures)
             while left:
                 done, left = wait(left, timeout=PAUSE if watch is not None else None, return_when="FIRST_EXCEPTION")

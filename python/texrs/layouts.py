@@ -23,7 +23,7 @@ __all__ = ["cells", "courses", "from_dict", "lattice", "points"]
 
 Points = NDArray[np.float64]
 
-GROUND, THING = 208, 72
+GROUND, ELEMENT = 208, 72
 """Grey values of the background and of the elements in the drawing."""
 DISC = 0.35
 """Radius of a drawn point, as a share of the usual distance to the nearest point."""
@@ -177,7 +177,7 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> ElementAnaly
     check_memory(4 * given.size, "labels")
     image = np.full(given.shape, GROUND, np.uint8)
     found = ElementAnalysis.of_labels(image, given, layout=Layout.JOINTED, wrap=wrap)
-    image[~found.mask] = THING
+    image[~found.mask] = ELEMENT
     return found
 
 
@@ -329,6 +329,6 @@ def _draw_points(at: Points, shape: tuple[int, int], wrap: tuple[bool, bool]) ->
     # A point whose disc is below others keeps its pixel.
     pixel = np.clip(np.rint(at), 0, np.array(shape) - 1).astype(np.intp)
     owner[pixel[:, 0], pixel[:, 1]] = np.arange(1, len(at) + 1)
-    image = np.where(owner > 0, THING, GROUND).astype(np.uint8)
+    image = np.where(owner > 0, ELEMENT, GROUND).astype(np.uint8)
     side = 2 * round(radius) + 1
     return ElementAnalysis(image, at, owner > 0, (side, side), Layout.DISJOINT, np.ones(len(at)), wrap=wrap)

@@ -33,7 +33,7 @@ edges.
 """
 RIM = 1 / 40
 """Width of the band around the mask that seams may use, as a share of the shorter side."""
-THINGS = 1 / 12
+ELEMENT_WIDTH = 1 / 12
 """The same for separate elements: those that the mask cuts are removed as a whole."""
 
 
@@ -145,9 +145,9 @@ def remove(
     marked = mark(asked, "mask", shape)
     check_share(marked, "mask", name_marks(asked, "mask"), "remove")
     wide = max(1, round(MARGIN * min(shape))) if margin is None else as_int(margin, "margin", 0, 64)
-    rim, things = round(RIM * min(shape)), min(64, round(THINGS * min(shape)))
+    rim, element_width = round(RIM * min(shape)), min(64, round(ELEMENT_WIDTH * min(shape)))
     if boundary_width is not None:
-        rim = things = as_int(boundary_width, "boundary_width", 0, 64)
+        rim = element_width = as_int(boundary_width, "boundary_width", 0, 64)
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
     number, follow = as_seed(seed), as_bool(match_lighting, "match_lighting")
     watch = progress or (lambda stage, share: None)
@@ -171,7 +171,15 @@ def remove(
     # Each plane is a part with its own pixels, and areas off all planes are other parts.
     parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole, pixels)
     made = fill_parts(
-        pixels, hole, parts, boundary=rim, things=things, light=follow, patch=side, seed=number, progress=progress
+        pixels,
+        hole,
+        parts,
+        boundary=rim,
+        element_width=element_width,
+        light=follow,
+        patch=side,
+        seed=number,
+        progress=progress,
     )
     # The source map contains the steps after copying, so that other maps get the same ones.
     how = made.finish(screening, (0, 0) if follow else None)

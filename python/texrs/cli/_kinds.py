@@ -126,7 +126,7 @@ CORNERS = Kind(
 )
 EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grounds, or {FOUND}.", many=True)
 """One value for each plane of a photograph."""
-THING = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
+OBJECT = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
 """Mask that the function reads, as its other options describe."""
 FILLED = Kind(
     "FILE|alpha|nan|nodata|VALUE",

@@ -25,10 +25,10 @@ from texrs.cli._kinds import (
     LAYOUT,
     MAP_OR_AUTO,
     NUMBERS,
+    OBJECT,
     SEEN,
     SOURCE,
     TARGET,
-    THING,
     UNKNOWN,
     UNKNOWN_VOLUME,
     VOLUME,
@@ -114,7 +114,7 @@ def make_verb(name: str) -> Verb:
         case "remove":
             from texrs.removal import remove
 
-            verb = _see(remove, {"mask.marks": "mask"}, **{"mask.marks": THING})
+            verb = _see(remove, {"mask.marks": "mask"}, **{"mask.marks": OBJECT})
             return replace(verb, says=lambda made: tell_filled(made) + say_planes(made), fills=True)
         case "solid":
             from texrs.papers.solid import solid

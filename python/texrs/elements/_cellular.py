@@ -18,7 +18,7 @@ from texrs._arrays import to_lab
 from texrs._typing import Bools, Floats, Labels, Progress
 from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._layout import Layout
-from texrs.elements._proposal import CELLS, THING, Start, compare_things, measure_distance, shrink
+from texrs.elements._proposal import CELLS, CLEAR, Start, compare_elements, measure_distance, shrink
 from texrs.elements._search import Detections
 from texrs.elements._separation import Separation, find_nearest_pixels
 from texrs.exemplar.cells import Cells, find_cells
@@ -92,7 +92,7 @@ def start_from_cells(guide: Floats, given: Arguments, progress: Progress) -> Cel
     if said is None:
         small, step = shrink(guide)
         seen = find_cells(small, progress=lambda stage, share: progress("propose", 0.3 * share))
-        if seen.confidence < SURE or seen.count < FEWEST or (given.layout is None and _are_things(small, seen)):
+        if seen.confidence < SURE or seen.count < FEWEST or (given.layout is None and _are_elements(small, seen)):
             return None
         said = step * float(np.clip(min(_measure_sides(seen)), 3, min(small.shape[:2])))
     size = float(np.clip(NARROW * said, 3, max(guide.shape[:2])))
@@ -115,7 +115,7 @@ def _measure_sides(cells: Cells) -> NDArray[np.float64]:
     return np.asarray(np.median(np.ptp(cells.outlines[whole], axis=1), axis=0), np.float64)
 
 
-def _are_things(small: Floats, cells: Cells) -> bool:
+def _are_elements(small: Floats, cells: Cells) -> bool:
     """Return whether cells look like objects on a background.
 
     False if the background is lighter than the cells, or so dark that it must be gaps.
@@ -126,7 +126,7 @@ def _are_things(small: Floats, cells: Cells) -> bool:
     sides = _measure_sides(cells)
     box = (max(1, round(sides[0])), max(1, round(sides[1])))
     away = measure_distance((small.shape[0], small.shape[1]), cells.centre, box, (False, False))
-    return compare_things(to_lab(small), away, cells.centre)[0] >= THING
+    return compare_elements(to_lab(small), away, cells.centre)[0] >= CLEAR
 
 
 def _measure_contrast(guide: Floats, cells: Cells) -> float:

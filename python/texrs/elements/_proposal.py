@@ -41,7 +41,7 @@ OUT = 1.1
 """Minimum distance from an element for a background pixel, in half boxes."""
 PLACES = 12
 """Number of proposed places of the background."""
-THING = 0.68
+CLEAR = 0.68
 """Minimum ratio of activity and variation in elements to the rest, for objects on a background."""
 LEAST_EDGE = 0.002
 """Negligible colour difference. The range of colours is 1."""
@@ -343,9 +343,9 @@ def _choose_layout(
         return (Layout.DISJOINT, 0.7) if float((~mask).mean()) > OPEN else (Layout.JOINTED, 0.6)
     if len(points) < 3:
         return Layout.DISJOINT, 0.1
-    thing, contrast = compare_things(to_lab(guide), away, points)
-    sure = _measure_odds(thing / THING)
-    if thing >= THING:
+    share, contrast = compare_elements(to_lab(guide), away, points)
+    sure = _measure_odds(share / CLEAR)
+    if share >= CLEAR:
         cells = find_cells(shrink(guide)[0]).confidence
         if cells < CELLS:
             return Layout.DISJOINT, sure
@@ -365,7 +365,7 @@ def _measure_odds(ratio: float) -> float:
     return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
 
-def compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
+def compare_elements(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
     """Return how much elements are objects, not openings, and their lightness difference to the rest.
 
     Openings of a net, and bricks between joints, are even and similar. Lines, edges and colours are between them. For
@@ -375,7 +375,7 @@ def compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) -
 
     inner, outer = away < 0.5, away > OUT
     if not inner.any() or not outer.any():
-        return THING, 0.0
+        return CLEAR, 0.0
     light = colours[..., 0]
     edges = gaussian_gradient_magnitude(light, 1.0)
     smooth = np.stack([gaussian_filter(colours[..., c], 2.0) for c in range(3)], axis=-1)

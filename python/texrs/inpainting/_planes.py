@@ -118,7 +118,7 @@ def add_rest(parts: Sequence[Part], hole: Bools, pixels: Array) -> list[Part]:
             like.append(piece)
     found = [Part(np.isin(pieces, group), large=np.isin(pieces, group)) for _, group in groups]
     if found:
-        # Things stay where they are.
+        # The pixels of elements stay in their places.
         found[0] = Part(found[0].shown | (rest & ~behind[pieces]), large=found[0].large)
     return [*parts, *found]
 
@@ -163,7 +163,7 @@ def fill_parts(
     parts: Sequence[Part],
     *,
     boundary: int = 0,
-    things: int = 0,
+    element_width: int = 0,
     light: bool = False,
     patch: int | None = None,
     seed: int = 0,
@@ -181,7 +181,7 @@ def fill_parts(
         What goes on there.
     boundary : int
         Pixels around the holes that may change too.
-    things : int
+    element_width : int
         The same for planes with separate elements.
     light : bool
         If True, patches are compared and continued as they would look in even light.
@@ -214,7 +214,7 @@ def fill_parts(
             counts.append(0)
             continue
         open_ = region
-        near, far = (region | (widen(region, width) & part.shown) for width in (boundary, max(boundary, things)))
+        near, far = (region | (widen(region, width) & part.shown) for width in (boundary, max(boundary, element_width)))
         if len(parts) > 1:
             band = round(min(max(BAND * float(np.count_nonzero(region)) ** 0.5, NARROWEST), WIDEST))
             open_ = region | (widen(region, band) & ~part.shown)

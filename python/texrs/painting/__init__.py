@@ -24,7 +24,7 @@ from texrs.painting._files import write_mesh
 from texrs.painting._meshes import find_tangents, shade
 from texrs.painting._reading import read_mesh
 from texrs.painting._relief import bake_frames, carve, read_slopes
-from texrs.painting._sets import Laid, lay_flat
+from texrs.painting._sets import UnwrappedMesh, lay_flat
 from texrs.painting._surface import MESH, PAINTED, Surface
 from texrs.papers.solid.window import SolidTexture
 
@@ -232,7 +232,7 @@ def texture_mesh(
 
 def _make_relief(
     texture: SolidTexture,
-    laid: Laid,
+    laid: UnwrappedMesh,
     baked: list[tuple[NDArray[np.float64], NDArray[np.bool_]]],
     maps: dict[str, Array],
     size: float,
@@ -262,7 +262,7 @@ def _make_relief(
     return _stack(reliefs) if reliefs else None
 
 
-def _take_set(laid: Laid, number: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+def _take_set(laid: UnwrappedMesh, number: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
     """Return the vertices, faces and UVs (0 to 1) of a texture set."""
     surface, mine = laid.surface, laid.which == number
     assert surface.uv is not None
@@ -300,8 +300,7 @@ def find_scale(
 
 
 def _limit_scale(size: float, texture: SolidTexture, surface: Surface, side: int) -> float:
-    """Return a scale, lowered if its voxels would be smaller than texels, because the atlas cannot show finer detail.
-    """
+    """Return a scale, lowered if its voxels would be smaller than texels, because the atlas cannot show finer detail."""
     assert surface.uv is not None
     edges = np.diff(surface.vertices[surface.faces], axis=1)
     flat = np.diff(surface.uv[surface.faces], axis=1)

@@ -14,7 +14,7 @@ from texrs.errors import InvalidInput
 from texrs.painting._meshes import unwrap
 from texrs.painting._surface import PAINTED, Floats64, Surface
 
-__all__ = ["Laid", "lay_flat"]
+__all__ = ["UnwrappedMesh", "lay_flat"]
 
 OFTEN = 256
 """Number of triangles between two checks whether the call was cancelled."""
@@ -28,7 +28,7 @@ MOST = 64
 """Maximum number of texture sets."""
 
 
-class Laid(NamedTuple):
+class UnwrappedMesh(NamedTuple):
     """A mesh whose faces all have a position in an atlas.
 
     Attributes
@@ -50,7 +50,7 @@ class Laid(NamedTuple):
     tile: Floats64
 
 
-def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Laid:
+def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> UnwrappedMesh:
     """Return a mesh with its texture sets: one, or one for each material, part and tile that would overlap.
 
     Raises
@@ -67,7 +67,7 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Laid:
         # The text of a file has other corners than the new layout.
         whole = surface._replace(vertices=vertices, faces=faces, uv=uv, text=None, origin=None)
         whole = whole._replace(normals=None if surface.normals is None else surface.normals[kept])
-        return Laid(whole, (PAINTED,), np.zeros(len(faces), np.int64), np.zeros((len(faces), 2)))
+        return UnwrappedMesh(whole, (PAINTED,), np.zeros(len(faces), np.int64), np.zeros((len(faces), 2)))
     if bare.any():
         assume(
             f"{surface.name}: {bare.sum()} of {len(bare)} faces have no UVs, and are laid out in a separate texture set"
@@ -82,7 +82,7 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Laid:
     if len(names) > 1:
         why = "its UVs overlap" if not tile.any() else "its UVs are in several tiles"
         assume(f"{surface.name}: read as {len(names)} texture sets, {', '.join(names)}, because {why}")
-    return Laid(surface, names, which, tile)
+    return UnwrappedMesh(surface, names, which, tile)
 
 
 def _unwrap_part(surface: Surface, bare: NDArray[np.bool_], side: int, padding: int) -> Surface:

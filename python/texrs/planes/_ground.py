@@ -53,7 +53,7 @@ PART, USUAL = 0.08, 0.25
 
 The median likelihood of its colours must reach this quantile of the likelihoods within the ground.
 """
-LEAST, THING = 0.004, 0.02
+LEAST, OBJECT = 0.004, 0.02
 """Minimum share of the image of a separate part of the ground, and of another object.
 
 A single button among many is not an object on a floor.
@@ -120,7 +120,7 @@ def find_ground(image: object, *, known: object = None) -> Bools:
             return there
         follows = side
     ground = settle(colours, seen, follows)
-    if np.count_nonzero(seen & ~ground) < THING * ground.size:
+    if np.count_nonzero(seen & ~ground) < OBJECT * ground.size:
         return there
     # Give blocks with unknown pixels the value of the nearest known block.
     nearest = distance_transform_edt(~seen, return_distances=False, return_indices=True)
@@ -286,7 +286,7 @@ def settle(colours: NDArray[np.float64], known: Bools, follows: Bools) -> Bools:
         near = np.where(ground, inside, outside) < wide
         ground = np.where(near, says > 0, ground) & known
         ground = median_filter(ground, 5) & known
-    for value, least in ((True, LEAST), (False, THING)):
+    for value, least in ((True, LEAST), (False, OBJECT)):
         # Merge parts that are too small with their surroundings.
         pieces, _ = label(ground == value)
         small = np.bincount(pieces.ravel()) < least * ground.size

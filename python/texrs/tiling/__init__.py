@@ -57,7 +57,7 @@ from texrs.tiling._enlarging import extend
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
 from texrs.tiling._lighting_choice import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
-from texrs.tiling._whole_elements import SMALLEST, Things, find_things
+from texrs.tiling._whole_elements import SMALLEST, WholeElements, find_whole_elements
 
 __all__ = ["Tiling", "check_tiling", "tile"]
 
@@ -242,11 +242,11 @@ def _join_edges(
     watch("segment", 0.0)
     found: dict[int, Joined] = {}
     reasons: dict[str, str] = {}
-    things = None if len(already) == sum(wrap) else find_things(exemplar.guidance)
+    elements = None if len(already) == sum(wrap) else find_whole_elements(exemplar.guidance)
     if larger:
         source = extend(exemplar.guidance, size, wrap, watch)
     else:
-        source, found, reasons = _join_ends(exemplar.guidance, things, size, choices, wrap, already, refused, watch)
+        source, found, reasons = _join_ends(exemplar.guidance, elements, size, choices, wrap, already, refused, watch)
     weight = screening if found or larger else 0.0
     source = source.with_finish(wrap, screening=weight or None, flatten_lighting=flatten_lighting)
     composite = source.render(exemplar.image)
@@ -270,9 +270,9 @@ def _join_edges(
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
         "joints": {AXES[a]: _describe(joined) for a, joined in found.items()},
         "in_place": round(_measure_kept_places(source), 4),
-        "in_step": things is not None and things.strict,
+        "in_step": elements is not None and elements.strict,
         "tiling": report_tiling(
-            check_result(result, source, wrap, regular=things is not None and things.regular), wrap
+            check_result(result, source, wrap, regular=elements is not None and elements.regular), wrap
         ),
     }
     return Synthesis(result, source, stages, report)
@@ -370,7 +370,7 @@ def _choose(side: int, wanted: int, free: bool) -> Choice:
 
 def _join_ends(
     colours: Floats,
-    things: Things | None,
+    elements: WholeElements | None,
     wanted: tuple[int, int],
     choices: Sequence[Choice],
     wrap: Sequence[bool],
@@ -394,17 +394,17 @@ def _join_ends(
     reasons: dict[str, str] = {}
     # Columns before rows, as in the paper.
     for axis in (1, 0):
-        if not wrap[axis] or axis in already or things is None:
+        if not wrap[axis] or axis in already or elements is None:
             continue
         shown = colours.reshape(-1, colours.shape[-1]).take(place, axis=0) if found else colours[part]
-        depth = things.depth.take(place) if found else things.depth[part]
+        depth = elements.depth.take(place) if found else elements.depth[part]
         choice = choices[axis]
-        if things.side > ELEMENT * place.shape[axis]:
+        if elements.side > ELEMENT * place.shape[axis]:
             choice = replace(choice, covered=DEAR)
-        elif things.is_out_of_step(axis, place.shape[axis]):
+        elif elements.is_out_of_step(axis, place.shape[axis]):
             # Any multiple of the period fits, so prefer the largest one.
             choice = replace(choice, covered=DEAR, loss=PERIODIC)
-        elif things.regular:
+        elif elements.regular:
             choice = replace(choice, covered=REGULAR)
         joined = find_joint(
             make_levels(shown, depth),
@@ -420,19 +420,19 @@ def _join_ends(
         label = np.take_along_axis(label, line, axis) * np.uint32(len(PIECES)) + piece if found else piece
         found[axis] = joined
         if choice.period and not joined.joint.cover:
-            reasons[AXES[axis]] = _give_reason(joined, things, axis, shape[axis])
+            reasons[AXES[axis]] = _give_reason(joined, elements, axis, shape[axis])
     coordinates = np.stack(np.divmod(place, shape[1]), axis=-1).astype(np.float32)
     return SourceMap.from_coordinates(coordinates, shape, label=label), found, reasons
 
 
-def _give_reason(joined: Joined, things: Things, axis: int, side: int) -> str:
+def _give_reason(joined: Joined, elements: WholeElements, axis: int, side: int) -> str:
     """Return why an axis became shorter."""
-    length, period = joined.joint.period, things.find_period(axis)
-    if times := things.count_periods(axis, length):
+    length, period = joined.joint.period, elements.find_period(axis)
+    if times := elements.count_periods(axis, length):
         return f"{side} -> {length} pixels: {times} whole periods of about {period:.1f}"
-    if things.side > ELEMENT * side:
+    if elements.side > ELEMENT * side:
         return f"{side} -> {length} pixels: elements are large, and fewer are cut at this length"
-    if things.is_out_of_step(axis, side):
+    if elements.is_out_of_step(axis, side):
         return f"{side} -> {length} pixels: no multiple of the period of about {period:.1f} fits, and the ends fit better here"
     return f"{side} -> {length} pixels: a joint that keeps the length costs {joined.dearer:.1f} times as much"
 

@@ -12,7 +12,7 @@ from texrs.exemplar.regularity import bend, find_lattice
 from texrs.kernels.gather import gather
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
-from texrs.tiling._whole_elements import find_things
+from texrs.tiling._whole_elements import find_whole_elements
 
 PATCH, OVERLAP, DEEP = 0.6, 0.25, 6.0
 """Side of a patch and overlap of two patches, as shares of the shorter side, and additional cost of a seam inside elements."""
@@ -21,8 +21,8 @@ PATCH, OVERLAP, DEEP = 0.6, 0.25, 6.0
 def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: Progress) -> SourceMap:
     """Return the source map of a periodic quilt of an image."""
     shape = (colours.shape[0], colours.shape[1])
-    things = find_things(colours)
-    picture = Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * things.depth, things.regular)
+    elements = find_whole_elements(colours)
+    picture = Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * elements.depth, elements.regular)
     return quilt(
         [close_lattice(picture, size, wrap)],
         size,

@@ -27,7 +27,7 @@ SMALLEST = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Things:
+class WholeElements:
     """The parts of an image that seams should avoid."""
 
     depth: Floats
@@ -64,9 +64,9 @@ class Things:
         return self.strict and self.find_period(axis) > 0 and not self.count_periods(axis, length)
 
 
-def find_things(colours: Floats) -> Things:
+def find_whole_elements(colours: Floats) -> WholeElements:
     """Find the elements that seams should avoid in the coarsest level of an image."""
-    nothing = Things(np.zeros(colours.shape[:2], np.float32))
+    nothing = WholeElements(np.zeros(colours.shape[:2], np.float32))
     if min(colours.shape[:2]) < SMALLEST:
         return nothing
     parts = segment(make_levels(colours, nothing.depth)[0].colours)
@@ -81,4 +81,4 @@ def find_things(colours: Floats) -> Things:
     rows, columns = (np.arange(n) * m // n for n, m in zip(colours.shape, depth.shape, strict=False))
     area = np.bincount(parts.elements.ravel())[1:].astype(np.float64)
     side = np.sqrt((area**2).sum() / area.sum()) * scale
-    return Things(np.ascontiguousarray(depth[rows][:, columns]), float(side), lattice, strict)
+    return WholeElements(np.ascontiguousarray(depth[rows][:, columns]), float(side), lattice, strict)

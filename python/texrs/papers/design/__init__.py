@@ -199,7 +199,7 @@ def design(
         - ``rotate``: Largest rotation that was used, in degrees.
         - ``pixel_counts``: Number of pixels from each example.
         - ``density``: For each scattered example, its density as ``asked``, ``reached`` and in the example (``own``), and the
-          number of ``things``; else None.
+          number of ``elements``; else None.
         - ``holes``: For each copy, the share of its pixels that were filled.
         - ``screening``: Weight of the values in the colour correction.
         - ``seams``: Visibility of the seams ``before`` and ``after`` the correction: number of ``edges``, ``mean`` (1 is that

@@ -61,7 +61,7 @@ class Layer:
     colours: Floats
     depth: Floats
     """Depth of each pixel inside an element, 0 to 1; 0 on the background."""
-    things: Bools
+    elements: Bools
     """Pixels of elements."""
 
 
@@ -192,12 +192,12 @@ def measure_ends(layer: Layer) -> NDArray[np.float32]:
     ends = np.empty((2, 2, *layer.depth.shape), np.float32)
     for axis in range(2):
         colours, depth = np.roll(layer.colours, -1, axis), np.roll(layer.depth, -1, axis)
-        things = np.roll(layer.things, -1, axis)
+        elements = np.roll(layer.elements, -1, axis)
         edge = np.abs(layer.colours - colours).sum(axis=-1)
         ground = CREASE + (1 - CREASE) * exp_single(-edge / max(2 * float(edge.mean()), 1e-6))
         plain = ground + DEEP * np.minimum(layer.depth, depth)
-        ends[axis, 0] = np.where(layer.things & ~things, OUTLINE, plain)
-        ends[axis, 1] = np.where(things & ~layer.things, OUTLINE, plain)
+        ends[axis, 0] = np.where(layer.elements & ~elements, OUTLINE, plain)
+        ends[axis, 1] = np.where(elements & ~layer.elements, OUTLINE, plain)
     return ends
 
 

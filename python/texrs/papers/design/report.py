@@ -96,7 +96,7 @@ def describe_density(plans: Sequence[Plan], composite: SourceMap, density: NDArr
             "asked": round(float(asked[which - 1]), 4),
             "reached": round(float((composite.exemplar == which).mean()), 4),
             "own": round(float((plans[which].parts.elements > 0).mean()), 4),
-            "things": int(np.unique(composite.label[composite.exemplar == which]).size),
+            "elements": int(np.unique(composite.label[composite.exemplar == which]).size),
         }
         for which in range(1, len(plans))
     ]

@@ -25,7 +25,7 @@ from texrs.papers.design.operations import Moves
 from texrs.papers.design.plan import Plan
 from texrs.source_map import SourceMap
 
-__all__ = ["find_things", "scatter"]
+__all__ = ["find_scattered_elements", "scatter"]
 
 SMALL, LARGE = 0.3, 4.0
 """Least and largest area of an element, relative to the median.
@@ -65,7 +65,7 @@ Remaining area, in element areas, below which the next element is chosen by its 
 """
 
 
-def find_things(plan: Plan, number: int) -> list[Element]:
+def find_scattered_elements(plan: Plan, number: int) -> list[Element]:
     """Return the elements that can be scattered: whole ones, neither splinters nor clumps.
 
     Raises
@@ -232,25 +232,25 @@ def scatter_layer(sheet: ScatteredSheet, plan: Plan, which: int, density: NDArra
     """Scatter the elements of one exemplar below those that are there, until they reach their density."""
     shape = plan.guide.shape[0], plan.guide.shape[1]
     due = float(np.mean(density)) * sheet.layer.size
-    things = find_things(plan, which)
+    elements = find_scattered_elements(plan, which)
     if due < 1:
         return
     rng = np.random.default_rng((seed, which, 5))
     heap = classify(plan.parts) in ("heap", "leaves")
-    extent = float(np.sqrt(np.median([e.area for e in things])))
+    extent = float(np.sqrt(np.median([e.area for e in elements])))
     room = Room.measure(density, sheet, extent, (seed, which))
-    usual = float(np.mean([e.area for e in things]))
+    usual = float(np.mean([e.area for e in elements]))
     every = max(1, int(due / usual / ROUNDS))
     covered, number, vain = 0, 0, 0
     # Lay one element per round, until the area is covered or too many elements in a row found no place.
     while covered < (1 - EXACT) * due and vain < PATIENCE:
         left = due - covered
         # The last element is chosen by size, so that it covers the remaining area.
-        drawn = [cut_out(things[int(rng.integers(len(things)))], plan.moves, shape, seed, which, number)]
+        drawn = [cut_out(elements[int(rng.integers(len(elements)))], plan.moves, shape, seed, which, number)]
         if left < LAST * usual:
-            for thing in rng.permutation(len(things))[:FITTED]:
+            for index in rng.permutation(len(elements))[:FITTED]:
                 number += 1
-                drawn.append(cut_out(things[thing], plan.moves, shape, seed, which, number))
+                drawn.append(cut_out(elements[index], plan.moves, shape, seed, which, number))
         number += 1
         stamp = drawn[0] if len(drawn) == 1 else min(drawn, key=lambda s: abs(s.area - left))
         if number % every == 0:

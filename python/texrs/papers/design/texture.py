@@ -133,11 +133,11 @@ def report_share(watch: Progress, number: int, count: int, share: float) -> None
 def measure_layer(source: SourceMap, plan: Plan) -> Layer:
     """Return the colours of a texture of one exemplar, and the places of its elements."""
     parts, where = plan.parts, source.coordinates
-    depth, things = np.zeros((2, *plan.guide.shape[:2]), np.float32)
+    depth, elements = np.zeros((2, *plan.guide.shape[:2]), np.float32)
     if parts.kind in ("components", "labels"):
-        depth, things = parts.measure_depth(DEEP), (parts.elements > 0).astype(np.float32)
+        depth, elements = parts.measure_depth(DEEP), (parts.elements > 0).astype(np.float32)
     colours = gather(plan.guide, where, interpolation="nearest")
-    shown = gather(np.stack([depth, things], axis=-1), where, interpolation="nearest")
+    shown = gather(np.stack([depth, elements], axis=-1), where, interpolation="nearest")
     return Layer(source, colours, shown[..., 0], shown[..., 1] > 0)
 
 

@@ -53,7 +53,7 @@ from texrs.materials import Material
 from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
 from texrs.papers.perspective.sizes import Sizes
-from texrs.papers.perspective.surfaces import Laid, lay_out
+from texrs.papers.perspective.surfaces import PreparedExemplar, lay_out
 from texrs.planes import Plane
 from texrs.scale_maps import Measuring
 from texrs.scale_maps._kinds import Kind
@@ -253,7 +253,7 @@ def perspective(
     return Synthesis(composite, source, stages, describe(asked, laid, found))
 
 
-def describe(asked: Request, laid: Laid, found: FromSheet) -> dict[str, Any]:
+def describe(asked: Request, laid: PreparedExemplar, found: FromSheet) -> dict[str, Any]:
     """Return the report as JSON types."""
     elements = laid.sheet.elements
     return {

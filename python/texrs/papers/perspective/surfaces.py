@@ -18,11 +18,11 @@ from texrs.papers.perspective.sizes import Outside, bring_within, choose_sizes
 from texrs.planes._projective import find_focal
 from texrs.scale_maps._slope import LEVEL, Slope
 
-__all__ = ["Laid", "lay_out"]
+__all__ = ["PreparedExemplar", "lay_out"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Laid:
+class PreparedExemplar:
     """A prepared exemplar.
 
     Attributes
@@ -50,7 +50,7 @@ class Laid:
     sizes: tuple[float, ...]
 
 
-def lay_out(asked: Request) -> Laid:
+def lay_out(asked: Request) -> PreparedExemplar:
     """Prepare an exemplar for the requested output."""
     colours = asked.exemplar.guidance
     plane = find_slope(asked, colours)
@@ -71,10 +71,10 @@ def lay_out(asked: Request) -> Laid:
         target = power_single(wanted, plane.power)
         sheet = Flattened.of(colours, plane, target)
     frames = None if asked.turn is None else sheet.frames(target, asked.wrap, asked.turn)
-    return Laid(sheet, target, wanted, frames, outside, sizes)
+    return PreparedExemplar(sheet, target, wanted, frames, outside, sizes)
 
 
-def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Slope | None) -> Laid:
+def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Slope | None) -> PreparedExemplar:
     """Prepare an exemplar for a surface: its plane flattened, the image as it is from the front, or copies."""
     areas = asked.target.astype(np.float64)
     front = plane is None and is_frontal(asked)
@@ -96,7 +96,7 @@ def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, pla
         sheet = Frontal.over(colours, float(np.median(scale)), held)
     else:
         sheet = Copies.of(colours, scale, sizes, held)
-    return Laid(sheet, held, wanted, sheet.bend(shown, held), outside, sizes)
+    return PreparedExemplar(sheet, held, wanted, sheet.bend(shown, held), outside, sizes)
 
 
 def turned(asked: Request, surface: NDArray[np.float64]) -> NDArray[np.float64]:

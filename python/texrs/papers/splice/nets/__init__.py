@@ -34,7 +34,7 @@ from texrs.exemplar import Exemplar
 from texrs.exemplar.cells import Cells
 from texrs.growth.start import OVERLAP, weights_of
 from texrs.papers.splice.nets.graph import describe_places, join_knots
-from texrs.papers.splice.nets.knots import Laid, lay_knots
+from texrs.papers.splice.nets.knots import PlacedKnots, lay_knots
 from texrs.papers.splice.nets.net_drawings import draw_net_stages
 from texrs.papers.splice.nets.targets import Targets, interpolate_layouts, take_own_points, take_points
 from texrs.papers.splice.result import list_place, report_ways
@@ -142,7 +142,7 @@ def splice_nets(
 
 
 def grow_rest(
-    a: ElementAnalysis, laid: Laid, mine: Floats, theirs: Floats, unit: float, seed: int, watch: Progress
+    a: ElementAnalysis, laid: PlacedKnots, mine: Floats, theirs: Floats, unit: float, seed: int, watch: Progress
 ) -> NDArray[np.int32]:
     """Return the source pixels after patches, grown around the knots, filled the pixels without a knot."""
     free = laid.target == FREE
@@ -174,7 +174,12 @@ def _code(said: Floats) -> NDArray[np.int16]:
 
 
 def _report(
-    a: ElementAnalysis, wanted: Targets, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp], unit: float
+    a: ElementAnalysis,
+    wanted: Targets,
+    laid: PlacedKnots,
+    places: NDArray[np.int32],
+    shown: NDArray[np.intp],
+    unit: float,
 ) -> dict[str, Any]:
     """Return the requested and reached knots, in JSON types."""
     size, source = places.shape[:2], laid.source[shown]
@@ -195,7 +200,7 @@ def _report(
     }
 
 
-def _find_places(a: ElementAnalysis, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
+def _find_places(a: ElementAnalysis, laid: PlacedKnots, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
     """Return the position of each knot in the output, from the source map; NaN if it is not visible."""
     found: Points = laid.found[shown]
     size = np.array(places.shape[:2])

@@ -13,7 +13,7 @@ from texrs._engine.stitcher import FREE, Pasting, Samples
 from texrs._typing import Bools, Floats, Progress
 from texrs.elements import ElementAnalysis
 
-__all__ = ["Laid", "lay_knots"]
+__all__ = ["PlacedKnots", "lay_knots"]
 
 Points = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ LOST = 0.35
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Laid:
+class PlacedKnots:
     """Pixels of the laid knots.
 
     Attributes
@@ -96,7 +96,7 @@ class Window:
 
 def lay_knots(
     a: ElementAnalysis, mine: Floats, targets: Points, theirs: Floats, unit: float, seed: int, watch: Progress
-) -> Laid:
+) -> PlacedKnots:
     """Lay a knot at each target.
 
     Parameters
@@ -170,7 +170,7 @@ def lay_knots(
         found[t] = np.rint(targets[t]) - middles[source[t]] - away[tried[k]] + points[source[t]]
         used[source[t]] += 1
     places = np.stack(np.divmod(np.where(shown == FREE, 0, shown).astype(np.int32), np.int32(shape[1])), axis=-1)
-    return Laid(places, owner, source, found)
+    return PlacedKnots(places, owner, source, found)
 
 
 def list_shifts(most: float) -> NDArray[np.intp]:
