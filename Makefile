@@ -1,4 +1,4 @@
-# Each goal sets up all it needs in this folder: a virtual environment in .venv and a release build.
+# Each goal sets up everything that it needs in this folder: a virtual environment in .venv and a release build.
 # make demo | test | fuzz | levels | lint | bench | wheel | docs | format | clean
 
 PYTHON ?= python3
@@ -11,27 +11,27 @@ RUST := Cargo.toml $(shell find rust -name '*.rs')
 
 .PHONY: help demo test test-rust test-python fuzz fuzz-kernels sanitize kills levels audit lint lint-rust lint-python format bench bench-kernels bench-guard wheel docs docs-check clean requirements
 .DELETE_ON_ERROR:
-# Compilers count the processors themselves: what make says of its own jobs is not for them.
+# Compilers count the processors themselves, so they must not inherit the job count of make.
 unexport MAKEFLAGS
 
 help:
-	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
+	@echo "make demo    images of every system on built-in examples: demo/index.html"
 	@echo "make test    all tests, Rust and Python"
 	@echo "make fuzz    random cases, hostile values, damaged files, for about ten minutes (MINUTES=10)"
-	@echo "make fuzz-kernels  the targets in fuzz/ alone, which share MINUTES (a nightly compiler)"
-	@echo "make sanitize  the Rust tests with checked addresses (a nightly compiler)"
+	@echo "make fuzz-kernels  only the targets in fuzz/, which share MINUTES (needs a nightly compiler)"
+	@echo "make sanitize  the Rust tests with checked addresses (needs a nightly compiler)"
 	@echo "make kills   commands killed at random moments (COUNT=200)"
-	@echo "make levels  stored results on lesser processors, some of them emulated (qemu-user)"
+	@echo "make levels  compare stored results on lesser processors, some of them emulated (qemu-user)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
-	@echo "make audit   licences of all that texrs needs, and its known defects (cargo-deny, where it is installed)"
-	@echo "make format  rewrite the sources in the house's format"
-	@echo "make bench   texrs beside other libraries and programs: benches/peers.json"
+	@echo "make audit   licences and known defects of all dependencies (cargo-deny, if it is installed)"
+	@echo "make format  format the sources"
+	@echo "make bench   compare texrs with other libraries and programs: benches/peers.json"
 	@echo "make bench-kernels  criterion benches of the kernels"
-	@echo "make bench-guard  instructions of the hottest kernels against those stored (valgrind)"
-	@echo "make wheel   a wheel and a source distribution in dist/, tried in clean environments"
+	@echo "make bench-guard  compare the instruction counts of the hottest kernels with the stored ones (valgrind)"
+	@echo "make wheel   a wheel and a source distribution in dist/, tested in clean environments"
 	@echo "make docs    documentation, gallery and reference: docs/_build/html/index.html"
-	@echo "make docs-check  these pages in a browser: accessibility, weight, links"
-	@echo "make clean   remove what the other goals made"
+	@echo "make docs-check  check these pages in a browser: accessibility, weight, links"
+	@echo "make clean   remove the files of the other goals"
 
 requirements:
 	@command -v $(PYTHON) >/dev/null 2>&1 || { echo "texrs needs Python 3.11 or newer: $(PYTHON) was not found (make PYTHON=/path/to/python3)" >&2; exit 1; }
@@ -53,9 +53,9 @@ demo: $(VENV)/.built
 	$(BIN)/texrs demo -o demo --force
 	@echo "Open demo/index.html in a browser."
 
-# All Rust tests are in the library: to build it once more for others would take a minute. Workers share the processors: were
-# each to have threads too, for matrices or for kernels, these would wait for each other; tests of threads ask for some. Dozens
-# of processes start: byte code is kept for them, whatever the environment says.
+# All Rust tests are in the library, because building it again for separate test programs takes a minute. Each worker uses one
+# thread, because the workers share the processors; tests of threads request more. Byte code is always kept, because the tests
+# start dozens of processes.
 test: test-rust test-python
 
 test-rust: | requirements
@@ -64,8 +64,8 @@ test-rust: | requirements
 test-python: $(VENV)/.built
 	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
-# Property tests, all hostile values of all arguments, damaged files, and the targets in fuzz/, where there is a nightly compiler.
-# Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
+# Property tests, all hostile values of all arguments, damaged files, and, with a nightly compiler, the targets in fuzz/. Each round
+# has a seed. Rounds run until one fails or the time is up; SEED repeats one round.
 fuzz: $(VENV)/.built
 	@end=$$(($$(date +%s) + 60 * $(MINUTES))); \
 	while seed=$(or $(SEED),$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')); do \
@@ -78,11 +78,11 @@ fuzz: $(VENV)/.built
 		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
 	done
 
-# From where the last run came to: what covered more of the code stays in fuzz/corpus.
+# Continue the last run: inputs that covered more of the code are kept in fuzz/corpus.
 fuzz-kernels: $(VENV)/.tools
 	$(BIN)/python .ci/fuzz --seconds $$((60 * $(MINUTES))) $(TARGETS)
 
-# What reads or writes beside an array ends the test that does. Stacks are larger where addresses are checked.
+# A test that reads or writes outside an array fails. Checked addresses need larger stacks.
 sanitize: | requirements
 	RUSTFLAGS=-Zsanitizer=address RUST_MIN_STACK=33554432 cargo +nightly test --quiet --lib \
 		--target $$(rustc -vV | sed -n 's/^host: //p')
@@ -91,20 +91,20 @@ sanitize: | requirements
 levels: $(VENV)/.built
 	MINUTES=$(MINUTES) $(BIN)/python .ci/levels
 
-# Commands killed at random moments, and several that write to one place at once.
+# Kill commands at random moments, and run several that write to one file at once.
 kills: $(VENV)/.built
 	$(BIN)/python tests/kill_commands.py --count $(or $(COUNT),200)
 
-# Side by side with `make -j2 lint`: the checks of either language leave a processor idle.
+# `make -j2 lint` checks both languages in parallel, because each leaves a processor idle.
 lint: lint-rust lint-python audit
 
-# What texrs is built on. The database of advisories is cargo-deny's, which fetches it: CI has it, a quiet machine may not.
+# Check the dependencies. cargo-deny downloads its database of advisories, so it needs a network.
 audit: $(VENV)/.tools
 	$(BIN)/python .ci/licences
 	@if command -v cargo-deny >/dev/null; then cargo deny check; \
-		else echo "advisories: not looked at, cargo-deny is not installed (cargo install cargo-deny)"; fi
+		else echo "advisories: not checked, because cargo-deny is not installed (cargo install cargo-deny)"; fi
 
-# With the same features, dependencies are checked once.
+# Clippy and rustdoc use the same features, so that dependencies are checked once.
 lint-rust: | requirements
 	cargo fmt --check
 	cargo clippy --all-targets --quiet --features python -- -D warnings
@@ -125,8 +125,8 @@ format: $(VENV)/.tools
 	$(BIN)/ruff check --fix --quiet . || true
 	$(BIN)/ruff format .
 
-# Beside other libraries and programs, as the page on performance shows them; these live in an environment of their own, for
-# some are under the GPL. ROWS="strip-512 ring-512" measures these again.
+# Compare with other libraries and programs, as the page on performance shows. They are in a separate environment, because some
+# are under the GPL. ROWS="strip-512 ring-512" measures these rows again.
 bench: $(VENV)/.built $(PEERS)/.tools
 	$(BIN)/python benches/peers $(if $(ROWS),--only $(ROWS)) --rounds $(or $(ROUNDS),5)
 
@@ -139,11 +139,11 @@ $(PEERS)/.tools: pyproject.toml | requirements
 bench-kernels: | requirements
 	cargo bench
 
-# Instructions hang on nothing else that runs. REGENERATE=1 stores them anew.
+# Instruction counts do not depend on other running programs. REGENERATE=1 stores new ones.
 bench-guard: | requirements
 	.ci/counts
 
-# Built for this machine, and used in clean environments by each Python that is here.
+# Build for this machine, and test in clean environments with each installed Python.
 wheel: $(VENV)/.tools
 	rm -rf dist
 	$(BIN)/maturin build --release --quiet --out dist
@@ -154,14 +154,14 @@ $(VENV)/.documented: $(VENV)/.built
 	$(BIN)/python -m pip install --quiet --group docs
 	@touch $@
 
-# Pages of Python, with those of the kernels in the folder rust; warnings are errors.
+# Build the Python pages, and those of the kernels in the folder rust. Warnings are errors.
 docs: $(VENV)/.documented
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	rm -rf docs/_build/html/rust && cp -r target/doc docs/_build/html/rust
 	@echo "Open docs/_build/html/index.html in a browser."
 
-# In a browser: accessibility, weight, what moves, links; needs Chromium, and `make docs` before it.
+# Check accessibility, weight, layout shift and links in a browser. Chromium and an earlier `make docs` are needed.
 docs-check: $(VENV)/.tools
 	$(BIN)/python -m pip install --quiet --group pages
 	$(BIN)/python .ci/pages
