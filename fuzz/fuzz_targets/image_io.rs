@@ -10,7 +10,7 @@ use texrs_fuzz::{Draw, speaks};
 const FORMATS: [Format; 3] = [Format::Png, Format::Tiff, Format::Hdr];
 const SAMPLES: [Sample; 3] = [Sample::U8, Sample::U16, Sample::F32];
 
-/// Reads a file, and checks that the result is inpaint and within the limits.
+/// Reads a file, and checks that the result is complete and within the limits.
 fn read(file: &[u8], limit: u64) -> Option<Decoded> {
     let found = decode("file", file, limit).inspect_err(speaks).ok()?;
     let [rows, columns, channels] = found.shape;
