@@ -68,7 +68,7 @@ def test_windows_larger_than_memory(here: Path, tiles: texrs.CornerTiles) -> Non
         (["-o", "set", "--origin", "3,4"], "--origin: is of a window, and needs --size"),
         (["-o", "set", "--workers", "2"], "--workers: is of a window"),
         (["-o", "w.png", "--size", "8", "--index", "8"], "--index: is of the index texture"),
-        (["-o", "set", "--tile-size", "50"], "--tile-size: needs a multiple of 4"),
+        (["-o", "set", "--tile-size", "50"], "--tile-size: must be a multiple of 4"),
         (["-o", "w.png", "--size", "8", "--origin", "1"], "--origin: needs X,Y"),
         (["-o", "set", "--role", "a=height"], "--role: is for materials"),
         (["-o", "dots.png", "--size", "8"], "dots.png is read"),

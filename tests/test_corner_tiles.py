@@ -156,9 +156,9 @@ def test_engines_read_what_is_saved(stones: texrs.CornerTiles, tmp_path: Path) -
 def test_wrong_arguments(tiles: texrs.CornerTiles) -> None:
     for call, message in (
         (lambda: texrs.CornerTiles(DOTS, 30), "tile_size: must be an integer between 32"),
-        (lambda: texrs.CornerTiles(DOTS, 50), "tile_size: needs a multiple of 4"),
+        (lambda: texrs.CornerTiles(DOTS, 50), "tile_size: must be a multiple of 4"),
         (lambda: texrs.CornerTiles(DOTS, 48, variants=0), "variants"),
-        (lambda: texrs.CornerTiles(DOTS, 48, wrap=True), "wrap: is given by tile_size"),
+        (lambda: texrs.CornerTiles(DOTS, 48, wrap=True), "wrap: cannot be set; use tile_size"),
         (lambda: tiles.window((0, 10**16), 5), "origin"),
         (lambda: tiles.window(0, (5, 0)), "size"),
         (lambda: tiles[0:5], "index: must be ranges"),

@@ -1,18 +1,19 @@
-"""Designs without an end: corner tiles, of which any window is looked up.
+"""Unbounded designs from corner tiles: any window is a look-up.
 
-A. Lagae and P. Dutre, "An alternative for Wang tiles: colored edges versus colored corners", ACM Transactions on Graphics
-25(4), 2006. Each corner of a lattice has one of three colours, by hash; the four corners of a cell say which of 81 tiles lies
-there. So neighbours agree along their edges and at their corners, nothing repeats, and a window takes the time of a copy,
-wherever it is.
+The method is A. Lagae and P. Dutre, "An alternative for Wang tiles: colored edges versus colored corners", ACM
+Transactions on Graphics 25(4), 2006. Each corner of a lattice has one of three colours, chosen by a hash. The four
+corners of a cell select one of 81 tiles. Neighbouring tiles therefore agree along their edges and at their corners,
+and nothing repeats periodically. A window takes only the time of a copy, wherever it is.
 
-The flow: several cyclic pictures are designed (`texrs.design_variants`); strips between each two corners are cut from them,
-and the inside of each tile is cut into its ring of strips, once along all edges (`texrs.corner_tiles._cutting`). Of the places
-most like what is known (`texrs.corner_tiles._fitting`) those are taken whose cuts show least; cuts through elements cost more.
-Where the exemplar repeats on a lattice, tiles hold whole periods of it, and all their pieces are cut in step. The paper has
-neither the search nor the step, and strips twice as wide, in which more is seen again.
+First, several tileable images are designed (`texrs.design_variants`). Then a strip for each pair of corners is cut
+from them. Finally the inside of each tile is cut into its ring of strips, once along all edges
+(`texrs.corner_tiles._cutting`). Candidates are the positions that are most similar to the known part
+(`texrs.corner_tiles._fitting`). The candidate with the least visible cut is used; cuts through elements cost more. If
+the exemplar repeats on a lattice, tiles contain whole periods, and all their pieces are aligned with the lattice. The
+paper has neither the search nor the alignment. Its strips are twice as wide, so more content recurs.
 
-In the atlas the tiles lie on a torus of 9 x 9, in which each is there once and fits its neighbours: it can be filtered, and
-is a cyclic texture itself.
+The atlas arranges the tiles on a torus of 9 x 9. Each tile is in it once and fits its neighbours. The atlas can
+therefore be filtered, and is a tileable texture itself.
 """
 
 from __future__ import annotations
@@ -51,38 +52,38 @@ from texrs.synthesis import Synthesis
 __all__ = ["CornerTiles"]
 
 MAX_COORDINATE = 10**15
-"""Coordinates of the world are within so many pixels."""
+"""Largest absolute coordinate of the unbounded texture."""
 LARGER = "texrs.CornerTiles.to_zarr and to_dask give it in parts"
-"""How what is too large for one array is had."""
+"""Remedy in the error for windows that are too large for one array."""
 IMAGE = "image"
 KEEP = 4.0
-"""What a cut deep inside of an element costs more, as a multiple."""
+"""Extra cost of a cut deep inside an element, relative to other cuts."""
 DEPTH = 3.0
 
 
 class CornerTiles(InParts):
-    """An unbounded design: 81 corner tiles, and which one lies where.
+    """An unbounded design: 81 corner tiles, and the tile of each cell.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar or Material
-        The example, as `texrs.design` takes it.
+        Example, as for `texrs.design`.
     tile_size : int, optional
-        Of a tile, 32 to 1024 and a multiple of 4; that of the exemplar's shorter side, 64 to 256, by default, or less so that
-        what repeats does so in whole periods.
+        Side of a tile in pixels, 32 to 1024 and a multiple of 4. Default: the exemplar's shorter side, limited to 64
+        to 256, or less to contain whole periods of a repeating exemplar.
     seed : int
-        Chooses the tiles and where they lie, 0 to 2^64 - 1.
+        Seed of the tiles and of their arrangement, 0 to 2^64 - 1.
     variants : int
-        Cyclic pictures that tiles are cut from, 1 to 64, each twice as large as a tile.
+        Number of tileable images that tiles are cut from, 1 to 64. Each is twice as large as a tile. Default: 4.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+        Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
     **options
-        Those of `texrs.design_variants`, such as ``motion`` or ``deformation``.
+        Options of `texrs.design_variants`, such as ``motion`` or ``deformation``.
 
     Raises
     ------
     InvalidInput
-        What `texrs.design` refuses, or an option out of its range.
+        `texrs.design` refuses the exemplar, or an option is out of its range.
     Cancelled
         The work was stopped.
 
@@ -114,10 +115,12 @@ class CornerTiles(InParts):
         if tile_size is None:
             tile_size = choose_side(known.segment().lattice, int(np.clip(min(known.shape), 64, 256)) // 4 * 4)
         if as_int(tile_size, "tile_size", 32, 1024) % 4:
-            raise InvalidInput(f"tile_size: needs a multiple of 4, got {tile_size}")
+            raise InvalidInput(f"tile_size: must be a multiple of 4, got {tile_size}")
         self._side, self._seed = tile_size, as_seed(seed)
         if {"size", "wrap", "count"} & options.keys():
-            raise InvalidInput(f"{min({'size', 'wrap', 'count'} & options.keys())}: is given by tile_size and variants")
+            raise InvalidInput(
+                f"{min({'size', 'wrap', 'count'} & options.keys())}: cannot be set; use tile_size and variants"
+            )
         check_work("CornerTiles", [known.pixels], (9 * tile_size, 9 * tile_size), "tile_size")
         given = exemplar if isinstance(exemplar, Material) else known
         made = list(
@@ -125,12 +128,14 @@ class CornerTiles(InParts):
                 given, as_int(variants, "variants", 1, 64), 2 * tile_size, seed=seed, progress=watch, **options
             )
         )
+        # Cuts through elements cost more, the deeper inside they are.
         depth = _measure_depth(known)
         costs = [np.asarray(KEEP * each.source_map.render(depth, interpolation="linear"), np.float32) for each in made]
         pictures = Pictures(np.stack([each.image for each in made]), np.stack(costs))
         advance = stage(watch, "tiles")
         step = find_step(list(pictures.images), known.segment().lattice, tile_size)
         tiles = cut_tiles(pictures, tile_size, step, self._seed, advance or (lambda share: None))
+        # Arrange the tiles on the torus, where each is once, and store where each number is.
         around = np.pad(TORUS, (0, 1), mode="wrap")
         order = number_tiles(around)
         self._place: NDArray[np.intp] = np.empty(TILES, np.intp)
@@ -144,6 +149,7 @@ class CornerTiles(InParts):
         else:
             self._maps[IMAGE] = pictures.look(laid)
         self._like = materials[0] if materials else None
+        # The atlas is a look-up into the designs, which are look-ups into the exemplar. Compose the two.
         outer = SourceMap(
             laid[..., 1:].astype(np.float32),
             laid[..., 0].astype(np.uint16),
@@ -154,32 +160,32 @@ class CornerTiles(InParts):
         self._source = outer.compose([each.source_map for each in made])
 
     def __repr__(self) -> str:
-        """Say what the tiles are."""
+        """Return the number, size and seed of the tiles."""
         return f"<{TILES} corner tiles of {self._side} x {self._side}, seed {self._seed}>"
 
     @property
     def tile_size(self) -> int:
-        """Pixels of a tile's side."""
+        """Side of a tile, in pixels."""
         return self._side
 
     @property
     def atlas(self) -> Array:
-        """All tiles on a torus, (9 tile_size, 9 tile_size[, C]): each fits those beside it."""
+        """All tiles on a torus, (9 tile_size, 9 tile_size[, C]). Each tile fits its neighbours."""
         return self._maps[self._base]
 
     @property
     def material(self) -> Material | None:
-        """All maps of the atlas, of a material."""
+        """All maps of the atlas, if the exemplar is a material."""
         return None if self._like is None else self._like.replace(**self._maps)
 
     @property
     def source_map(self) -> SourceMap:
-        """Where the pixels of the atlas come from."""
+        """Source map of the atlas."""
         return self._source
 
     @cached_property
     def key(self) -> str:
-        """Digest of all that decides the windows."""
+        """Hash of everything that determines the windows."""
         return content_hash(self._side, self._seed, *self._maps, *self._maps.values()).hex()
 
     @property
@@ -187,24 +193,24 @@ class CornerTiles(InParts):
         return IMAGE if self._like is None else self._like.base_name
 
     def index(self, origin: int | Sequence[int], size: int | Sequence[int]) -> NDArray[np.uint8]:
-        """Return which tile lies in each cell of the lattice.
+        """Return the tile in each cell of the lattice.
 
         Parameters
         ----------
         origin : int or (int, int)
-            First cell: cell (i, j) begins at pixel (i tile_size, j tile_size).
+            First cell. Cell (i, j) begins at pixel (i tile_size, j tile_size).
         size : int or (rows, columns)
-            How many cells, down and across.
+            Number of cells, as rows and columns.
 
         Returns
         -------
         (rows, columns) uint8
-            Where the tile is in the atlas: 9 times its row, and its column.
+            Position of the tile in the atlas: 9 times its row plus its column.
 
         Raises
         ------
         InvalidInput
-            Not such an origin or size.
+            The origin or size is not valid.
 
         Examples
         --------
@@ -219,7 +225,7 @@ class CornerTiles(InParts):
         return self._place[number_tiles(draw_colours(self._seed, *lines))].astype(np.uint8)
 
     def __getitem__(self, index: Any) -> Array:
-        """Return a part: ``tiles[y0:y1, x0:x1]``, of any integers."""
+        """Return a window: ``tiles[y0:y1, x0:x1]``, for any integers."""
         wanted = "ranges [y0:y1, x0:x1] of integers, each with both ends"
         parts = as_tuple(index, "index", 2, wanted)
         if not all(isinstance(p, slice) and p.step is None and None not in (p.start, p.stop) for p in parts):
@@ -231,21 +237,21 @@ class CornerTiles(InParts):
     def window(
         self, origin: int | Sequence[int], size: int | Sequence[int], *, progress: Progress | bool | None = None
     ) -> Synthesis:
-        """Return a part with its source map.
+        """Return a window with its source map.
 
         Parameters
         ----------
         origin : int or (int, int)
-            First pixel, of the world; any integers within 10^15.
+            First pixel of the window, any integers within 10^15.
         size : int or (rows, columns)
-            Pixels.
+            Size of the window in pixels.
         progress : callable or True, optional
-            As for all verbs; there is little to tell.
+            Function called as ``progress(stage, share)``, as for all verbs.
 
         Returns
         -------
         Synthesis
-            The image, of a material all maps, and the source map, whose labels are those of the atlas.
+            Window, with all maps of a material, and its source map. The labels are those of the atlas.
 
             Stages:
 
@@ -260,7 +266,7 @@ class CornerTiles(InParts):
         Raises
         ------
         InvalidInput
-            Not such an origin or size.
+            The origin or size is not valid.
 
         Examples
         --------
@@ -272,6 +278,7 @@ class CornerTiles(InParts):
         """
         watch = stage(listen(progress), "window")
         start, sides = self._as_origin(origin), as_size(size, way=LARGER)
+        # A dense Jacobian is cut like the other arrays. A table by label stays whole.
         source = self._source
         jacobian = source.jacobian_array()
         names, dense = list(self._maps), jacobian is not None and jacobian.ndim > 3
@@ -288,7 +295,7 @@ class CornerTiles(InParts):
         return Synthesis(maps[self._base], here, {"before_blending": maps[self._base]}, report, material)
 
     def _read(self, origin: Sequence[int], size: Sequence[int], arrays: Sequence[Array]) -> list[Array]:
-        """Return windows of arrays of the atlas."""
+        """Read a window from each of some arrays of the atlas."""
         side = self._side
         first = [o // side for o in origin]
         cells = [(o + n - 1) // side - f + 1 for o, n, f in zip(origin, size, first, strict=True)]
@@ -307,25 +314,26 @@ class CornerTiles(InParts):
         return out
 
     def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
-        """Check where a part begins, and how large it is; return what reads it."""
+        """Check the origin and size of a part, and return its reader."""
         as_sides(shape, "shape", 2)
         start = self._as_origin(origin)
         return Part(_Reader(self, start), start, self._base)
 
     def save(self, folder: Path, cells: int | Sequence[int] = 256) -> list[FilePath]:
-        """Write the tiles for engines: the atlas of each map, an index texture, and short shaders for GLSL and Godot.
+        """Write the tiles for game engines: atlases, an index texture, and short shaders for GLSL and Godot.
 
         Parameters
         ----------
         folder : path_like
-            Made where it is missing; files of these names are replaced.
+            Output folder. It is created if it is missing, and files of the same names are replaced.
         cells : int or (rows, columns)
-            Of the index texture, in cells. A shader goes around at its ends.
+            Size of the index texture in cells. A shader wraps around at its ends. Default: 256.
 
         Returns
         -------
         list of pathlib.Path
-            ``NAME.png`` (.tif of floats) for each map, ``index.png``, ``tiles.glsl`` and ``tiles.gdshader``.
+            Written files: ``NAME.png`` for each map (.tif if it has floats), ``index.png``, ``tiles.glsl`` and
+            ``tiles.gdshader``.
 
         Raises
         ------
@@ -350,7 +358,7 @@ class CornerTiles(InParts):
         for name, array in self._maps.items():
             written.append(where / f"{name}.{'tif' if array.dtype.kind == 'f' else 'png'}")
             write(written[-1], array)
-        # Cyclic, as a shader reads it: the corners at the far ends are those at the near ones.
+        # Shaders wrap around, so the corners at the far ends must equal the corners at the near ends.
         colours = draw_colours(self._seed, *(np.arange(n, dtype=np.int64) for n in sides))
         around = number_tiles(np.pad(colours, (0, 1), mode="wrap"))
         written.append(where / "index.png")
@@ -366,14 +374,14 @@ class CornerTiles(InParts):
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads parts of tiles, whose first pixel is at an origin."""
+    """Reader of parts of the texture, relative to an origin."""
 
     tiles: CornerTiles
     origin: tuple[int, int]
 
     @property
     def maps(self) -> Mapping[str, Channel]:
-        """What there is."""
+        """Maps by name."""
         like = self.tiles._like
         return {
             name: Channel.of(each, 2, labelled=like is not None and like[name].role.labelled)
@@ -382,11 +390,11 @@ class _Reader:
 
     @property
     def key(self) -> str:
-        """Digest of the tiles and the origin."""
+        """Hash of the tiles and the origin."""
         return content_hash(self.tiles.key, self.origin).hex()
 
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
-        """Return a part of some maps."""
+        """Read a part of some maps."""
         start = [s.start + o for s, o in zip(box, self.origin, strict=True)]
         size = [s.stop - s.start for s in box]
         found = self.tiles._read(start, size, [self.tiles._maps[name] for name in names])
@@ -394,7 +402,7 @@ class _Reader:
 
 
 def _measure_depth(known: Exemplar) -> Floats:
-    """Return how deep inside of an element each pixel is, 0 to 1, where elements are found."""
+    """Return the depth of each pixel inside its element, 0 to 1, or 0 if no elements are found."""
     parts = known.segment()
     if parts.kind != "components":
         return np.zeros(known.shape, np.float32)

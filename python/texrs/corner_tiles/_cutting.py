@@ -1,4 +1,4 @@
-"""Corner tiles cut from cyclic pictures: a strip for each pair of corners, and each inside cut into its ring of strips."""
+"""Cut corner tiles from tileable images: a strip for each pair of corners, then an inside for each ring of strips."""
 
 from __future__ import annotations
 
@@ -17,23 +17,29 @@ from texrs.kernels.seam import cut, cut_strip
 __all__ = ["cut_tiles"]
 
 STRIPS, INSIDES = 24, 6
-"""Places that are tried for each strip and each inside; the one whose cut costs least is taken. Strips are seen nine times as
-often."""
+"""Number of candidates for each strip and each inside. The one with the cheapest cut is used.
+
+Strips get more because they are seen nine times as often.
+"""
 BORDER = 3 / 16
-"""Half the width of a strip, as a share of a tile's side: what corners and strips show comes again in many tiles, so that
-wider ones repeat more; narrower ones leave cuts less room."""
+"""Half the width of a strip, as a share of a tile's side.
+
+The content of corners and strips recurs in many tiles, so wider strips repeat more. Narrower strips leave less space
+for cuts.
+"""
 EDGES = 0.2
-"""Share of the work, about, that edges are."""
+"""Approximate share of the edges in the work. The progress uses it."""
 
 
 def cut_tiles(
     pictures: Pictures, side: int, step: Step | None, seed: int, advance: Callable[[float], object]
 ) -> Places:
-    """Return the places of all tiles, (81, side, side, 3); in step, where pictures repeat.
+    """Return the source positions of all tiles, (81, side, side, 3), aligned with the lattice if there is one.
 
-    1. Corners: a window of a picture for each colour.
-    2. Edges: between two corners a strip, that is a window cut into both; one for each pair, across and down.
-    3. Tiles: what four strips show within their border is the ring; the inside is cut into it, once along all edges.
+    1. Corners: choose a window of an image for each colour.
+    2. Edges: for each pair of corners, across and down, cut a window into both corners. The result is a strip.
+    3. Tiles: the ring of a tile is the inner half of its four strips. Cut an inside into the ring, once along all
+       edges.
     """
     half = round(BORDER * side)
     draw = Draw(np.random.default_rng(np.random.PCG64(seed)), len(pictures.images), pictures.size, step)
@@ -47,7 +53,7 @@ def cut_tiles(
     for number in range(TILES):
         nw, ne, sw, se = number // 27, number // 9 % 3, number // 3 % 3, number % 3
         ring = np.zeros((side, side, 3), np.int32)
-        # Strips lie half on either side of an edge; axis 1 runs across.
+        # Half of each strip is on either side of its edge. Strips of axis 1 run across.
         ring[:half] = edges[1, nw, ne][half:]
         ring[-half:] = edges[1, sw, se][:half]
         ring[half:-half, :half] = edges[0, nw, sw][half:-half, half:]
@@ -58,10 +64,10 @@ def cut_tiles(
 
 
 def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, corners: tuple[Place, Place]) -> Places:
-    """Return the strip between two corners, of a side's length and twice half a width; axis 1 runs across."""
+    """Cut the strip between two corners, ``side`` long and 2 ``half`` wide; that of axis 1 runs across."""
 
     def look(place: Place, along: int, length: int) -> Places:
-        """Return a part of a strip as one that runs across, of what lies so far along from a corner's middle."""
+        """Return the part of a strip that begins ``along`` pixels from a corner's centre, laid out across."""
         which, row, column = place
         if axis:
             return pictures.at((which, row - half, column + along), (2 * half, length))
@@ -71,7 +77,7 @@ def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, co
         return values if axis else values.swapaxes(0, 1)
 
     middle = side // 2
-    # Near a corner all is the corner's; then come the parts in which a window is cut into both.
+    # Near a corner the strip is that of the corner. In the parts between, a window is cut into both corners.
     ends = np.concatenate([look(corners[0], 0, middle), look(corners[1], -middle, middle)], axis=1)
     known = np.zeros(ends.shape[:2], bool)
     known[:, half : side - half] = True
@@ -91,7 +97,7 @@ def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, co
 
 
 def _fill(pictures: Pictures, fit: Fit, ring: Places, half: int) -> Places:
-    """Return a tile: an inside cut into its ring; the outermost pixels are the ring's."""
+    """Cut an inside into the ring of a tile. The outermost pixels stay those of the ring."""
     shape = (ring.shape[0], ring.shape[1])
     band = np.ones(shape, bool)
     band[half:-half, half:-half] = False

@@ -1,4 +1,4 @@
-"""Places in cyclic pictures that go with what is known of a piece of a tile."""
+"""Search of tileable images for positions that fit the known part of a piece."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from texrs.kernels.patch_search import PatchIndex
 __all__ = ["Fit", "Pictures", "Place", "Places", "look_up"]
 
 APART = 32
-"""Places that are tried for a piece are a tile's side over this apart, or more, along one axis at least."""
+"""Divisor of a tile's side: the minimum distance of candidates for a piece, along at least one axis."""
 SPARE = 8
-"""As many times the places that are wanted are found, for some lie where something is taken already."""
+"""Factor of extra candidates, because some are at positions that are taken already."""
 AGAIN = 8
-"""Nearer than a tile's side over this to a place that is taken, another one would show the same thing again."""
+"""Divisor of a tile's side: closer to a taken position, a piece would show the same content again."""
 
 Place = tuple[int, int, int]
-"""A picture, and a row and a column of it."""
+"""Number of an image, and a row and a column in it."""
 Places = NDArray[np.int32]
-"""Which picture each pixel is from, and its row and column there: (..., 3)."""
+"""Source position of each pixel: image, row, column; (..., 3)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
-    """Cyclic pictures of one size.
+    """Tileable images of one size.
 
     Attributes
     ----------
     images : (pictures, rows, columns[, C]) array
-        All of them.
+        All images.
     penalties : (pictures, rows, columns) float32
-        What cuts through their elements cost more.
+        Extra costs of cuts through elements.
 
     """
 
@@ -44,11 +44,11 @@ class Pictures:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Rows and columns of each."""
+        """Rows and columns of each image."""
         return self.penalties.shape[1], self.penalties.shape[2]
 
     def at(self, place: Place, shape: tuple[int, int]) -> Places:
-        """Return the places of a window, which goes around."""
+        """Return the positions of a window, which wraps around."""
         (which, row, column), (rows, columns) = place, self.size
         out = np.empty((*shape, 3), np.int32)
         out[..., 0] = which
@@ -57,25 +57,25 @@ class Pictures:
         return out
 
     def look(self, places: Places) -> Array:
-        """Return the pixels at places."""
+        """Return the pixels at positions."""
         return look_up(self.images, places)
 
     def weigh(self, places: Places) -> Floats:
-        """Return what cuts cost more there."""
+        """Return the extra costs of cuts at positions."""
         return look_up(self.penalties, places)
 
 
 class Fit:
-    """Finds places for pieces of tiles: those in step where pictures repeat, or else those most like what is known.
+    """Finder of positions for pieces: aligned with the lattice if there is one, otherwise similar to the known part.
 
     Parameters
     ----------
     pictures : Pictures
-        Where to look.
+        Images to search.
     side : int
-        Of a tile: pieces are no larger.
+        Side of a tile. Pieces are not larger.
     draw : Draw
-        Draws places by chance, in step.
+        Generator of random positions, aligned with the lattice.
 
     """
 
@@ -90,18 +90,18 @@ class Fit:
     def find(
         self, known: Places, weight: NDArray[np.bool_], count: int, *, ahead: tuple[int, int] = (0, 0)
     ) -> list[Place]:
-        """Return some places at which pictures are most like what is known of a piece.
+        """Return positions whose content is most similar to the known part of a piece.
 
         Parameters
         ----------
         known : Places
-            The piece; what has no weight may be anything.
+            Piece. Positions without weight are ignored.
         weight : (rows, columns) bool
-            Which part of it is known.
+            Known part of the piece.
         count : int
-            Of places.
+            Number of positions.
         ahead : (int, int)
-            How far the piece lies from the first pixel of a tile.
+            Offset of the piece from the first pixel of a tile.
 
         """
         if self._draw.step is not None:
@@ -113,11 +113,11 @@ class Fit:
         matches = self._index.best(wanted, seen, count=more * count, separation=apart)
         rows, columns = self._pictures.size
         places = [(m.exemplar, 2 * m.row % rows, 2 * m.column % columns) for m in matches]
-        # Where all are taken, all may be taken again.
+        # If all candidates are taken, allow them again.
         return ([place for place in places if not self._is_taken(place)] or places)[:count]
 
     def take(self, place: Place) -> None:
-        """Let what is found from now on be something else."""
+        """Mark a position as taken, so that later pieces show other content."""
         self._taken.append(place)
 
     def _is_taken(self, place: Place) -> bool:
@@ -130,7 +130,7 @@ class Fit:
 
 
 def _halve(image: Array) -> Floats:
-    """Return a picture of half the size, (rows, columns, channels), of 0 to 1 if it is one of integers."""
+    """Halve the size of an image, (rows, columns, channels), and scale integers to [0, 1]."""
     rows, columns = (n // 2 for n in image.shape[:2])
     whole = 1.0 if image.dtype.kind in "fb" else float(np.iinfo(image.dtype).max)
     values = image.reshape(rows, 2, columns, 2, -1).mean(axis=(1, 3), dtype=np.float64)
@@ -138,5 +138,5 @@ def _halve(image: Array) -> Floats:
 
 
 def look_up(pictures: Array, places: Places) -> Array:
-    """Return what pictures of one size, (pictures, rows, columns[, C]), show at places."""
+    """Look positions up in images of one size, (images, rows, columns[, C])."""
     return np.asarray(pictures[places[..., 0], places[..., 1], places[..., 2]])

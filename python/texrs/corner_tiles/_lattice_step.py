@@ -1,4 +1,4 @@
-"""Tiles in step: where an exemplar repeats on a lattice, all pieces of all tiles are cut at places that are alike."""
+"""Alignment of tiles with a lattice: if an exemplar repeats, all pieces are cut at equivalent positions."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from texrs.exemplar.regularity import Lattice
 __all__ = ["Draw", "choose_side", "find_step"]
 
 SMALLER = 0.7
-"""Least side of a tile, as a share of the usual one, that is chosen so that a lattice closes on it."""
+"""Minimum share of the usual side for a side that is chosen so that a lattice closes on it."""
 WHOLE = 0.01
-"""How far from whole the number of periods in a side may be."""
+"""Maximum deviation of the number of periods in a side from an integer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Where cyclic pictures show the same part of a period."""
+    """Equivalent positions in tileable images, which show the same part of a period."""
 
     shifts: NDArray[np.intp]
-    """Those of the lattice within a picture, (n, 2): after each it is like itself."""
+    """Lattice translations within an image, (n, 2). The image looks similar after each."""
     phases: NDArray[np.intp]
-    """Where each picture shows what the first one does at its first pixel, (pictures, 2)."""
+    """Position in each image that corresponds to the first pixel of the first image, (images, 2)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """Places in pictures, drawn by chance."""
+    """Generator of random positions in images."""
 
     rng: np.random.Generator
     count: int
-    """Of the pictures."""
+    """Number of images."""
     size: tuple[int, int]
-    """Of each."""
+    """Rows and columns of each image."""
     step: Step | None
-    """How places are to be alike, if they are."""
+    """Equivalent positions to draw from. None draws from all."""
 
     def __call__(self, row: int = 0, column: int = 0, which: int | None = None) -> tuple[int, int, int]:
-        """Return a picture, or which was said, and a place there, of what lies so many pixels beyond the corner of a tile."""
+        """Draw an image, unless ``which`` is given, and a position for content at this offset from a tile's corner."""
         drawn = int(self.rng.integers(self.count))
         picture = drawn if which is None else which
         if self.step is None:
@@ -52,7 +52,7 @@ class Draw:
 
 
 def choose_side(lattice: Lattice | None, usual: int) -> int:
-    """Return the side of a tile: a multiple of 4 on which a lattice closes with the least change, or else the usual one."""
+    """Return the side of a tile, a multiple of 4, that a lattice fits with the least change, or the usual one."""
     if lattice is None:
         return usual
     changes = []
@@ -64,7 +64,7 @@ def choose_side(lattice: Lattice | None, usual: int) -> int:
 
 
 def find_step(images: Sequence[Array], lattice: Lattice | None, side: int) -> Step | None:
-    """Return how places in cyclic pictures of a lattice are alike, if tiles of a side hold whole periods of it."""
+    """Return equivalent positions in tileable images, or None if a tile does not contain whole periods."""
     size = (images[0].shape[0], images[0].shape[1])
     closing = None if lattice is None else lattice.close(size, (True, True))
     if lattice is None or closing is None:
@@ -82,12 +82,12 @@ def find_step(images: Sequence[Array], lattice: Lattice | None, side: int) -> St
 
 
 def _find_phase(first: Array, other: Array, shifts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return by how much a picture is shifted against another one, by how alike they are on the mean over all periods."""
+    """Return the shift of an image against another one that correlates best over all periods."""
     comb = np.zeros(first.shape[:2])
     comb[tuple(shifts.T)] = 1 / len(shifts)
     pictures = (image.reshape(*comb.shape, -1)[..., :3].mean(axis=-1, dtype=np.float64) for image in (first, other))
     light, beside, periods = (np.fft.fft2(each) for each in (*pictures, comb))
     alike = np.fft.ifft2(np.conj(light) * beside * np.conj(periods)).real
-    # Where the best are as good but for their last bits, the first counts.
+    # Round the scores, so that the first of equally good shifts wins on every processor.
     best = np.rint(alike / max(float(np.abs(alike).max()), 1e-300) * 2**24).argmax()
     return np.array(np.unravel_index(best, alike.shape), np.intp)
