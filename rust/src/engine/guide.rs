@@ -49,6 +49,7 @@ impl<'a> Guide<'a> {
         samples: usize,
         points: usize,
     ) -> Result<Self> {
+        // The lengths of the arrays determine their layout.
         let first = output.len() == points;
         let values = if first { 1 } else { CHANNELS };
         let weights = if weight.len() == 1 { 1 } else { points };

@@ -9,8 +9,8 @@ use crate::{Error, Result};
 /// Number of points in a task.
 const CHUNK: usize = 4096;
 
-/// Computes the places of a region from the places at half the resolution, as S(p) = 2 S'(p / 2) + 1/2 + J r, where r
-/// = p mod 2 - 1/2.
+/// Computes the places S of a region from the places S' at half the resolution. With r = p mod 2 - 1/2, S(p) = 2 S'(p
+/// / 2) + 1/2 + J r.
 ///
 /// The halves are there because a parent is in the middle between its children. With identity frames, whole
 /// coordinates remain whole. The parents must include p / 2, rounded down, for every p of the world. Along periodic

@@ -78,6 +78,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         options: &'a Options,
     ) -> Self {
         let table = Table::new(appearance);
+        // Pack the coordinates of the substitutes once, so that points need no divisions.
         let mut sets = vec![0; similarity.sets.len()];
         par::chunks_mut(&mut sets, CHUNK, |chunk, sets| {
             for (set, &s) in sets.iter_mut().zip(&similarity.sets[chunk * CHUNK..]) {

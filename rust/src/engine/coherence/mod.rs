@@ -53,6 +53,7 @@ pub fn jitter<const D: usize>(
         let message = format!("must be at most {}, got {reach}", i32::MAX);
         return Err(crate::Error::value("reach", message));
     }
+    // Draw noise by the world's coordinates, so that overlapping regions agree.
     let noise = Noise::new(seed).part(4);
     par::chunks_mut(places, CHUNK, |chunk, places| {
         for (i, place) in places.iter_mut().enumerate() {

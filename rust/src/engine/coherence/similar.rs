@@ -45,6 +45,7 @@ pub fn similar<const D: usize>(
         ));
     }
     memory::room("the similarity sets", appearance.grid().len(), 128 + 8 * k)?;
+    // The length of the vectors is a constant of the inner loops.
     let sets = match numbers {
         FEW => search::<D, FEW>(appearance, k, n, monitor)?,
         KEEP => search::<D, KEEP>(appearance, k, n, monitor)?,

@@ -174,6 +174,7 @@ impl<const D: usize> Chart<D> {
             frame,
             rigid: true,
         };
+        // Measure how far the rigid map deviates from the field at each point.
         if let Frames::Dense(all) = frames {
             chart.distortion = chart
                 .window
@@ -210,6 +211,7 @@ impl<const D: usize> Chart<D> {
         let Frames::Dense(all) = frames else {
             return None;
         };
+        // Integrate each exemplar axis on a coarse lattice, then interpolate it at the points.
         let mesh = Mesh::new(&window, all);
         let potentials: Vec<Vec<f64>> = (0..D).map(|i| mesh.integrate(i)).collect();
         let at = |p: [f64; D]| -> [f64; D] { std::array::from_fn(|i| mesh.at(&potentials[i], p)) };
@@ -234,6 +236,7 @@ impl<const D: usize> Chart<D> {
         };
         chart.measure(all);
         chart.mask = chart.inside(canvas, Some(side));
+        // Leave points that deviate too much to other patches.
         for (mask, &d) in chart.mask.iter_mut().zip(&chart.distortion) {
             *mask &= d < TORN;
         }

@@ -71,7 +71,7 @@ pub struct Shown<const D: usize> {
 /// Returns the costs of the seams between points that show different patches.
 ///
 /// # Errors
-/// Arrays whose sizes differ from the size of the region.
+/// Returns an error if sizes of arrays do not match the region.
 pub fn judge<const D: usize>(
     source: &Source<D>,
     grid: &Grid<D>,
@@ -98,6 +98,7 @@ pub fn judge<const D: usize>(
         apart.iter_mut().for_each(|d| *d *= *d);
         judge.pairs(l, r, [&apart, &apart], &mut costs);
         for k in 0..n {
+            // Points of the same patch have no seam between them.
             if patches[p + k] != patches[q + k] {
                 seams[p + k][axis] = costs[k];
             }
@@ -110,7 +111,8 @@ pub fn judge<const D: usize>(
 /// several.
 ///
 /// # Errors
-/// Options out of their range, arrays whose sizes differ from the size of the region, or a monitor that was cancelled.
+/// Returns an error if options are out of their range, sizes of arrays do not match the region, or the monitor was
+/// cancelled.
 pub fn cover<const D: usize>(
     source: &Source<D>,
     prepared: &Prepared<D>,
@@ -121,6 +123,7 @@ pub fn cover<const D: usize>(
     monitor: &Monitor,
 ) -> Result<Shown<D>> {
     super::check(region, frames, Given::NOTHING, options)?;
+    // Paint the present content, so that patches are judged against it.
     let canvas = paint(
         region,
         frames,
@@ -293,8 +296,12 @@ fn paint<const D: usize>(
         check_shape("places", &grid.shape(), got)?;
     }
     if patches.iter().any(|&p| p as usize >= table.len()) {
-        return Err(Error::value("patches", "a number that the table lacks"));
+        return Err(Error::value(
+            "patches",
+            "must be below the number of patches in the table",
+        ));
     }
+    // If the distortion was not stored, all patches are rigid, so it follows from their frames.
     let distortion = match frames {
         Frames::Constant(_) => Vec::new(),
         Frames::Dense(all) if distortion.is_empty() => all

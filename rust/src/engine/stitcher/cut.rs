@@ -155,6 +155,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         } else {
             0.0
         };
+        // Without costs of single points, skip the work for them.
         if presence <= 0.0 && self.guide.is_none() && distortion.is_empty() {
             return Vec::new();
         }
@@ -249,6 +250,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         let mut best = coarse;
         while best.block > 1 {
             let mut ties = view.ties.clone();
+            // Mark both sides of the cut, and widen this band.
             let mut band = vec![false; grid.len()];
             runs(grid, |Run { p, q, n, .. }| {
                 for (p, q) in (p..p + n).zip(q..) {
@@ -262,6 +264,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
                 band = widen(grid, &band);
             }
             for i in 0..grid.len() {
+                // Points outside the band keep their side of the coarse cut.
                 if ties[i] == Tie::Either && !band[i] {
                     ties[i] = if best.take[i] { Tie::New } else { Tie::Old };
                 }
@@ -281,6 +284,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
         let grid = patch.window.grid;
+        // Reuse a workspace if one is free.
         let spare = self.workspaces().pop();
         let mut work = match spare {
             Some(spare) => spare,
@@ -293,6 +297,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         };
         self.look(view, patch, ties, &mut work.patch);
         work.energy.clear(grid, block)?;
+        // Add the costs of single points, then those of pairs.
         for (i, take) in patch.points.iter().enumerate() {
             if ties[i] == Tie::Either {
                 work.energy.add_point(i, capacity(take - view.cost(i)));
@@ -400,6 +405,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
             let kept = &view.seams[run.axis];
             for k in 0..run.n {
                 let (p, q) = (run.p + k, run.q + k);
+                // A seam exists only where one of two points takes the patch. It is judged again, because the energy
+                // has rounded costs.
                 let cost = match (take[p], take[q]) {
                     (false, false) => continue,
                     (true, true) => 0.0,

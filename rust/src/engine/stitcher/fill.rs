@@ -220,6 +220,7 @@ impl<const D: usize> Stitching<'_, D> {
         );
         let view = (self.cutter).view(&self.canvas, &chart.window, &chart.mask, &[]);
         let worth = f64::from(o.balance / side);
+        // The balance of classes after the cut is a part of the cost.
         let excess = |patch: &Proposal<'_, D>, take: &[bool]| {
             let points = &chart.window.points;
             let after = self
@@ -227,6 +228,7 @@ impl<const D: usize> Stitching<'_, D> {
                 .after(source, &self.canvas, points, &patch.places, take);
             worth * after.excess(source)
         };
+        // Compare the candidates by coarse cuts, and refine only the cheapest.
         let cuts = par::map(places.len(), |k| {
             let patch = self.cutter.propose(&chart, places[k]);
             let cut = self.cutter.judge(&view, &patch, self.monitor)?;

@@ -58,14 +58,15 @@ impl Samples {
     /// Prepares samples from their colours, their depth inside an element, and the weights of seams.
     ///
     /// # Errors
-    /// Arrays of other sizes, values that are not finite or out of their range, and too many samples.
+    /// Returns an error if sizes of arrays do not match, values are not finite or out of their range, or there are too
+    /// many samples.
     pub fn new(colours: &[f32], channels: usize, depth: &[f32], weights: Weights) -> Result<Self> {
         weights.check()?;
         let count = depth.len();
         if count >= FREE as usize {
             return Err(Error::value(
                 "depth",
-                format!("fewer than {FREE} samples are allowed, got {count}"),
+                format!("must have fewer than {FREE} samples, got {count}"),
             ));
         }
         let grid = Grid::new([count.div_ceil(LINE), LINE.min(count)], [false; 2])?;
@@ -81,7 +82,7 @@ impl Samples {
     /// point would show. Large patches are cut between blocks of points, which is precise enough for a comparison.
     ///
     /// # Errors
-    /// Arrays whose sizes differ from the size of the window, samples that do not exist, or a monitor that was
+    /// Returns an error if sizes of arrays do not match the window, samples do not exist, or the monitor was
     /// cancelled.
     pub fn judge(
         &self,
@@ -112,7 +113,7 @@ impl Samples {
     /// Cuts in the patch with the lowest cost of [`Self::judge`]. Returns its number also.
     ///
     /// # Errors
-    /// The errors of [`Self::judge`].
+    /// Returns the same errors as [`Self::judge`].
     pub fn cut_best(
         &self,
         pasting: &Pasting<'_>,
@@ -144,7 +145,7 @@ impl Samples {
     /// Cuts a patch into a window between any of its points, or between blocks if the window is very large.
     ///
     /// # Errors
-    /// The errors of [`Self::judge`].
+    /// Returns the same errors as [`Self::judge`].
     pub fn cut(&self, pasting: &Pasting<'_>, patch: &[u32], monitor: &Monitor) -> Result<Pasted> {
         let (window, view) = self.open(pasting)?;
         let patch = self.propose(pasting, &window, patch)?;
@@ -173,8 +174,9 @@ impl Samples {
         }
         let costs = pasting.seams.as_flattened();
         if !costs.iter().all(|s| (0.0..=f32::MAX).contains(s)) {
-            return Err(Error::value("seams", "costs of at least 0 are allowed"));
+            return Err(Error::value("seams", "must be finite and at least 0"));
         }
+        // Cuts only distinguish free points from others here, so all samples belong to patch 0.
         let mut patches = vec![FREE; n];
         for (patch, &sample) in patches.iter_mut().zip(pasting.shown) {
             if sample != FREE {
@@ -219,7 +221,7 @@ impl Samples {
         Err(Error::value(
             argument,
             format!(
-                "there are {} samples, and {sample} is asked for",
+                "must be below the number of samples, {}, got {sample}",
                 self.count
             ),
         ))

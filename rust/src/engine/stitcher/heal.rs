@@ -22,8 +22,9 @@ const LACK: f64 = 0.3;
 const ROUNDS: usize = 2;
 /// Minimum share of its points that makes an instance complete.
 const WHOLE: f64 = 0.97;
-/// Minimum share of an instance that is completed, and maximum share of an instance that is removed.
+/// Minimum share of an instance that is completed.
 const GROW: f64 = 0.35;
+/// Maximum share of an instance that is removed. Between both shares, both are tried.
 const DROP: f64 = 0.7;
 /// Number of instances that are examined at the same time.
 const BATCH: usize = 4;
@@ -137,6 +138,8 @@ impl<const D: usize> Stitching<'_, D> {
             let instance = &mut all[number];
             for a in 0..D {
                 let n = canvas.grid.shape()[a] as i32;
+                // Measure from the anchor the short way round, because an instance may cross the end of a periodic
+                // axis.
                 let mut step = point[a] as i32 - instance.anchor[a] as i32;
                 if canvas.grid.wrap()[a] {
                     step = (step + n / 2).rem_euclid(n) - n / 2;
@@ -183,6 +186,7 @@ impl<const D: usize> Stitching<'_, D> {
         if share <= 0.0 || share >= WHOLE {
             return Ok(None);
         }
+        // A nearly complete instance may grow, a small one may be replaced by a neighbour.
         let mut options = Vec::new();
         if share >= GROW {
             options.push((instance.key.0, true));

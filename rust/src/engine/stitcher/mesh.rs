@@ -117,6 +117,7 @@ impl<const D: usize> Mesh<D> {
             part[axis] = x - first[axis] as f64;
         }
         let mut sum = 0.0;
+        // Sum over the corners of the cell. An axis with a single node has only the first corner.
         for corner in 0..1usize << D {
             let (mut node, mut w) = (first, 1.0);
             for axis in 0..D {

@@ -1,16 +1,17 @@
 //! The stitcher: maps patches of an exemplar into the output, and cuts them along the least visible seams.
 //!
-//! 1. *chart*: a patch is a box of the exemplar, mapped from the output by the frames around its centre;
-//! 2. *search*: for all exemplar coordinates at once, the difference between the patch and the points that are known
-//!    already;
-//! 3. *cut*: minimum cuts insert the best few candidates and judge the pairs that result, and the cheapest is kept;
-//! 4. *recover*: other patches are tried over the worst seams;
+//! 1. *chart*: a patch is a box of the exemplar, mapped from the output by the frames around its centre.
+//! 2. *search*: the difference between the patch and the known points is computed for all exemplar coordinates at
+//!    once.
+//! 3. *cut*: minimum cuts insert the best few candidates. They judge the pairs that result, and the cheapest is kept.
+//! 4. *recover*: other patches are tried over the worst seams.
 //! 5. *heal*: torn elements are completed or removed.
 //!
-//! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures*, SIGGRAPH 2003. Departures: patches follow a field; a cut
-//! judges the pair that results instead of the difference of two images; cuts and healing use the elements.
+//! The method is by Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures*, SIGGRAPH 2003. There are three
+//! departures. Patches follow a field. A cut judges the pair that results instead of the difference of two images.
+//! Cuts and healing use the elements.
 //!
-//! [`Samples`] is only the third step, for patches that are not transformed and come from another search.
+//! [`Samples`] offers only the third step, for patches that are not transformed and come from another search.
 
 mod balance;
 mod canvas;
@@ -60,7 +61,7 @@ pub struct Options {
     pub overlap: f32,
     /// Number of candidates that are cut in for each patch. The cheapest is kept.
     pub candidates: usize,
-    /// Whether patches bend with the field. Otherwise they are rotated and scaled as a whole.
+    /// If true, patches bend with the field. Otherwise they are rotated and scaled as a whole.
     pub bend: bool,
     /// Weights of the seam costs.
     pub weights: Weights,
@@ -73,20 +74,21 @@ pub struct Options {
     pub balance: f32,
     /// Number of the worst seams that are covered again, as a share of the number of patches.
     pub recover: f32,
-    /// Whether torn elements are healed.
+    /// If true, torn elements are healed.
     pub heal: bool,
-    /// Chooses the texture.
+    /// Seed of the random numbers. Each seed gives another texture.
     pub seed: u64,
 }
 
 /// Points that are given: none, or one flag and one place per point.
 #[derive(Debug, Clone, Copy)]
 pub struct Given<'a, const D: usize> {
-    /// Whether each point is given.
+    /// True for each given point.
     pub points: &'a [bool],
     /// Exemplar coordinates of the given points.
     pub places: &'a [Place<D>],
-    /// Whether patches may take a given point to reduce the costs of seams. Empty if all given points must stay.
+    /// True for each given point that patches may take to reduce the costs of seams. Empty if all given points must
+    /// stay.
     pub loose: &'a [bool],
 }
 
@@ -157,7 +159,8 @@ struct Stitching<'a, const D: usize> {
 /// Fills a region with patches of a source.
 ///
 /// # Errors
-/// Options out of their range, arrays whose sizes differ from the size of the region, or a monitor that was cancelled.
+/// Returns an error if options are out of their range, sizes of arrays do not match the region, or the monitor was
+/// cancelled.
 #[allow(clippy::too_many_arguments)] // the inputs of the engine's other starts
 pub fn stitch<const D: usize>(
     source: &Source<D>,
@@ -217,6 +220,7 @@ pub fn stitch<const D: usize>(
     })
 }
 
+/// Returns an error if options are out of their range, or if the sizes of arrays do not match.
 fn check<const D: usize>(
     region: &Region<D>,
     frames: Frames<'_, D>,
@@ -225,6 +229,7 @@ fn check<const D: usize>(
 ) -> Result<()> {
     let n = region.grid.len();
     frames.check(n)?;
+    // Given points are all absent or one for each point; only `loose` may be absent alone.
     let loose = given.loose.len();
     for got in [given.points.len(), given.places.len(), loose] {
         let none = got == 0 && (given.points.is_empty() || got == loose);
@@ -244,7 +249,7 @@ fn check<const D: usize>(
         return Err(Error::value(
             "patch",
             format!(
-                "patches of 4 to 4096 samples, overlaps up to 0.8, 1 to 64 candidates and 0 to 4 times as many again are allowed, got {options:?}"
+                "must be from 4 to 4096 samples, with an overlap of at most 0.8, 1 to 64 candidates and a recover share of 0 to 4, got {options:?}"
             ),
         ));
     }
@@ -253,7 +258,7 @@ fn check<const D: usize>(
     if !charges.iter().all(|x| (0.0..=100.0).contains(x)) {
         return Err(Error::value(
             "weights",
-            format!("0 to 100 are allowed, got {options:?}"),
+            format!("must be from 0 to 100, got {options:?}"),
         ));
     }
     Ok(())

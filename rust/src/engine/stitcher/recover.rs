@@ -1,6 +1,7 @@
 //! Recovery: other patches are tried over the worst seams. These patches need not fit the content around the seam.
 //!
-//! Kwatra et al., section 3.1. The costs of old seams count, so a patch is kept only if it reduces the total.
+//! The method is by Kwatra et al., section 3.1. The costs of old seams count, so a patch is kept only if it reduces
+//! the total.
 
 use super::Stitching;
 use super::chart::Chart;

@@ -60,7 +60,8 @@ impl<const D: usize> Source<D> {
     /// Prepares `colours`, points of `grid` by `channels`. The exemplar is periodic along axes that wrap.
     ///
     /// # Errors
-    /// Arrays of other sizes, colours that are not finite, classes that are not in the table, or negative costs.
+    /// Returns an error if sizes of arrays do not match, colours are not finite, classes are not in the table, or
+    /// costs are negative.
     pub fn new(
         colours: &[f32],
         grid: Grid<D>,
@@ -71,6 +72,7 @@ impl<const D: usize> Source<D> {
         let n = grid.len();
         check_channels(channels)?;
         check_shape("colours", &[n, channels], colours.len())?;
+        // Empty arrays turn off the costs of elements or classes.
         for (argument, got) in [
             ("labels", elements.labels.len()),
             ("depth", elements.depth.len()),
@@ -81,10 +83,10 @@ impl<const D: usize> Source<D> {
             }
         }
         if !colours.iter().chain(elements.depth).all(|x| x.is_finite()) {
-            return Err(Error::value("colours", "finite values are allowed"));
+            return Err(Error::value("colours", "must be finite"));
         }
         if !adjacency.costs.iter().all(|c| (0.0..=f32::MAX).contains(c)) {
-            return Err(Error::value("costs", "those of at least 0 are allowed"));
+            return Err(Error::value("costs", "must be finite and at least 0"));
         }
         let classes = (adjacency.costs.len() as f64).sqrt() as usize;
         if classes * classes != adjacency.costs.len()
@@ -92,14 +94,14 @@ impl<const D: usize> Source<D> {
         {
             return Err(Error::value(
                 "classes",
-                "needs a square table of costs that has every class",
+                "must be indices of the square table of costs",
             ));
         }
         let most = elements.labels.iter().max().map_or(0, |&m| m as usize);
         if most > n {
             return Err(Error::value(
                 "labels",
-                format!("{most} of {n} samples; at most one element a sample"),
+                format!("must be at most the number of samples, {n}, got {most}"),
             ));
         }
         let mut this = Self {
@@ -114,6 +116,7 @@ impl<const D: usize> Source<D> {
         for &class in adjacency.classes {
             this.shares[usize::from(class)] += 1.0 / n as f64;
         }
+        // Normalise the colours before the other values of the looks are added.
         this.colour(colours);
         for (i, look) in this.looks.iter_mut().enumerate() {
             look.depth = elements.depth.get(i).map_or(0.0, |d| d.clamp(0.0, DEEP));
@@ -128,7 +131,7 @@ impl<const D: usize> Source<D> {
     /// Prepares samples in a row, with their depth inside an element. Their elements and classes are not known.
     ///
     /// # Errors
-    /// Arrays of other sizes, a grid that is too small, and values that are not finite.
+    /// Returns an error if sizes of arrays do not match, the grid is too small, or values are not finite.
     pub(super) fn row(
         colours: &[f32],
         grid: Grid<D>,
@@ -139,12 +142,12 @@ impl<const D: usize> Source<D> {
         check_channels(channels)?;
         check_shape("colours", &[n.min(grid.len()), channels], colours.len())?;
         if !colours.iter().chain(depth).all(|x| x.is_finite()) {
-            return Err(Error::value("colours", "finite values are allowed"));
+            return Err(Error::value("colours", "must be finite"));
         }
         let mut this = Self {
             grid,
             channels,
-            looks: memory::filled("the samples of pictures", Look::EMPTY, grid.len())?,
+            looks: memory::filled("the samples of images", Look::EMPTY, grid.len())?,
             sizes: vec![0; 2],
             costs: Vec::new(),
             classes: 0,
@@ -333,6 +336,6 @@ fn check_channels(channels: usize) -> Result<()> {
     if (1..=CHANNELS).contains(&channels) {
         return Ok(());
     }
-    let message = format!("1 to {CHANNELS} are allowed, got {channels}");
+    let message = format!("must be from 1 to {CHANNELS}, got {channels}");
     Err(Error::value("channels", message))
 }

@@ -70,6 +70,7 @@ impl<const D: usize> View<D> {
             if patch != FREE {
                 looks.set(i, &source.look(places[i]));
             }
+            // Decide which points have a choice: only those that show a sample and are in the mask, outside the core.
             ties.push(match (patch, mask[i]) {
                 (FREE, false) => Tie::Out,
                 (FREE, true) => Tie::New,

@@ -56,7 +56,7 @@ impl Weights {
         }
         Err(Error::value(
             "weights",
-            format!("0 to 100 are allowed, got {self:?}"),
+            format!("must be from 0 to 100, got {self:?}"),
         ))
     }
 }

@@ -76,7 +76,7 @@ impl<'a, const D: usize> Fit<'a, D> {
         best
     }
 
-    /// What a patch costs with its centre at a sample, in the units of [`super::Index`].
+    /// Returns the cost of a patch with its centre at a sample, in the units of [`super::Index`].
     fn cost(&self, centre: [i32; D]) -> f32 {
         let mut cost = 0.0;
         if !self.known.is_empty() {

@@ -4,7 +4,7 @@ use crate::foundation::fft::Volumes;
 use crate::foundation::fixed::{Place, nearest};
 use crate::foundation::grid::Grid;
 
-/// Exemplars of more samples are searched by blocks of them.
+/// Exemplars with more samples are searched in blocks of samples.
 const LARGE: usize = 1 << 18;
 
 /// Blocks of samples, in arrays that have room for transforms.
@@ -19,13 +19,13 @@ pub(super) struct Lattice<const D: usize> {
 }
 
 impl<const D: usize> Lattice<D> {
-    /// Blocks as small as they may be.
+    /// Chooses the smallest blocks that are allowed.
     pub(super) fn new(samples: &Grid<D>) -> Self {
         let mut this = Self::of(*samples, 0);
         while this.grid.len() > LARGE {
             let (shape, wrap) = (this.grid.shape(), this.grid.wrap());
             if (0..D).any(|a| wrap[a] && shape[a] % 2 != 0) {
-                // Blocks would not have the period of the exemplar.
+                // Blocks must divide the period of the exemplar.
                 break;
             }
             let Ok(half) = Grid::new(shape.map(|n| n.div_ceil(2)), wrap) else {

@@ -53,7 +53,7 @@ pub(super) struct Index<const D: usize> {
     grid: Grid<D>,
     spectra: Arc<Spectra<D>>,
     charges: Charges,
-    /// How often what lies around each sample has been shown.
+    /// Number of patches that have shown the surroundings of each sample, weighted by distance.
     shown: Vec<f32>,
     total: f64,
 }
@@ -122,8 +122,8 @@ impl<const D: usize> Index<D> {
         }
     }
 
-    /// The places of the centre of a chart that fit known points of it best, the best one first; at most `count`.
-    #[allow(clippy::too_many_arguments)] // what is searched for, and where
+    /// Returns the places of a chart's centre that fit its known points best, the best one first; at most `count`.
+    #[allow(clippy::too_many_arguments)] // the query and where to search
     pub(super) fn best(
         &self,
         source: &Source<D>,
@@ -315,6 +315,7 @@ impl<const D: usize> Index<D> {
                 scores[lattice.position(block)] + self.repetition(lattice.centre(block, first))
             })
             .collect();
+        // Charge candidates that continue a neighbour exactly, also a few samples around.
         if self.charges.continuation > 0.0 {
             for centre in continued {
                 let at = std::array::from_fn(|a| (centre[a] >> lattice.level) + first[a]);
@@ -324,6 +325,7 @@ impl<const D: usize> Index<D> {
             }
         }
         let mut found = Vec::with_capacity(count);
+        // Store the minimum of each run. Each pick then updates only the runs near it.
         let mut runs: Vec<(f32, usize)> = values.chunks(RUN).map(least).collect();
         let mut changed = Vec::new();
         while found.len() < count {
@@ -338,6 +340,7 @@ impl<const D: usize> Index<D> {
             }
             let block = blocks.point(best.1);
             found.push(lattice.centre(block, first));
+            // Exclude the surroundings of the pick, so that candidates differ.
             self.around(blocks, block.map(|x| x as i32), wide(APART), |k| {
                 values[k] = f32::INFINITY;
                 if changed.last() != Some(&(k / RUN)) {
