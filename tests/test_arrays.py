@@ -212,7 +212,7 @@ def test_what_is_masked_is_a_hole():
     half = np.ma.masked_array(PEBBLES, np.repeat(upper[..., np.newaxis], 3, axis=-1))
     assert np.array_equal(texrs.inpaint(half, lower).image, expected)
     for verb in (texrs.tile, texrs.design, texrs.Exemplar, texrs.elements.analyse):
-        with pytest.raises(InvalidInput, match=r": 672 of 12288 values are masked, which is a hole: texrs.inpaint"):
+        with pytest.raises(InvalidInput, match=r": 672 of 12288 values are masked; texrs.inpaint"):
             verb(known)
     with pytest.raises(InvalidInput, match="mask: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image"):
         texrs.inpaint(PEBBLES)
@@ -221,16 +221,19 @@ def test_what_is_masked_is_a_hole():
 @pytest.mark.parametrize("shape", [(3, 64, 64), (1, 64, 64), (4, 256, 256), (3, 12, 9)])
 def test_channels_first_is_noticed(shape: tuple[int, ...]):
     with pytest.raises(
-        InvalidInput, match=rf"image: shape .* has its {shape[0]} channels first.* numpy.moveaxis\(image, 0, -1\)"
+        InvalidInput,
+        match=rf"image: must have its channels last, .* {shape[0]} channels first.* numpy.moveaxis\(image, 0, -1\)",
     ):
         texrs.tile(np.zeros(shape, np.uint8))
 
 
 def test_channels_first_is_noticed_in_volumes_and_batches_but_not_guessed():
-    with pytest.raises(InvalidInput, match=r"exemplar: shape \(3, 16, 16, 16\) has its 3 channels first"):
+    with pytest.raises(
+        InvalidInput, match=r"exemplar: must have its channels last, got shape \(3, 16, 16, 16\) with 3 channels first"
+    ):
         texrs.solid(np.zeros((3, 16, 16, 16), np.uint8), 16)
     with pytest.raises(
-        InvalidInput, match="image: shape .* is a batch of 8 with channels first; give one picture at a time"
+        InvalidInput, match="image: shape .* is a batch of 8 with channels first; give one image at a time"
     ):
         texrs.tile(np.zeros((8, 3, 32, 32), np.uint8))
     for shape in ((3, 64), (3, 64, 3), (2, 5, 6), (9, 64, 64)):
@@ -273,7 +276,7 @@ def test_a_mask_may_be_a_file_or_a_coloured_picture(tmp_path: Path):
     texrs.io.write(tmp_path / "hole.png", marked)
     for given in (tmp_path / "hole.png", Image.fromarray(marked), Image.fromarray(marked[..., :3])):
         assert np.array_equal(as_mask(given, "mask", HOLE.shape), HOLE)
-    with pytest.raises(InvalidInput, match="mask: needs shape"):
+    with pytest.raises(InvalidInput, match="mask: must have shape"):
         as_mask(marked, "mask", HOLE.shape)
 
 
@@ -283,10 +286,10 @@ def test_what_cannot_be_taken_is_said_in_a_sentence(tmp_path: Path):
             raise RuntimeError("lies on another device;\n call .cpu()")
 
     with pytest.raises(
-        InvalidInput, match=r"^image: not an array of numbers \(lies on another device; call \.cpu\(\)\)$"
+        InvalidInput, match=r"^image: is not an array of numbers \(lies on another device; call \.cpu\(\)\)$"
     ):
         texrs.tile(Elsewhere())
     with pytest.raises(FileError, match=r"^image: .*nowhere\.png: there is no such file$"):
         texrs.tile(tmp_path / "nowhere.png")
-    with pytest.raises(InvalidInput, match="image: needs numbers"):
+    with pytest.raises(InvalidInput, match="image: must be numbers"):
         texrs.tile([["a", "b"], ["c", "d"]])

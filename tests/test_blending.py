@@ -477,7 +477,7 @@ def test_parts_do_not_stain_each_other() -> None:
     assert (texrs.blend(source, image, wrap=False, parts=parts) != shown).any()
     parts[:, 10:] = 1
     np.testing.assert_array_equal(texrs.blend(source, image, wrap=False, parts=parts), shown)
-    with pytest.raises(InvalidInput, match="parts: needs shape"):
+    with pytest.raises(InvalidInput, match="parts: must have shape"):
         texrs.blend(source, image, wrap=False, parts=parts[:4])
 
 

@@ -257,7 +257,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock -o new.exr --depth 16", "--out: a file of layers keeps each map as it is"),
         ("design rock/rock_albedo.png -o new.png --depth 16", "--depth: is for materials"),
         ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: is for materials"),
-        ("design rock rock/rock_albedo.png -o new", "either all are materials or none is"),
+        ("design rock rock/rock_albedo.png -o new", "must all be materials, or none of them"),
         ("design rock -o mine", "mine/rock_albedo.png is there already"),
         ("design same -o same", "--out: same is read, and would then contain other maps"),
         ("tile rock -o new --mipmaps links/../rock", "rock is read, and would then contain other maps"),

@@ -151,7 +151,7 @@ REFUSED = {
     "inpaint in.png": "MASK: must be a mask",
     "inpaint in.png no.png": "no.png",
     "inpaint no.png hole.png": "no.png",
-    "inpaint in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
+    "inpaint in.png other.png": "other.png: must have shape 80 x 64, got 64 x 64",
     "inpaint in.png white.png": "white.png: covers the whole image",
     "inpaint in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
     "inpaint in.png hole.png --patch-size 65": "--patch-size: must be an integer between 4 and 64, got 65",

@@ -258,7 +258,7 @@ HALF[:, :40] = True
             {"mask": MASK, "background": None, "layout": "connected"},
             "layout: contradicts the mask: connected means",
         ),
-        ({"mask": MASK[:5]}, "mask: needs shape"),
+        ({"mask": MASK[:5]}, "mask: must have shape"),
         ({"mask": np.ones_like(MASK)}, "mask: must contain foreground and background, got only foreground"),
         ({"points": [(10, 10), (20, np.inf)]}, "points: must be finite, but point 1"),
         ({"points": [(10, 10), (20, 10), (10, 10)]}, "points: point 2, .* occurs twice"),

@@ -104,7 +104,7 @@ def test_damaged_files_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("image", "options", "says"),
     [
-        (WEAVE[0, 0], {}, "image: needs shape (rows, columns)"),
+        (WEAVE[0, 0], {}, "image: must have shape (rows, columns)"),
         (WEAVE, {"axes": 4}, "axes: must be an integer between 2 and 3"),
         (WEAVE, {"labels": True}, "labels: must have one channel, got 3"),
         (WEAVE, {"repeat": "xyz"}, "repeat: must be True, False or 2"),
@@ -124,7 +124,7 @@ def test_verbs_take_either():
     for value, options, says in (
         (exemplar, {"axes": 3}, "exemplar: must be an Exemplar with axes=3, got one with axes=2"),
         (exemplar, {"minimum": 64}, "exemplar: each side must be at least 64, got shape (48, 48)"),
-        (np.array("weave"), {}, "exemplar: needs numbers"),
+        (np.array("weave"), {}, "exemplar: must be numbers"),
         (texrs.Exemplar(WEAVE[:12]).image, {"minimum": 16}, "exemplar: each side must be at least 16"),
     ):
         with pytest.raises(InvalidInput) as caught:

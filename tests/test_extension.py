@@ -101,10 +101,10 @@ def test_again_and_otherwise() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: texrs.extend(FLOOR), "nothing to add"),
+        (lambda: texrs.extend(FLOOR), "at least one must be above 0"),
         (lambda: texrs.extend(FLOOR, right=-4), "right: "),
         (lambda: texrs.extend(FLOOR, right=10**6), "right: "),
-        (lambda: texrs.extend(FLOOR, top=300, view=PLANE), "reach the plane's horizon"),
+        (lambda: texrs.extend(FLOOR, top=300, view=PLANE), "reach the horizon of the plane"),
         (
             lambda: texrs.extend(FLOOR, top=8, view=PlaneView(corners=[[0, 0]] * 4)),
             "corners: must form a convex quadrilateral",
@@ -125,5 +125,5 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main(["extend", photo, "-o", out, "--left", "64", "--right", "80", "--bottom", "24", *said]) == 0
     np.testing.assert_array_equal(io.read(out), LARGER.image)
     assert main(["extend", photo, "-o", str(tmp_path / "none.png"), *said]) == 2
-    assert "nothing to add" in capsys.readouterr().err
+    assert "at least one must be above 0" in capsys.readouterr().err
     assert not (tmp_path / "none.png").exists()

@@ -118,13 +118,13 @@ def test_files_of_directions(tmp_path: Path, suffix: str) -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: fields.from_directions(np.zeros((4, 4, 4))), "directions: needs numbers of shape"),
+        (lambda: fields.from_directions(np.zeros((4, 4, 4))), "directions: must be numbers of shape"),
         (lambda: fields.from_directions(np.zeros((4, 4, 2))), "directions: all have length 0"),
         (lambda: fields.from_directions(np.full((4, 4, 2), np.nan)), "32 of 32 values are not finite"),
         (lambda: fields.from_directions(AROUND, along="z"), "along: must be one of y, x"),
         (lambda: fields.from_directions(AROUND, order="zyx"), "order: must be one of yx, xy"),
         (lambda: fields.from_directions(WOUND, up=(0, 0, 0)), "up: needs 3 numbers"),
-        (lambda: fields.from_gradient(np.zeros(4)), "volume: needs numbers"),
+        (lambda: fields.from_gradient(np.zeros(4)), "volume: must be numbers"),
         (lambda: fields.from_gradient(np.zeros((4, 4))), "all have length 0"),
         (lambda: fields.from_gradient(Z, across=True), "across: is for pictures"),
         (lambda: fields.from_structure(np.ones((8, 8))), "volume: is constant"),

@@ -112,7 +112,7 @@ def test_files_are_read_as_arrays_and_give_their_name(tmp_path: Path) -> None:
     # Any other mask of texrs is read in the same way.
     np.testing.assert_array_equal(as_mask(tmp_path / "stroke.png", "ground", SIZE), DISC)
     np.testing.assert_array_equal(as_mask(Mask(tmp_path / "stroke.png", invert=True), "ground", SIZE), ~DISC)
-    with pytest.raises(InvalidInput, match="ground: must have no feather"):
+    with pytest.raises(InvalidInput, match="ground: cannot have a feather"):
         as_mask(Mask(WHITE, feather=2), "ground", SIZE)
 
 
@@ -163,10 +163,13 @@ def test_grow_goes_across_cyclic_borders() -> None:
         (lambda: Mask(WHITE, grow=9999), "grow: must be an integer"),
         (lambda: Mask(WHITE, feather=-1), "feather: must be an integer"),
         (lambda: Mask(WHITE, invert="no"), "invert: must be True or False"),
-        (lambda: read(WHITE[:40]), r"mask: needs shape \(96, 112\), got \(40, 112\); a mask has the size of the image"),
+        (
+            lambda: read(WHITE[:40]),
+            r"mask: must have shape \(96, 112\), got \(40, 112\); a mask has the size of the image",
+        ),
         (lambda: read(np.full(SIZE, np.nan)), "mask: must be finite"),
-        (lambda: read(np.dstack([WHITE] * 5)), "mask: needs shape"),
-        (lambda: read(WHITE.astype(complex)), "mask: needs bool, integers or floats"),
+        (lambda: read(np.dstack([WHITE] * 5)), "mask: must have shape"),
+        (lambda: read(WHITE.astype(complex)), "mask: must be bool, integers or floats"),
         (lambda: texrs.inpaint(BRICKS, 0 * WHITE), "mask: marks nothing, so there is nothing to fill"),
         (lambda: texrs.inpaint(BRICKS, Mask(WHITE, grow=-20)), "mask: marks nothing"),
         (lambda: texrs.inpaint(BRICKS, Mask(DISC | True, invert=True)), "mask: marks nothing"),

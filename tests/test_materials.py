@@ -236,12 +236,12 @@ def test_bad_materials_are_refused() -> None:
         ({"albedo": picture}, {"spaces": {"albedo": "lab"}}, "must be one of srgb, linear"),
         ({"albedo": picture}, {"weights": {"albedo": -1}}, "weights"),
         ({"albedo": picture, "mask": picture}, {"weights": {"albedo": 0, "mask": 0}}, "nothing to decide on"),
-        ({"albedo": np.zeros((4, 4, 4, 4, 4))}, {}, "albedo: needs shape"),
+        ({"albedo": np.zeros((4, 4, 4, 4, 4))}, {}, "albedo: must have shape"),
     ):
         with pytest.raises(InvalidInput) as caught:
             Material(maps, **options)  # type: ignore[arg-type]
         assert words in str(caught.value)
-    with pytest.raises(InvalidInput, match="either all are materials or none is"):
+    with pytest.raises(InvalidInput, match="must all be materials, or none of them"):
         texrs.design([STONES, picture], 64)
     with pytest.raises(InvalidInput, match="the same maps"):
         texrs.design([STONES, Material({"albedo": picture})], 64)

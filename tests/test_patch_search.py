@@ -83,7 +83,7 @@ def test_the_same_for_any_number_of_threads():
         (lambda: PatchIndex(np.full((9, 9), 1e300)), "infinite as float32"),
         (
             lambda: PatchIndex(np.zeros((9, 9)), allowed=np.ones((3, 3), bool)),
-            "allowed: needs shape",
+            "allowed: must have shape",
         ),
         (
             lambda: PatchIndex([np.zeros((9, 9))], allowed=[None, None]),
@@ -91,8 +91,8 @@ def test_the_same_for_any_number_of_threads():
         ),
         (lambda: PatchIndex(np.zeros((9, 9)), max_patch=0), "max_patch"),
         (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((10, 3))), r"patch: .*\(10, 3\)"),
-        (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((3, 3, 2))), "patch: needs shape"),
-        (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((0, 3))), "patch: needs shape"),
+        (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((3, 3, 2))), "patch: must have shape"),
+        (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((0, 3))), "patch: must have shape"),
         (lambda: PatchIndex(np.zeros((9, 9))).best([["a"]]), "real numbers"),
         (
             lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((3, 3)), -np.ones((3, 3))),
@@ -120,7 +120,7 @@ def test_an_index_made_again_finds_what_a_new_one_finds():
     assert again.best(patch, weight, count=5) == new.best(patch, weight, count=5)
     with pytest.raises(InvalidInput, match="allowed: needs a list of 2"):
         again.again(allowed=allowed[0])
-    with pytest.raises(InvalidInput, match=r"allowed\[1\]: needs shape"):
+    with pytest.raises(InvalidInput, match=r"allowed\[1\]: must have shape"):
         again.again(allowed=[None, allowed[0]])
     with pytest.raises(InvalidInput, match="max_patch"):
         again.again(max_patch=0)

@@ -162,12 +162,12 @@ def test_progress_and_stopping(floor):
 
 
 BAD = [
-    ({"scale_map": np.ones((9, 9))}, "scale_map: needs shape"),
+    ({"scale_map": np.ones((9, 9))}, "scale_map: must have shape"),
     ({"scale_map": np.zeros((32, 32))}, "scale_map: 1024 of 1024 scales are outside"),
     ({"scale_map": np.full((32, 32), -1.0)}, "scale_map: "),
     ({"scale_map": np.full((32, 32), np.nan)}, "scale_map: .* NaN"),
     ({"scale_map": np.ones((32, 32), np.uint8)}, "scale_map: must be floats"),
-    ({"target": np.ones((5, 5, 7), np.float32)}, "target: needs shape"),
+    ({"target": np.ones((5, 5, 7), np.float32)}, "target: must have shape"),
     ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: a scale map is given"),
     (
         {"scale_map": "auto", "scale_measurement": {"min_feature_size": 3}},

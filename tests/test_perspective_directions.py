@@ -124,7 +124,7 @@ def test_same_bytes_for_any_number_of_threads(lines, count):
     ("given", "words"),
     [
         ({"direction": np.nan}, "direction: must be a number"),
-        ({"direction": np.full((4, 4), np.inf)}, "direction: needs finite degrees"),
+        ({"direction": np.full((4, 4), np.inf)}, "direction: must be finite degrees"),
         ({"direction": np.zeros((4, 4, 2))}, "direction: needs degrees"),
         ({"direction": "up"}, "field"),
         ({"direction": fields.circular()}, "direction: needs a field of 2 axes"),

@@ -188,7 +188,7 @@ def test_an_output_that_wraps(floor):
     [
         ({"method": "paint"}, "method: must be one of 'patch', 'optimise'"),
         ({"scale_map": "guess"}, "scale_map: must be 'auto'"),
-        ({"scale_map": np.ones((3, 3))}, "scale_map: needs shape"),
+        ({"scale_map": np.ones((3, 3))}, "scale_map: must have shape"),
         ({"scale_map": np.zeros((64, 64))}, "scale_map: |scale: "),
         ({"exemplar_scale_map": np.ones((40, 40))}, "exemplar_scale_map: needs an exemplar"),
         (
@@ -197,7 +197,7 @@ def test_an_output_that_wraps(floor):
                 "exemplar": np.zeros((40, 40), np.uint8),
                 "exemplar_scale_map": np.ones((30, 40)),
             },
-            "exemplar_scale_map: needs shape",
+            "exemplar_scale_map: must have shape",
         ),
         (
             {"method": "optimise", "exemplar": np.zeros((12, 40), np.uint8)},

@@ -106,7 +106,7 @@ def test_coordinates_may_jump_and_end():
         (lambda: scale_maps.jacobians_of_normals(make_column(), green="left"), "green: must be one of up, down"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 2))), "coordinates: no pixel shows a surface"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((1, 4, 2))), "coordinates: must have at least two rows"),
-        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 3))), "coordinates: needs shape"),
+        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 3))), "coordinates: must have shape"),
     ],
 )
 def test_what_is_no_surface_is_refused(work, words):
@@ -268,7 +268,7 @@ def test_a_column_that_repeats(weave):
         ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),
         ({"target": np.zeros((8, 8, 3))}, "target: normals: no pixel shows a surface"),
         ({"target": np.zeros((8, 8, 2), np.uint8)}, "target: coordinates .* need floats"),
-        ({"target": np.ones((8, 8, 3, 3))}, "target: needs shape"),
+        ({"target": np.ones((8, 8, 3, 3))}, "target: must have shape"),
         ({"target": make_column(8), "method": "paper"}, "method: the paper's knows no surfaces"),
         ({"scale_map": "plane:slant=x"}, "scale_map: needs plane:slant=DEGREES"),
         ({"scale_map": "above"}, "scale_map: must be one of auto, front"),

@@ -71,7 +71,7 @@ def test_every_verb_says_what_progress_may_be(verb):
     needed = [p for p in inspect.signature(verb).parameters.values() if p.default is p.empty]
     given = few.get(verb.__name__, (STRIPES,) * len([p for p in needed if p.kind is p.POSITIONAL_OR_KEYWORD]))
     named = {p.name: True for p in needed if p.kind is p.KEYWORD_ONLY}
-    with pytest.raises(InvalidInput, match="progress: needs True, a function to call, or None; got 3"):
+    with pytest.raises(InvalidInput, match="progress: must be True, a function or None, got 3"):
         verb(*given, **named, progress=3)
 
 

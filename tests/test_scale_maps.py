@@ -146,8 +146,8 @@ def test_user_and_angles_do_not_need_a_map() -> None:
         ((np.zeros((4, 4)), (5, 5)), {}, r"^scale: 16 of 16 scales are outside"),
         ((np.full((4, 4), np.nan), (5, 5)), {}, r"^scale: 16 of 16 values are NaN or infinite"),
         ((np.full((4, 4), 128, np.uint8), (5, 5)), {}, r"^scale: must be floats, got uint8; convert"),
-        ((np.ones((4, 4, 3)), (5, 5)), {}, r"^scale: needs shape \(rows, columns\), got \(4, 4, 3\)"),
-        ((FLOOR, (5, 5), "user"), {"pattern": np.ones(4)}, r"^pattern: needs shape \(rows, columns\)"),
+        ((np.ones((4, 4, 3)), (5, 5)), {}, r"^scale: must have shape \(rows, columns\), got \(4, 4, 3\)"),
+        ((FLOOR, (5, 5), "user"), {"pattern": np.ones(4)}, r"^pattern: must have shape \(rows, columns\)"),
     ],
 )
 def test_resample_refuses(arguments: tuple, options: dict, message: str) -> None:
@@ -202,8 +202,8 @@ def test_one_known_pixel_is_enough() -> None:
     ("scale", "known", "message"),
     [
         (FLOOR, np.zeros(FLOOR.shape, bool), r"^known: must mark at least one pixel, got none$"),
-        (FLOOR, np.ones((5, 5), bool), r"^known: needs shape \(60, 80\), got \(5, 5\)$"),
-        (FLOOR, np.ones(FLOOR.shape), r"^known: needs bool or integers, got dtype float64$"),
+        (FLOOR, np.ones((5, 5), bool), r"^known: must have shape \(60, 80\), got \(5, 5\)$"),
+        (FLOOR, np.ones(FLOOR.shape), r"^known: must be bool or integers, got dtype float64$"),
         (-FLOOR, np.eye(60, 80, dtype=bool), r"^scale: 60 of 4800 scales are outside"),
         (FLOOR * np.nan, np.eye(60, 80, dtype=bool), r"^scale: 60 of 4800 values are NaN"),
     ],

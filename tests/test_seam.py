@@ -302,9 +302,9 @@ def test_no_overlap_and_no_b_only_pixel():
     [
         ({"b": np.zeros((4, 5))}, "b: needs the shape of a"),
         ({"a": np.full((4, 4), np.nan)}, "a: 16 of 16 values are NaN"),
-        ({"mask_a": np.ones((4, 5), bool)}, "mask_a: needs shape"),
-        ({"mask_b": np.ones((4, 4))}, "mask_b: needs bool"),
-        ({"mask_a": True}, "mask_a: needs shape"),
+        ({"mask_a": np.ones((4, 5), bool)}, "mask_a: must have shape"),
+        ({"mask_b": np.ones((4, 4))}, "mask_b: must be bool"),
+        ({"mask_a": True}, "mask_a: must have shape"),
         (
             {"core_a": np.ones((4, 4), bool), "core_b": np.ones((4, 4), bool)},
             "core_a, core_b: ",
@@ -313,7 +313,7 @@ def test_no_overlap_and_no_b_only_pixel():
         ({"penalty": np.full((4, 4), -1.0)}, "penalty: .*-1"),
         ({"penalty": np.full((4, 4), np.nan)}, "penalty: .*NaN"),
         ({"penalty": np.full((4, 4), 3e38)}, "penalty: .*infinite"),
-        ({"penalty": ["much"]}, "penalty: needs real numbers"),
+        ({"penalty": ["much"]}, "penalty: must be real numbers"),
         ({"cost": "l2"}, "cost: must be one of gradient, paper"),
         ({"wrap": "yes"}, "wrap: must be"),
         ({"old": seam.OldSeams([], [], [])}, r"old\.kept: must be 2 arrays"),
@@ -332,7 +332,7 @@ def test_bad_input_to_cut(change, message):
     [
         (np.zeros((4, 1)), {}, "pixels along axis 1"),
         (np.zeros((4, 4)), {"axis": 2}, "axis: must be an integer between 0 and 1"),
-        (np.zeros((4, 4)), {"penalty": np.ones((3, 4))}, "penalty: needs shape"),
+        (np.zeros((4, 4)), {"penalty": np.ones((3, 4))}, "penalty: must have shape"),
         (np.full((4, 4), np.inf), {}, "NaN or infinite"),
     ],
 )
@@ -356,11 +356,11 @@ def test_many_strips_are_cut_as_each_by_itself():
 @pytest.mark.parametrize(
     ("strip", "message"),
     [
-        (seam.Strip(np.zeros((4, 4)), np.zeros((4, 4)), 1), "strips: a: needs shape"),
-        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 3, 1)), 1), "strips: b: needs shape"),
+        (seam.Strip(np.zeros((4, 4)), np.zeros((4, 4)), 1), "strips: a: must have shape"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 3, 1)), 1), "strips: b: must have shape"),
         (seam.Strip(np.zeros((4, 4, 1)), np.full((4, 4, 1), np.nan), 1), "a, b: .*finite"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 2), "axis: must be an integer between 0 and 1"),
-        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 0, np.ones((3, 4))), "penalty: needs shape"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 0, np.ones((3, 4))), "penalty: must have shape"),
     ],
 )
 def test_bad_input_to_strips(strip, message):
@@ -371,13 +371,13 @@ def test_bad_input_to_strips(strip, message):
 @pytest.mark.parametrize(
     ("unary", "pairwise", "message"),
     [
-        (np.zeros((3, 2)), 1.0, "unary: needs shape"),
+        (np.zeros((3, 2)), 1.0, "unary: must have shape"),
         (np.zeros((3, 3, 2)), [1.0], "pairwise: must be a number or 2 entries"),
         (np.zeros((3, 3, 2)), -1.0, "pairwise: .*-1"),
-        (np.zeros((3, 3, 2)), [np.zeros((2, 3)), 1.0], "pairwise: needs shape"),
+        (np.zeros((3, 3, 2)), [np.zeros((2, 3)), 1.0], "pairwise: must have shape"),
         (np.full((3, 3, 2), np.inf), 1.0, "unary: "),
         (np.full((3, 3, 2), np.nan), 1.0, "unary: "),
-        (["none"], 1.0, "unary: needs real numbers"),
+        (["none"], 1.0, "unary: must be real numbers"),
     ],
 )
 def test_bad_input_to_labels(unary, pairwise, message):

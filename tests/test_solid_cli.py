@@ -148,7 +148,7 @@ WRONG = [
     ("solid v.npy -o out.tif --constraint-mask m.npy", "m.npy: there is no such file"),
     (
         "solid v.npy -o out.tif --size 20 --constraint-mask v.npy --constraint-values v.npy",
-        "v.npy: needs shape 20 x 20 x 20",
+        "v.npy: must have shape 20 x 20 x 20",
     ),
     ("solid v.npy -o out.tif --threads 0", "--threads: must be an integer between 1"),
     ("solid v.npy -o out.png", "out.png: .png cannot hold volumes of uint8 with 3 channels"),

@@ -358,7 +358,7 @@ def test_arguments_are_checked(options, words):
         (np.zeros((1, 8), np.uint8), "at least 2 rows"),
         (np.zeros((0, 8), np.uint8), "image: each side"),
         (np.full((8, 8), np.nan), "NaN"),
-        ([["a"]], "image: needs numbers"),
+        ([["a"]], "image: must be numbers"),
     ],
 )
 def test_images_are_checked(image, words):

@@ -220,7 +220,7 @@ def test_far_and_wrong_points() -> None:
     assert plane.sample(far).shape == (2, 3)
     assert plane.sample(np.zeros((0, 2))).shape == (0, 3)
     for points, message in (
-        ([[1, 2, 3]], r"points: needs numbers of shape \(\.\.\., 2\)"),
+        ([[1, 2, 3]], r"points: must be numbers of shape \(\.\.\., 2\)"),
         ([[np.nan, 0]], "points: 1 of 2 values are NaN"),
         ([[2e9, 0]], "points: need to lie within 1000000000"),
     ):

@@ -47,7 +47,7 @@ def test_each_way_to_say_it_settles_the_plane() -> None:
         (lambda: PlaneView(plane=PLANE, fov=50), "fov: cannot be combined with plane"),
         (lambda: PlaneView(slant=89), "slant: must be a number"),
         (lambda: PlaneView(fov=0.5), "fov: must be a number"),
-        (lambda: PlaneView(corners=[[1, 2], [3, 4]]), "corners: needs shape"),
+        (lambda: PlaneView(corners=[[1, 2], [3, 4]]), "corners: must have shape"),
         (lambda: PlaneView(corners=CORNERS[[0, 2, 1, 3]]).settle(SHAPE), "corners: must form a convex quadrilateral"),
         (lambda: PlaneView.of(PLANE).settle((9, 9)), "plane: must have the shape of the image, 9 x 9"),
         (lambda: PlaneView(ground=MASK).settle((9, 9)), "ground: "),

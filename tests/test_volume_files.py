@@ -189,7 +189,7 @@ SLAB = np.zeros((2, 4, 4))
         ([SLAB, SLAB[:, :3]], (4, 4, 4), "a.npy", InvalidInput, r"from plane 2 on is float64 of shape \(2, 3, 4\)"),
         ([SLAB, SLAB.astype(int)], (4, 4, 4), "a.npy", InvalidInput, "float64 of shape \\(d, 4, 4\\) is needed"),
         ([SLAB], (2, 4, 4, 1), "a.npy", InvalidInput, "is needed"),
-        ([SLAB[0]], (2, 4, 4), "a.npy", InvalidInput, "array: needs shape"),
+        ([SLAB[0]], (2, 4, 4), "a.npy", InvalidInput, "array: must have shape"),
         ([SLAB], (2, 4), "a.npy", InvalidInput, "shape: needs"),
         ([SLAB], (2, 4, -4), "a.npy", InvalidInput, "shape: needs"),
         ([SLAB], "abc", "a.npy", InvalidInput, "shape: needs"),

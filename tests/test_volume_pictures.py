@@ -164,7 +164,7 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda p: volume.slices(VOLUME[0, 0]), "volume: needs shape"),
+        (lambda p: volume.slices(VOLUME[0, 0]), "volume: must have shape"),
         (lambda p: volume.slices(VOLUME, (1, 2)), "at: must be plane, row and column"),
         (lambda p: volume.slices(VOLUME, (7, 0, 0)), "at: must be an integer between -7 and 6"),
         (lambda p: volume.slices(VOLUME, gap=-1), "gap"),
@@ -191,7 +191,7 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
         (lambda p: volume.label_to_color([[0, 2]], [(0, 0, 0)]), "reach 2, but there are 1 colours"),
         (lambda p: volume.label_to_color([[0, 2]], [(0, 0, 300)]), "from 0 to 255"),
         (lambda p: volume.extract_surface(np.zeros((4, 4, 4), bool)), "no surface"),
-        (lambda p: volume.extract_surface(np.zeros((4, 4, 4))), "mask: needs bool"),
+        (lambda p: volume.extract_surface(np.zeros((4, 4, 4))), "mask: must be bool"),
         (lambda p: volume.extract_surface(np.zeros((1, 4, 4), bool)), "at least 2"),
         (lambda p: volume.extract_surface(np.eye(4, dtype=bool)[None].repeat(4, 0), spacing=(1, 1, 0)), "spacing"),
     ],

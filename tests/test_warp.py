@@ -99,7 +99,7 @@ def test_bad_warps() -> None:
         (three[[0, 0, 1]], three, "same place"),
         (np.array([[0, 0], [1, 1], [2, 2.0]]), three, "line"),
         (three, three * np.nan, "finite"),
-        (["abc"], three, "needs real numbers"),
+        (["abc"], three, "must be real numbers"),
     ):
         with pytest.raises(InvalidInput, match=words):
             from_points(source, target, (10, 10))  # type: ignore[arg-type]

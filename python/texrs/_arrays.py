@@ -113,21 +113,19 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     """
     array = as_ndarray(value, name, axes=axes)
     if array.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: needs numbers (integers, floats or bool), got dtype {array.dtype}")
+        raise InvalidInput(f"{name}: must be numbers (integers, floats or bool), got dtype {array.dtype}")
     if array.dtype.kind == "f" and array.dtype.itemsize not in (2, 4, 8):
-        raise InvalidInput(f"{name}: floats of 16, 32 or 64 bit are allowed, got {array.dtype}")
+        raise InvalidInput(f"{name}: floats must have 16, 32 or 64 bits, got {array.dtype}")
     _check_order(array.shape, name, axes)
     if array.ndim not in (axes, axes + 1):
         shapes = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
         hint = "; a volume is not an image" if array.ndim == 4 and axes == 2 else ""
-        raise InvalidInput(
-            f"{name}: needs shape {shapes} with channels last where there are any, got shape {array.shape}{hint}"
-        )
+        raise InvalidInput(f"{name}: must have shape {shapes}, with any channels last, got shape {array.shape}{hint}")
     if array.ndim == axes:
         array = array[..., np.newaxis]
     elif array.shape[-1] > 64:
         raise InvalidInput(
-            f"{name}: shape {array.shape} has {array.shape[-1]} channels, up to 64 are allowed; "
+            f"{name}: must have at most 64 channels, got {array.shape[-1]} in shape {array.shape}; "
             "a volume is not an image"
         )
     if array.size == 0 or min(array.shape[:axes]) < minimum:
@@ -145,12 +143,12 @@ def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
         return
     if first == 0:
         raise InvalidInput(
-            f"{name}: shape {shape} has its {shape[0]} channels first, they must come last: "
-            f"numpy.moveaxis({name}, 0, -1), or of a tensor {name}.permute{(*range(1, axes + 1), 0)}"
+            f"{name}: must have its channels last, got shape {shape} with {shape[0]} channels first; use "
+            f"numpy.moveaxis({name}, 0, -1), or for a tensor {name}.permute{(*range(1, axes + 1), 0)}"
         )
     if axes == 2:
         raise InvalidInput(
-            f"{name}: shape {shape} is a batch of {shape[0]} with channels first; give one picture at a time, channels last: "
+            f"{name}: shape {shape} is a batch of {shape[0]} with channels first; give one image at a time, channels last: "
             f"numpy.moveaxis({name}[0], 0, -1)"
         )
 
@@ -191,20 +189,20 @@ def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | s
     >>> as_array([[1, 2]], "flow", np.float32, ("rows", "columns", 3))
     Traceback (most recent call last):
         ...
-    texrs.errors.InvalidInput: flow: needs shape (rows, columns, 3), got (1, 2)
+    texrs.errors.InvalidInput: flow: must have shape (rows, columns, 3), got (1, 2)
 
     """
     array, wanted = as_ndarray(value, name), np.dtype(dtype)
     if array.dtype.kind not in ("buif" if wanted.kind == "f" else "bui"):
         allowed = "real numbers" if wanted.kind == "f" else "bool or integers"
-        raise InvalidInput(f"{name}: needs {allowed}, got dtype {array.dtype}")
+        raise InvalidInput(f"{name}: must be {allowed}, got dtype {array.dtype}")
     if shape is not None and not _has_shape(array.shape, shape):
         sides = ", ".join(map(str, shape)) + "," * (len(shape) == 1)
-        raise InvalidInput(f"{name}: needs shape ({sides}), got {array.shape}")
+        raise InvalidInput(f"{name}: must have shape ({sides}), got {array.shape}")
     if wanted.kind in "ui" and array.size and not np.can_cast(array.dtype, wanted):
         info, low, high = np.iinfo(wanted), int(array.min()), int(array.max())
         if low < info.min or high > info.max:
-            raise InvalidInput(f"{name}: must be {info.min} to {info.max}, got {low} to {high}")
+            raise InvalidInput(f"{name}: must be between {info.min} and {info.max}, got {low} to {high}")
     return _make_contiguous(array, name, wanted)
 
 
@@ -223,7 +221,7 @@ def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
         with np.errstate(over="ignore"):
             return np.require(array, dtype, ("C", "A"))
     except MemoryError:
-        raise LimitExceeded(f"{name}: needs more memory than there is") from None
+        raise LimitExceeded(f"{name}: needs more memory than is available") from None
 
 
 def check_finite(array: Array, name: str) -> None:
@@ -307,7 +305,7 @@ def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     The mask may be an array of bool or integers (zero means False), a file, an image of PIL, or a `texrs.Mask`.
     """
     if isinstance(value, Mask) and value.feather:
-        raise InvalidInput(f"{name}: must have no feather, which is for a hole that is filled")
+        raise InvalidInput(f"{name}: cannot have a feather, which is only for holes that are filled")
     if isinstance(value, Mask | str | PathLike) or is_pillow(value):
         return mark(value, name, shape)
     given = as_ndarray(value, name, axes=len(shape))

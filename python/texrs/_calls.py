@@ -19,6 +19,4 @@ def check_call(function: Callable[..., object], name: str, *arguments: str) -> N
     try:
         signature.bind(*arguments)
     except TypeError:
-        raise InvalidInput(
-            f"{name}: is called as {name}({', '.join(arguments)}), which {function!r} does not take"
-        ) from None
+        raise InvalidInput(f"{name}: must accept the call {name}({', '.join(arguments)}), got {function!r}") from None

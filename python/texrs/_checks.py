@@ -37,7 +37,7 @@ def try_array(value: object, dtype: DTypeLike | None = None) -> NDArray[Any]:
 def as_size(
     value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int | None = None, way: str = ""
 ) -> tuple[int, ...]:
-    """Check a size: an int for a square, or one int an axis (rows, columns). ``way`` names a method for larger sizes.
+    """Check a size: an int for a square, or one int for each axis (rows, columns). ``way`` names a method for larger sizes.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def as_items(value: object, name: str) -> Iterator[Any]:
 
 
 def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | None = None) -> tuple[bool, ...]:
-    """Check a choice of periodic axes: one bool for all, or one an axis. None gives the default, if there is one."""
+    """Check a choice of periodic axes: one bool for all, or one for each axis. None gives the default, if there is one."""
     if value is None and usual is not None:
         return (usual,) * axes
     if isinstance(value, bool | np.bool_):
@@ -216,7 +216,7 @@ def as_method(value: object, *allowed: str | None) -> None:
 
 
 def as_progress(value: object, name: str = "progress", *, stages: bool = False) -> Callable[..., object] | None:
-    """Check a progress function, which is called with the completed share, or with the ``stages`` too."""
+    """Check a progress function, which is called with the completed share, or with the stage and the share if ``stages``."""
     if value is None:
         return None
     if not callable(value):

@@ -76,14 +76,14 @@ def as_ndarray(value: object, name: str, *, axes: int = 2, used: bool = True) ->
             return np.from_dlpack(value)
         return np.asarray(value)
     except MemoryError:
-        raise LimitExceeded(f"{name}: needs more memory than there is") from None
+        raise LimitExceeded(f"{name}: needs more memory than is available") from None
     except InvalidInput:
         raise
     except (
         Exception
     ) as error:  # Libraries raise many types for data that they cannot export, such as a tensor on another device.
         text = " ".join(str(error).split())
-        raise InvalidInput(f"{name}: not an array of numbers ({text or type(error).__name__})") from None
+        raise InvalidInput(f"{name}: is not an array of numbers ({text or type(error).__name__})") from None
 
 
 def _read(path: str | os.PathLike[str], name: str, axes: int) -> Array:
@@ -102,8 +102,8 @@ def _take_whole(value: Any, name: str) -> Array:
     count = int(np.ma.getmaskarray(value).sum())
     if count:
         raise InvalidInput(
-            f"{name}: {count} of {value.size} values are masked, which is a hole: texrs.inpaint fills it, "
-            "or value.filled(...) fills it with a number"
+            f"{name}: {count} of {value.size} values are masked; texrs.inpaint fills them by example, "
+            "or value.filled(...) with a number"
         )
     return np.asarray(value.data)
 
@@ -165,4 +165,4 @@ def _take_colours(picture: Any, name: str) -> Any:
     if mode in KEPT or mode.startswith("I;16"):
         return picture
     way = "PIL.ImageCms.profileToProfile" if mode == "LAB" else 'image.convert("RGB")'
-    raise InvalidInput(f"{name}: a PIL picture of mode {mode} holds no colours that texrs knows; convert it: {way}")
+    raise InvalidInput(f"{name}: the mode {mode} of this PIL image is not supported; convert it with {way}")

@@ -69,7 +69,7 @@ class Mask:
     Raises
     ------
     InvalidInput
-        An option is out of its range.
+        If an option is out of its range.
 
     Examples
     --------
@@ -157,14 +157,14 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     mask = as_marks(value)
     given = as_ndarray(mask.marks, name, axes=len(shape), used=False)
     if given.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: needs bool, integers or floats, got dtype {given.dtype}")
+        raise InvalidInput(f"{name}: must be bool, integers or floats, got dtype {given.dtype}")
     sides = given.shape[: len(shape)]
     fits = len(sides) == len(shape) and all(
         n > 0 if isinstance(wanted, str) else n == wanted for n, wanted in zip(sides, shape, strict=True)
     )
     if not fits or given.ndim > len(shape) + 1 or (given.ndim > len(shape) and not 0 < given.shape[-1] <= 4):
         wanted = ", ".join(map(str, shape)) + "," * (len(shape) == 1)
-        raise InvalidInput(f"{name}: needs shape ({wanted}), got {given.shape}; a mask has the size of the image")
+        raise InvalidInput(f"{name}: must have shape ({wanted}), got {given.shape}; a mask has the size of the image")
     if given.dtype.kind == "f" and not np.isfinite(given).all():
         raise InvalidInput(f"{name}: must be finite, but some values of the mask are NaN or infinite")
     return adjust(mask, _decide(given, len(shape), mask, name_marks(mask, name)), wrap)

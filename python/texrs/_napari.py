@@ -127,12 +127,12 @@ def read_store(path: Path, name: str) -> list[LayerData]:
     try:
         node = zarr.open(os.fspath(path), mode="r")
     except Exception as error:
-        raise FileError(f"{path}: is no Zarr store ({error})") from None
+        raise FileError(f"{path}: is not a Zarr store ({error})") from None
     if isinstance(node, zarr.Array):
         return [_show_lazy([lazy.from_zarr(node)], _name_axes(node), {"name": name})]
     layers = _find_images(node, name)
     if not layers:
-        raise FileError(f"{path}: holds no image")
+        raise FileError(f"{path}: does not contain an image")
     return layers
 
 

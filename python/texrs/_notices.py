@@ -101,12 +101,12 @@ def ignore(message: str) -> None:
     Raises
     ------
     InvalidInput
-        In a strict block.
+        If a block is strict.
 
     Warns
     -----
     InputWarning
-        No block of `collect` shows the notice.
+        If no block of `collect` shows the notice.
 
     """
     collectors = _COLLECTORS.get()
@@ -117,7 +117,7 @@ def ignore(message: str) -> None:
 
 
 def assume(message: str) -> None:
-    """Report what a call takes an input for, if the input does not state it.
+    """Report a fact that a call assumes because the input does not state it.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _add(kind: str, message: str) -> bool:
 
 
 def _count_frames() -> int:
-    """Return how many frames lie between a notice and the code that called texrs."""
+    """Return the number of stack frames between a notice and the code that called texrs."""
     frame, count = sys._getframe(1), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, count = frame.f_back, count + 1

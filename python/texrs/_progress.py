@@ -107,7 +107,7 @@ def _choose(progress: Progress | bool | None) -> Progress | None:
     if progress is True:
         return _make_bar() or show_lines(lambda line: print(line, file=sys.stderr, flush=True))
     if not callable(progress) or isinstance(progress, type):
-        raise InvalidInput(f"progress: needs True, a function to call, or None; got {progress!r}")
+        raise InvalidInput(f"progress: must be True, a function or None, got {progress!r}")
     check_call(progress, "progress", "stage", "share")
     return progress
 

@@ -126,10 +126,12 @@ class SideBySide:
                     raise Cancelled("stopped, because another task failed")
                 shares[number] = share
 
+            # A task that starts after a failure stops here.
             tell(0.0)
             with threads(self._count):
                 return work(item, tell)
 
+        # Copy the context, so that limits and listeners of this thread also apply to the tasks.
         futures: list[Future[R]] = []
         try:
             for number, item in enumerate(items):
@@ -147,6 +149,7 @@ class SideBySide:
             for each in futures:
                 each.cancel()
             wait(futures)
+        # Raise the error of a task before the cancellations that followed from it.
         failed = [error for each in futures if not each.cancelled() and (error := each.exception()) is not None]
         for error in sorted(failed, key=lambda e: isinstance(e, Cancelled)):
             raise error

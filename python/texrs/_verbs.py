@@ -87,6 +87,7 @@ def takes_materials(
                 if isinstance(given.arguments.get(name), Material):
                     other = given.arguments[name]
                     given.arguments[name] = _analyse(other, other.guide, name, watch) if analysed else other.guide
+            # Replace materials by guide images, which combine all their maps.
             used = [name for name in names if given.arguments.get(name) is not None]
             several = [m for name in used for m in _as_list(given.arguments[name])]
             if not any(isinstance(m, Material) for m in several):
@@ -111,6 +112,7 @@ def takes_materials(
                 made = replace(
                     made, source_map=_flattened(made.source_map), report={**made.report, "flatten_lighting": True}
                 )
+            # Render all maps of the materials through the source map of the guide images.
             if isinstance(made, Synthesis):
                 return cast(T, finish(made, materials, watch))
             return cast(T, (finish(one, materials, watch) for one in made))
@@ -187,6 +189,6 @@ def _check(several: list[object], names: list[str]) -> list[Material]:
     materials = [each for each in several if isinstance(each, Material)]
     if len(materials) < len(several):
         raise InvalidInput(
-            f"{', '.join(names)}: either all are materials or none is; got {len(materials)} of {len(several)}"
+            f"{', '.join(names)}: must all be materials, or none of them, got {len(materials)} of {len(several)}"
         )
     return materials

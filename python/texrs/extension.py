@@ -135,10 +135,10 @@ def extend(
     missing = [n - m for n, m in zip(sides, _add_sizes((rows, columns), added), strict=True)]
     if min(missing) < 0 or max(missing) > 2 * MOST:
         raise InvalidInput(
-            f"size: needs {rows, columns} pixels, and what the sides add, at least, and at most {2 * MOST} more; got {sides}"
+            f"size: must be at least {_add_sizes((rows, columns), added)} pixels, and at most {2 * MOST} more, got {sides}"
         )
     if sides == (rows, columns):
-        raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
+        raise InvalidInput("top, bottom, left, right: at least one must be above 0")
     check_work("extend", [pixels], sides, "top, bottom, left, right" if size is None else "size")
     screening = as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
     rim, number, follow = (
@@ -166,6 +166,7 @@ def extend(
         if alone and missing[axis] and sum(room) >= added[before] + added[after]:
             over = max(0, added[before] - room[0]) - max(0, added[after] - room[1])
             added[before], added[after] = added[before] - over, added[after] + over
+    # Place the photograph on a larger canvas, whose other pixels are one hole.
     first = np.array([added["top"], added["left"]])
     inner = (slice(first[0], first[0] + rows), slice(first[1], first[1] + columns))
     canvas, hole = np.zeros((*sides, pixels.shape[2]), pixels.dtype), np.ones(sides, np.bool_)
@@ -179,7 +180,7 @@ def extend(
     reach = parts[0].reach
     if len(parts) == 1 and reach is not None and (hole & ~reach).any():
         raise InvalidInput(
-            "top, bottom, left, right: the picture would reach the plane's horizon; add fewer pixels, or say how the plane lies"
+            "top, bottom, left, right: the image would reach the horizon of the plane; add fewer pixels, or give the view"
         )
     made = fill_parts(canvas, hole, parts, boundary=rim, light=follow, seed=number, progress=progress)
     lit = (-added["top"], -added["left"]) if follow else None

@@ -73,15 +73,15 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     shape, around = _as_shape(size), as_wrap(wrap, "wrap")
     at = try_array(places, np.float64)
     if at.ndim != 2 or at.shape[1] != 2 or not np.isfinite(at).all():
-        raise InvalidInput(f"places: needs finite (row, column), shape (n, 2), got {at.dtype} {at.shape}")
+        raise InvalidInput(f"places: must be finite (row, column), shape (n, 2), got {at.dtype} {at.shape}")
     at = np.asarray(at, np.float64)
     if not 3 <= len(at) <= MOST:
-        raise InvalidInput(f"places: needs 3 to {MOST} points, got {len(at)}")
+        raise InvalidInput(f"places: must be between 3 and {MOST} points, got {len(at)}")
     outside = ((at < -0.5) | (at > np.array(shape) - 0.5)).any(axis=1)
     if outside.any():
-        raise InvalidInput(f"places: {at[outside][0].tolist()} lies outside of {shape}")
+        raise InvalidInput(f"places: must be inside the size {shape}, got {at[outside][0].tolist()}")
     if len(np.unique(at, axis=0)) < len(at):
-        raise InvalidInput("places: holds one place twice")
+        raise InvalidInput("places: must be different, got a place twice")
     return _draw_points(at, shape, (around[0], around[1]))
 
 
@@ -124,9 +124,11 @@ def lattice(
     basis = np.array([_as_pair(first, "first"), _as_pair(second, "second")])
     area = abs(float(np.linalg.det(basis)))
     if area < 0.05 * float(np.hypot(*basis[0]) * np.hypot(*basis[1])) or not area:
-        raise InvalidInput(f"second: {tuple(basis[1].tolist())} lies along first, {tuple(basis[0].tolist())}")
+        raise InvalidInput(
+            f"second: must not be parallel to first, {tuple(basis[0].tolist())}, got {tuple(basis[1].tolist())}"
+        )
     if np.prod(shape) / area > MOST:
-        raise InvalidInput(f"first, second: more than {MOST} points would lie in {shape}")
+        raise InvalidInput(f"first, second: must give at most {MOST} points in {shape}; use longer vectors")
     middle = (np.array(shape) - 1) / 2 if origin is None else np.array(_as_pair(origin, "origin"))
     corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)]) - middle
     ends = corners @ np.linalg.inv(basis)
@@ -135,7 +137,7 @@ def lattice(
     at = np.round(index.reshape(-1, 2) @ basis + middle, 6)
     at = at[((at >= 0) & (at <= np.array(shape) - 1)).all(axis=1)]
     if len(at) < 3:
-        raise InvalidInput(f"size: {shape} shows {len(at)} points of this lattice, three or more are needed")
+        raise InvalidInput(f"size: must contain at least 3 points of this lattice, got {len(at)} in {shape}")
     return _draw_points(at, shape, (False, False))
 
 
@@ -173,7 +175,7 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> ElementAnaly
     """
     given: NDArray[Any] = try_array(labels, None)
     if given.ndim != 2 or min(given.shape) < SHORTEST:
-        raise InvalidInput(f"labels: needs (H, W) with sides of at least {SHORTEST}, got shape {given.shape}")
+        raise InvalidInput(f"labels: must have shape (H, W) with sides of at least {SHORTEST}, got shape {given.shape}")
     check_memory(4 * given.size, "labels")
     image = np.full(given.shape, GROUND, np.uint8)
     found = ElementAnalysis.of_labels(image, given, layout=Layout.JOINTED, wrap=wrap)
@@ -231,12 +233,12 @@ def courses(
     listed = as_items(height, "height") if isinstance(height, Sequence | np.ndarray) else [height]
     heights = [as_float(h, "height", 4, 1e6) for h in listed]
     if not heights:
-        raise InvalidInput("height: needs one or more")
+        raise InvalidInput("height: must have at least one entry")
     long, moved = as_float(length, "length", 4, 1e6), as_float(shift, "shift", -1e6, 1e6)
     spread = as_float(vary, "vary", 0, 0.9)
     wide = as_float(joint, "joint", 0, min(*heights, long * (1 - spread), 1e6) / 2)
     if shape[0] / min(heights) * (shape[1] / long + 2) > MOST:
-        raise InvalidInput(f"height, length: more than {MOST} bricks would lie in {shape}")
+        raise InvalidInput(f"height, length: must give at most {MOST} bricks in {shape}; use larger ones")
     noise, labels = np.random.default_rng(number), np.zeros(shape, np.int32)
     rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
     top, course, count = 0.0, 0, 0
@@ -281,16 +283,20 @@ def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
     import inspect
 
     if not isinstance(description, Mapping) or description.get("layout") not in _MADE:
-        raise InvalidInput(f"layout: needs a mapping with a 'layout' among {', '.join(_MADE)}; got {description!r}")
+        raise InvalidInput(
+            f"layout: must be a mapping whose 'layout' is one of {', '.join(_MADE)}; got {description!r}"
+        )
     function = _MADE[description["layout"]]
     given = {str(name): value for name, value in description.items() if name != "layout"}
     known = inspect.signature(function).parameters
     for name in given:
         if name not in known:
-            raise InvalidInput(f"layout: {description['layout']} has no {name!r}; it has {', '.join(known)}")
+            raise InvalidInput(
+                f"layout: arguments of {description['layout']} must be among {', '.join(known)}; got {name!r}"
+            )
     for name, parameter in known.items():
         if parameter.default is parameter.empty and name not in given:
-            raise InvalidInput(f"layout: {description['layout']} needs {name!r}")
+            raise InvalidInput(f"layout: {description['layout']} requires {name!r}")
     return function(**given)
 
 
@@ -314,7 +320,7 @@ def _as_shape(size: object) -> tuple[int, int]:
 def _as_pair(value: object, name: str) -> tuple[float, float]:
     pair = try_array(value, np.float64)
     if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise InvalidInput(f"{name}: needs two finite numbers (row, column), got {value!r}")
+        raise InvalidInput(f"{name}: must be two finite numbers (row, column), got {value!r}")
     return as_float(float(pair[0]), name, -1e6, 1e6), as_float(float(pair[1]), name, -1e6, 1e6)
 
 

@@ -163,7 +163,7 @@ def evaluate(
     as_instance(elements, "elements", ElementOptions)
     known = exemplar if isinstance(exemplar, Exemplar) else Exemplar(exemplar)
     if known.axes != 2 or source.shapes != (known.shape,):
-        raise InvalidInput(f"source: needs one into a picture of {known.shape}, got one into {source.shapes}")
+        raise InvalidInput(f"source: must have one exemplar of shape {known.shape}, got {source.shapes}")
     cyclic = as_wrap(wrap)
     traits = known.cached(("traits", elements.key), lambda: _measure_traits(known, elements))
     seams = [_find_seam(source, axis, cyclic[axis]) for axis in range(2)]
@@ -171,7 +171,7 @@ def evaluate(
     if image is not None:
         pixels = guidance(as_image(image, "image"))
         if pixels.shape[:2] != source.shape:
-            raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
+            raise InvalidInput(f"image: must have the size of the source map, {source.shape}, got {pixels.shape[:2]}")
         seam_blur = _measure_blur(traits, source, seams, pixels)
     repetition, coverage = _measure_use(traits, source)
     area = source.shape[0] * source.shape[1]

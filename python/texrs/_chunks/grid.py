@@ -79,8 +79,8 @@ class Grid:
     def sort(self, numbers: Iterable[int]) -> list[int]:
         """Sort chunks along a Z-curve, so that any run of successive chunks is compact.
 
-        In this order, workers compute less twice along the borders of their parts than row by row, and use their
-        caches sooner.
+        Compared with an order by rows, workers then repeat less work along the borders of their parts, and reuse
+        cached results sooner.
         """
         given = np.array(list(numbers), np.int64)
         index, key, place = np.unravel_index(given, self.counts), np.zeros(len(given), np.uint64), 0

@@ -76,7 +76,7 @@ class InParts(ABC):
         shape : int or sequence of int
             Samples along each axis.
         chunks : int or sequence of int, optional
-            Samples of a block along each axis. Larger blocks take more memory, and compute less twice along their
+            Samples of a block along each axis. Larger blocks take more memory, but repeat less work along their
             borders. Default: 512 for images, 128 for volumes.
         origin : int or sequence of int
             First sample, in the coordinates of the unbounded texture. Default: 0.
@@ -217,9 +217,9 @@ class InParts(ABC):
         Parameters
         ----------
         path : path_like
-            Path of the file. ``.npy``, ``.tif`` and ``.raw`` can have any size; ``.raw`` has a header ``.nhdr``, which
-            NRRD readers open. Other formats of `texrs.io.write` or `texrs.io.write_volume` are in memory once, at the
-            end.
+            Path of the file. ``.npy``, ``.tif`` and ``.raw`` can have any size. A header ``.nhdr`` is written next to
+            ``.raw``, which NRRD readers open. Other formats of `texrs.io.write` and `texrs.io.write_volume` are in
+            memory once, at the end.
         shape : int or sequence of int
             Samples along each axis.
         chunks : int or sequence of int, optional

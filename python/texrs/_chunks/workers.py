@@ -219,7 +219,7 @@ class _Process:
 def _run_processes(
     work: Work, numbers: Sequence[int], count: int, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
-    """Run tasks in processes. Each takes a row of neighbours, then tasks from the end of the longest remaining row."""
+    """Run tasks in processes. Each runs a row of neighbours, then takes tasks from the end of the longest row."""
     payload = pack(work)
     each = threads_each or max(1, (os.cpu_count() or 1) // count)
     # Give each process a row of neighbouring tasks, which share cached results.

@@ -259,7 +259,7 @@ class Work:
         except UsageFailure as failure:
             return str(failure.format_message())  # type: ignore[attr-defined]
         except MemoryError:
-            return "needs more memory than there is"
+            return "needs more memory than is available"
         except (TexrsError, OSError) as error:
             return say_error(error)
         except Exception as error:  # A broken job does not stop the others.

@@ -101,7 +101,7 @@ def _run(work: Callable[[], object]) -> int:
         complain(say_error(error))
         code = BAD_INPUT
     except MemoryError:
-        complain("this needs more memory than there is; a smaller size or exemplar needs less")
+        complain("this needs more memory than is available; a smaller size or exemplar needs less")
         code = BAD_INPUT
     except OSError as error:
         name = f"{error.filename}: " if isinstance(error.filename, str) else ""
@@ -151,10 +151,10 @@ def say_sizes(message: str) -> str:
     --------
     >>> say_sizes("size: each side must be at least 16, got (40, 8)")
     'size: each side must be at least 16, got 8 x 40'
-    >>> say_sizes("mask.png: needs shape (64, 96), got (40, 30, 3)")
-    'mask.png: needs shape 96 x 64, got 30 x 40 with 3 channels'
-    >>> say_sizes("points: needs numbers of shape (n, 2), got shape (40, 30)")
-    'points: needs numbers of shape (n, 2), got shape (40, 30)'
+    >>> say_sizes("mask.png: must have shape (64, 96), got (40, 30, 3)")
+    'mask.png: must have shape 96 x 64, got 30 x 40 with 3 channels'
+    >>> say_sizes("points: must be numbers of shape (n, 2), got shape (40, 30)")
+    'points: must be numbers of shape (n, 2), got shape (40, 30)'
 
     """
     if not SPEAKS_OF_SIZES.search(message) or ANY_SHAPE.search(message):

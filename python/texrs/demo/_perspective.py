@@ -68,6 +68,7 @@ def _perspective(workshop: Workshop) -> str:
         given = [figure(floor.image, "Example"), figure(scale_maps.picture(target), "Target")]
         grown.append(card(given, figure(made.image, name.capitalize())))
     workshop.watch((len(patterns) + 1) / (len(patterns) + 2))
+    # Flatten the floor, and remove a painted object from it.
     flat = rectify(floor.image, wrap=True, seed=3)
     seen = [figure(floor.image, "In perspective"), figure(flat.stages["flat"], "Flat", note="the plane was found")]
     levelled = [card(seen, figure(np.tile(flat.image, (2, 2, 1)), "Tileable", note="2 × 2 copies"))]

@@ -80,7 +80,7 @@ def from_directions(
     axes = given.shape[-1] if given.ndim else 0
     if given.dtype.kind not in "buif" or axes not in (2, 3) or given.ndim != axes + 1 or not given.size:
         raise InvalidInput(
-            f"directions: needs numbers of shape (R, C, 2) or (P, R, C, 3), got {given.dtype} of {given.shape}"
+            f"directions: must be numbers of shape (R, C, 2) or (P, R, C, 3), got {given.dtype} of {given.shape}"
         )
     letters = _LETTERS[axes - 2]
     as_choice(along, "along", tuple(letters))
@@ -184,7 +184,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
 def _as_map(volume: ArrayLike) -> NDArray[np.float64]:
     given = try_array(volume)
     if given.dtype.kind not in "buif" or given.ndim not in (2, 3) or min(given.shape) < 2:
-        raise InvalidInput(f"volume: needs numbers of shape (R, C) or (P, R, C), got {given.dtype} of {given.shape}")
+        raise InvalidInput(f"volume: must be numbers of shape (R, C) or (P, R, C), got {given.dtype} of {given.shape}")
     check_memory(8 * given.size, "volume")
     return np.asarray(given, np.float64)
 

@@ -322,7 +322,7 @@ def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.
     given = try_array(points)
     if given.dtype.kind not in "buif" or given.ndim == 0 or given.shape[-1] != axes:
         raise InvalidInput(
-            f"{name}: needs numbers of shape (..., {axes}), ({', '.join(_NAMES[axes - 2])}) each; "
+            f"{name}: must be numbers of shape (..., {axes}), ({', '.join(_NAMES[axes - 2])}) each; "
             f"got {given.dtype} of shape {given.shape}"
         )
     at = np.ascontiguousarray(given, np.float64)

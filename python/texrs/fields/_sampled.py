@@ -82,7 +82,7 @@ def make_grid(
     given = _as_numbers(frames, "frames")
     axes = given.shape[-1] if given.ndim else 0
     if axes not in (2, 3) or given.shape[-2:] != (axes, axes) or given.ndim != axes + 2 or given.size == 0:
-        raise InvalidInput(f"frames: needs shape (R, C, 2, 2) or (P, R, C, 3, 3), got {given.shape}")
+        raise InvalidInput(f"frames: must have shape (R, C, 2, 2) or (P, R, C, 3, 3), got {given.shape}")
     sides = given.shape[:axes]
     if prod(sides) > MAX_FRAMES:
         raise InvalidInput(f"frames: up to {MAX_FRAMES} frames are taken, got {prod(sides)}; fewer are interpolated")
@@ -134,10 +134,10 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
     given = _as_numbers(frames, "frames")
     axes = given.shape[-1] if given.ndim == 3 else 0
     if axes not in (2, 3) or given.shape[1] != axes or not 0 < len(given) <= MAX_POINTS:
-        raise InvalidInput(f"frames: needs shape (N, 2, 2) or (N, 3, 3), N up to {MAX_POINTS}; got {given.shape}")
+        raise InvalidInput(f"frames: must have shape (N, 2, 2) or (N, 3, 3), N up to {MAX_POINTS}; got {given.shape}")
     at = as_points(points, axes)
     if at.shape != (len(given), axes):
-        raise InvalidInput(f"points: needs shape {(len(given), axes)} for {len(given)} frames, got {at.shape}")
+        raise InvalidInput(f"points: must have shape {(len(given), axes)} for {len(given)} frames, got {at.shape}")
     if len(np.unique(at, axis=0)) < len(at):
         raise InvalidInput("points: two frames are set at one point")
     turns, stretches = _split(given, lambda index: at[index])

@@ -338,7 +338,7 @@ def _check_coordinates(given: Array, mask: Bools, image: Array) -> Floats:
     axes = mask.ndim
     places, wanted = np.asarray(given), (*mask.shape, axes)
     if places.dtype.kind not in "iuf" or places.shape != wanted:
-        raise InvalidInput(f"coordinates: needs numbers of shape {wanted}, got {places.dtype} {places.shape}")
+        raise InvalidInput(f"coordinates: must be numbers of shape {wanted}, got {places.dtype} {places.shape}")
     inside = (places >= 0) & (places <= np.array(image.shape[:axes]) - 1)
     if not inside[mask].all():
         raise InvalidInput("coordinates: those of given points must lie inside the exemplar and be finite")

@@ -486,11 +486,11 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
         raise FileError(f"{target}: the suffix {target.suffix!r} is not one that surfaces are written to: .stl")
     corners, triangles = try_array(vertices), try_array(faces)
     if corners.ndim != 2 or corners.shape[-1] != 3 or corners.dtype.kind not in "uif":
-        raise InvalidInput(f"vertices: needs numbers of shape (N, 3), got {corners.dtype} of {corners.shape}")
+        raise InvalidInput(f"vertices: must be numbers of shape (N, 3), got {corners.dtype} of {corners.shape}")
     if triangles.ndim != 2 or triangles.shape[-1] != 3 or triangles.dtype.kind not in "ui":
         raise InvalidInput(f"faces: needs integers of shape (M, 3), got {triangles.dtype} of {triangles.shape}")
     if not np.isfinite(corners).all() or not 0 < len(triangles) < 2**32:
-        raise InvalidInput("vertices, faces: needs finite corners and at least one triangle")
+        raise InvalidInput("vertices, faces: must be finite corners and at least one triangle")
     if int(triangles.min()) < 0 or int(triangles.max()) >= len(corners):
         raise InvalidInput(f"faces: name corners from 0 to {len(corners) - 1}")
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):

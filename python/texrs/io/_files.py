@@ -45,7 +45,7 @@ def translate_errors(path: Path, what: str) -> Iterator[None]:
     except TexrsError:
         raise
     except MemoryError:
-        raise LimitExceeded(f"{path}: {what} needs more memory than there is") from None
+        raise LimitExceeded(f"{path}: {what} needs more memory than is available") from None
     except OSError as error:
         raise FileError(f"{path}: {what} failed ({describe_error(error)})") from error
     except Exception as error:

@@ -175,10 +175,10 @@ def check(value: object, suffix: str, axes: int) -> Array:
     except (ValueError, TypeError, MemoryError) as error:
         raise InvalidInput(f"array: not an array of numbers ({_files.describe_error(error)})") from None
     if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
-        raise InvalidInput(f"array: needs bool, integers or floats, got dtype {array.dtype}")
+        raise InvalidInput(f"array: must be bool, integers or floats, got dtype {array.dtype}")
     if array.ndim not in (axes, axes + 1) or array.size == 0:
         shapes = ("(H, W) or (H, W, C)", "(D, H, W) or (D, H, W, C)")[axes - 2]
-        raise InvalidInput(f"array: needs shape {shapes}, not empty; got shape {array.shape}")
+        raise InvalidInput(f"array: must have shape {shapes}, not empty; got shape {array.shape}")
     check_memory(array.size * array.itemsize, "array")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
     form, volume = _NUMPY if suffix == STORE else FORMATS[suffix], axes == 3

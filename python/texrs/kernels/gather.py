@@ -75,7 +75,7 @@ def gather(
     points = as_array(coordinates, "coordinates", np.float32)
     axes = points.shape[-1] if points.ndim else 0
     if axes not in (2, 3):
-        raise InvalidInput(f"coordinates: needs shape (..., 2) or (..., 3), got {points.shape}")
+        raise InvalidInput(f"coordinates: must have shape (..., 2) or (..., 3), got {points.shape}")
     several = [as_ndarray(e, "exemplars", axes=axes) for e in as_list(exemplars)]
     if not several:
         raise InvalidInput("exemplars: at least one is needed, got none")

@@ -198,7 +198,7 @@ def cut(
     covered = as_array(mask_a, "mask_a", np.bool_)
     axes = covered.ndim
     if axes not in (2, 3):
-        raise InvalidInput(f"mask_a: needs shape (rows, columns) or (planes, rows, columns), got {axes} axes")
+        raise InvalidInput(f"mask_a: must have shape (rows, columns) or (planes, rows, columns), got {axes} axes")
     first, second = _as_pair(a, b, axes)
     shape = first.shape[:-1]
     mask, value, edges = _rust.seam_cut(
@@ -413,7 +413,9 @@ def binary_labels(
     costs = as_array(unary, "unary", np.float32)
     axes = costs.ndim - 1
     if axes not in (2, 3) or costs.shape[-1] != 2 or costs.size == 0:
-        raise InvalidInput(f"unary: needs shape (rows, columns, 2) or (planes, rows, columns, 2), got {costs.shape}")
+        raise InvalidInput(
+            f"unary: must have shape (rows, columns, 2) or (planes, rows, columns, 2), got {costs.shape}"
+        )
     shape = costs.shape[:-1]
     what = f"a number or {axes} entries, one an axis"
     entries = (pairwise,) * axes if isinstance(pairwise, Real) else as_tuple(pairwise, "pairwise", axes, what)

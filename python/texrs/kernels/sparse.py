@@ -135,7 +135,7 @@ class Cholesky:
         """
         array = as_array(sides, "sides", np.float64)
         if array.ndim not in (1, 2) or array.shape[0] != self.size or not array.size:
-            raise InvalidInput(f"sides: needs shape ({self.size},) or ({self.size}, k), got {array.shape}")
+            raise InvalidInput(f"sides: must have shape ({self.size},) or ({self.size}, k), got {array.shape}")
         found = self._inner.solve(np.ascontiguousarray(array.T).reshape(-1))
         return np.ascontiguousarray(found.reshape(array.shape[::-1]).T)
 
@@ -149,9 +149,9 @@ def _list_entries(
     if not issparse(matrix):
         matrix = as_array(matrix, name, np.float64)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
-        raise InvalidInput(f"{name}: needs shape (n, n), got {matrix.shape}")
+        raise InvalidInput(f"{name}: must have shape (n, n), got {matrix.shape}")
     if matrix.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: needs real numbers, got dtype {matrix.dtype}")
+        raise InvalidInput(f"{name}: must be real numbers, got dtype {matrix.dtype}")
     check_memory(8 * matrix.shape[0], name)
     columns = csc_array(matrix)
     if not columns.has_canonical_format:

@@ -23,7 +23,7 @@ FORMAT = 1
 """Version of the file layout."""
 NAMES = ("texrs_source_map", "coordinates", "exemplar", "label", "shapes")
 LEAST = 2**26
-"""Maximum bytes of a table of Jacobians for small maps. Larger maps may have one matrix for each pixel."""
+"""Number of bytes that a table of Jacobians may always have. Large maps may have one matrix for each pixel."""
 
 Map = TypeVar("Map", bound=Parted)
 
@@ -81,6 +81,7 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
     for name, shaped in wanted.items():
         if headers[name].shape != shaped or len(shape) not in (2, 3):
             raise FileError(f"{path}: is damaged ({name} of shape {headers[name].shape})")
+    # A damaged or hostile file may declare arrays of any size, so limit each.
     most = {
         "texrs_source_map": 8,
         "coordinates": 4 * len(shape) * pixels,

@@ -38,7 +38,7 @@ class RenderOptions:
     screening : float, optional
         Weight of the original values when seams are blended, above 0 (see `texrs.blend`). Default: no blending.
     band : int, optional
-        Maximum distance in pixels from a seam up to where values are corrected. Default: no limit.
+        Maximum distance of corrected pixels from a seam, in pixels. Default: no limit.
     across : bool
         If True, also correct values where two exemplars meet. Default: True.
     outlines : bool
@@ -154,6 +154,7 @@ class RenderOptions:
             raise InvalidInput(f"finish: must contain {', '.join(PLAIN)}")
         if not isinstance(words["wrap"], list) or len(words["wrap"]) != len(shape):
             raise InvalidInput(f"finish: wrap must have {len(shape)} values")
+        # Check the masks against the shapes of the map and of its exemplars.
         masks = [parts[name] for i in range(len(shapes)) if (name := f"finish/known/{i}") in parts]
         within = parts.get("finish/within")
         if masks and [m.shape for m in masks] != list(shapes):

@@ -42,6 +42,7 @@ class Parted(ABC):
         for name in ("coordinates", "exemplar", "label"):
             if not isinstance(getattr(self, name), np.ndarray):
                 raise InvalidInput(f"{name}: must be a NumPy array, got {type(getattr(self, name)).__name__}")
+        # All arrays must cover the same output pixels.
         shape = self.coordinates.shape[:-1]
         axes = self.coordinates.shape[-1] if self.coordinates.ndim else 0
         if len(shape) != axes or axes not in (2, 3) or 0 in shape:

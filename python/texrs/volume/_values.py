@@ -79,7 +79,7 @@ def as_values(values: ArrayLike, name: str = "values") -> Floats:
     """Return finite values of one channel, in 2-D or in 3-D."""
     array = as_array(values, name, np.float32)
     if array.ndim not in (2, 3) or array.size == 0:
-        raise InvalidInput(f"{name}: needs shape (H, W) or (D, H, W), got {array.shape}")
+        raise InvalidInput(f"{name}: must have shape (H, W) or (D, H, W), got {array.shape}")
     check_finite(array, name)
     return array
 
@@ -88,7 +88,7 @@ def as_region(mask: ArrayLike) -> Bools:
     """Return a mask in 2-D or in 3-D."""
     array = as_array(mask, "mask", np.bool_)
     if array.ndim not in (2, 3) or array.size == 0:
-        raise InvalidInput(f"mask: needs shape (H, W) or (D, H, W), got {array.shape}")
+        raise InvalidInput(f"mask: must have shape (H, W) or (D, H, W), got {array.shape}")
     return array
 
 

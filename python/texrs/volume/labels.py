@@ -62,7 +62,9 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
         return np.ascontiguousarray(table[array.astype(np.intp)])
     given = try_array(colours)
     if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "ui" or given.min() < 0 or given.max() > 255:
-        raise InvalidInput(f"colours: needs numbers from 0 to 255 of shape (K, 3), got {given.dtype} of {given.shape}")
+        raise InvalidInput(
+            f"colours: must be numbers from 0 to 255 of shape (K, 3), got {given.dtype} of {given.shape}"
+        )
     if largest >= len(given):
         raise InvalidInput(f"labels: reach {largest}, but there are {len(given)} colours")
     return np.ascontiguousarray(given.astype(np.uint8)[array.astype(np.intp)])
@@ -109,7 +111,7 @@ def extract_surface(
 
     array = try_array(mask)
     if array.dtype.kind not in "bui" or array.ndim != 3 or min(array.shape) < 2:
-        raise InvalidInput(f"mask: needs bool (D, H, W) of at least 2 a side, got {array.dtype} of {array.shape}")
+        raise InvalidInput(f"mask: must be bool (D, H, W) of at least 2 a side, got {array.dtype} of {array.shape}")
     if array.size > 2**28:
         raise LimitExceeded(f"mask: {array.size} voxels are more than the limit of {2**28}")
     steps = [as_float(s, "spacing", 1e-12, 1e12) for s in as_direction(spacing, "spacing").tolist()]

@@ -51,7 +51,7 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
         )
     angles = given.astype(np.float64)
     if not (np.abs(angles) <= FARTHEST).all():
-        raise InvalidInput(f"direction: needs finite degrees within {FARTHEST:g}")
+        raise InvalidInput(f"direction: must be finite degrees within {FARTHEST:g}")
     # Remove whole turns first, because the remainder of large angles would be rounded.
     angles = np.radians(angles % 360)
     parts = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
