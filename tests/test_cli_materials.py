@@ -253,7 +253,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("solid sample:stripes -o new.tif --size 32x32x32 --depth 16", "No such option: --depth"),
         ("design rock -o new --role wet", "--role: needs MAP=ROLE"),
         ("design rock -o new --role rock_wet=shiny", "allowed roles are"),
-        ("design rock -o new --role dry=mask", "there is no picture 'dry'"),
+        ("design rock -o new --role dry=mask", "got 'dry'"),
         ("design rock -o new.exr --depth 16", "--out: a file of layers keeps each map as it is"),
         ("design rock/rock_albedo.png -o new.png --depth 16", "--depth: is for materials"),
         ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: is for materials"),

@@ -151,7 +151,7 @@ def test_database(here: Path, capsys: Capture) -> None:
         ("analyse in.png -o before.npz --method letter", "--method: must be one of default, paper"),
         ("analyse in.png -o before.npz --rotations 0", "--rotations: must be an integer between 1 and 72"),
         ("analyse in.png -o before.png", "--out: needs a name that ends in .npz"),
-        ("analyse none.png -o before.npz", "none.png: there is no such file"),
+        ("analyse none.png -o before.npz", "none.png: does not exist"),
         ("database db rename", "add\\|list\\|remove\\|splice\\|matrix: must be one of"),
         ("database db list", "db: the folder does not exist"),
         ("database db add", "IMAGE: add needs images"),

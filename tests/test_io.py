@@ -286,8 +286,8 @@ def test_names(tmp_path, name):
     [
         ("a.psd", "is not one that is written: .png"),
         ("a", "the suffix '' is not"),
-        ("missing/a.png", "there is no folder"),
-        ("file/a.png", "there is no folder"),
+        ("missing/a.png", "does not exist"),
+        ("file/a.png", "does not exist"),
         ("folder.png", "is a folder"),
         ("n\0.png", "null"),
         ("x" * 300 + ".png", "cannot be written"),

@@ -270,7 +270,7 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
         (np.ones((4, 4, 2)), 3, r"field: holds \(4, 4, 2\), a field of 2 axes; 3 are needed"),
         (np.zeros((4, 4, 4, 3)), 3, "directions: all have length 0"),
         (7, 3, "field: needs a field of 3 axes, got int"),
-        ("nowhere.npy", 3, "there is no such file"),
+        ("nowhere.npy", 3, "does not exist"),
         ("flow.npy:around=z", 3, "knows along=, order=, up=, signed= after a file"),
         ("flow.npy:up=1x", 3, "up= needs three numbers"),
         ("flow.npy:signed=1", 3, "signed= needs yes or no"),

@@ -158,7 +158,7 @@ def test_colours_that_are_not_read(tmp_path):
 def test_missing_files_and_folders(tmp_path):
     (tmp_path / "file").write_bytes(b"regular")
     for read in (tio.read, tio.read_volume):
-        with pytest.raises(FileError, match="there is no such file"):
+        with pytest.raises(FileError, match="does not exist"):
             read(tmp_path / "missing.png")
         with pytest.raises(FileError, match="is a folder"):
             read(tmp_path)

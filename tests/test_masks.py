@@ -445,7 +445,7 @@ def test_commands_refuse_what_marks_nothing_and_warn_of_much(here: Path, capsys:
 def test_a_file_that_is_missing_is_named_once(here: Path, capsys: Capture) -> None:
     for command in ("inpaint in.png no.png", "remove in.png no.png", "inpaint in.png hole.png --allowed no.png"):
         assert main([*command.split(), "-o", "out.png"]) == 2
-        assert capsys.readouterr().err.splitlines()[-1] == "texrs: no.png: there is no such file"
+        assert capsys.readouterr().err.splitlines()[-1] == "texrs: no.png: does not exist"
 
 
 def test_an_inverted_mask_is_warned_of(here: Path, capsys: Capture) -> None:

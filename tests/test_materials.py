@@ -215,7 +215,7 @@ def test_what_names_do_not_say_is_left_out_and_said(tmp_path: Path) -> None:
         assert list(Material.read(tmp_path)) == ["rock_albedo"]
     with pytest.raises(InvalidInput, match="one size"):
         Material.read(tmp_path, roles={"rock_preview.png": "mask"})
-    with pytest.raises(InvalidInput, match="there is no picture 'rock'"):
+    with pytest.raises(InvalidInput, match="roles: must name images in .*got 'rock'"):
         Material.read(tmp_path, roles={"rock": "mask"})
     (tmp_path / "empty").mkdir()
     with pytest.raises(FileError, match="no picture has a name"):
@@ -232,7 +232,7 @@ def test_bad_materials_are_refused() -> None:
         ({"albedo": picture, "height": picture[:-1, :, 0]}, {}, "maps: all must have one size; height has"),
         ({"normal": picture[..., 0]}, {}, "normal: a map of role normal must have 2, 3 or 4 channels, got 1"),
         ({"albedo": picture}, {"roles": {"albedo": "shiny"}}, "allowed roles are"),
-        ({"albedo": picture}, {"roles": {"colour": "mask"}}, "there is no map 'colour'"),
+        ({"albedo": picture}, {"roles": {"colour": "mask"}}, "roles: must name maps (albedo), got 'colour'"),
         ({"albedo": picture}, {"spaces": {"albedo": "lab"}}, "must be one of srgb, linear"),
         ({"albedo": picture}, {"weights": {"albedo": -1}}, "weights"),
         ({"albedo": picture, "mask": picture}, {"weights": {"albedo": 0, "mask": 0}}, "nothing to decide on"),
@@ -271,7 +271,7 @@ def test_maps_say_what_they_are() -> None:
     changed = STONES.replace(albedo=255 - each.pixels)
     assert isinstance(changed["albedo"], Map)
     assert changed["albedo"].role is Role.COLOUR
-    with pytest.raises(InvalidInput, match="there is no map 'colour'"):
+    with pytest.raises(InvalidInput, match="maps: must name maps of the material .*got 'colour'"):
         STONES.replace(colour=each.pixels)
 
 

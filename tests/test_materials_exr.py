@@ -147,7 +147,7 @@ def test_files_of_other_programs_are_read_by_names(tmp_path: Path) -> None:
     assert back["height"].pixels.ndim == 2
     plain = Material.read(write(tmp_path / "c.exr", [({}, {**colours, "depth.V": one})]), roles={"depth": "height"})
     assert {name: each.role for name, each in plain.items()} == {"colour": Role.COLOUR, "depth": Role.HEIGHT}
-    with pytest.raises(InvalidInput, match="there is no layer 'deep'"):
+    with pytest.raises(InvalidInput, match="roles: must name layers of .*got 'deep'"):
         Material.read(tmp_path / "c.exr", roles={"deep": "height"})
     with pytest.raises(FileError, match="no layer has a name"):
         Material.read(write(tmp_path / "d.exr", [({}, {"grace.V": one, "glory.V": one})]))
@@ -257,7 +257,7 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
         (tmp_path / "cut.exr").write_bytes(whole[:cut])
         with pytest.raises(FileError, match=r"cut\.exr"):
             Material.read(tmp_path / "cut.exr")
-    with pytest.raises(FileError, match="there is no such file"):
+    with pytest.raises(FileError, match="does not exist"):
         Material.read(tmp_path / "none.exr")
     with pytest.raises(FileError, match="layers are written to .exr"):
         EVERY.save_exr(tmp_path / "a.png")

@@ -268,7 +268,7 @@ def test_pictures_of_16_bit(tmp_path: Path) -> None:
     ("name", "options", "error", "words"),
     [
         ("a.obj", {}, FileError, "is not one of glTF"),
-        ("none/a.glb", {}, FileError, "there is no folder"),
+        ("none/a.glb", {}, FileError, "does not exist"),
         ("a.glb", {"shapes": []}, InvalidInput, "shapes: needs plane, sphere or both"),
         ("a.glb", {"shapes": ["plane", "plane"]}, InvalidInput, "shapes: needs plane, sphere or both"),
         ("a.glb", {"shapes": ["cube"]}, InvalidInput, "must be one of plane, sphere"),

@@ -91,11 +91,11 @@ def test_scales_that_the_exemplar_has_not_are_made_or_brought_to_those_it_has(fl
     mixed = small.copy()
     mixed[:24] = 1
     with pytest.warns(
-        UserWarning, match=r"target: 50.0% of it asks for scales that the exemplar has not, by a factor of"
+        UserWarning, match=r"target: 50.0% of it is outside the scales of the exemplar's copies, by a factor of"
     ):
         held = grow(floor, 48, target=mixed, augment_scales=False)
     assert held.report["outside"]["share"] == pytest.approx(0.5)
-    with pytest.raises(InvalidInput, match="target: asks for scales from"):
+    with pytest.raises(InvalidInput, match="target: must be within"):
         grow(floor, 48, target=small, augment_scales=False)
 
 

@@ -128,7 +128,7 @@ def test_transparency_is_the_hole(floor):
     assert (result.image[..., 3] == 255).all()
     with pytest.raises(InvalidInput, match="mask: no pixel of the image is transparent"):
         texrs.inpaint(result.image, "alpha")
-    with pytest.raises(FileError, match="mask: beta: there is no such file"):
+    with pytest.raises(FileError, match="mask: beta: does not exist"):
         texrs.inpaint(result.image, "beta")
 
 

@@ -241,7 +241,7 @@ def test_what_is_no_plane_and_has_many_sizes_is_bent_in_copies():
 def test_what_is_too_small_is_shown_as_small_as_there_is(weave):
     far = 20 * EYE * np.ones((32, 32, 1, 1))
     far[:16] = 2 * EYE
-    with pytest.warns(UserWarning, match="target: 50.0% of it asks for scales"):
+    with pytest.warns(UserWarning, match="target: 50.0% of it is outside the scales"):
         made = texrs.perspective(weave, "front", target=far, seed=1)
     np.testing.assert_allclose(made.stages["target"][16:], 1 / 8, rtol=1e-3)
 
@@ -262,8 +262,8 @@ def test_a_column_that_repeats(weave):
         ({"target": "floor"}, "target: needs plane:slant=DEGREES"),
         ({"target": "plane:tilt=9"}, "target: needs plane:slant=DEGREES"),
         ({"target": "plane:slant=steep"}, "target: needs plane:slant=DEGREES"),
-        ({"target": "plane:slant=99"}, "target: slant: must be a number between 0 and 88"),
-        ({"target": "plane:slant=80,fov=90"}, "target: the horizon of a plane at 80 degrees lies inside"),
+        ({"target": "plane:slant=99"}, "target: slant: needs a number from 0 to 88"),
+        ({"target": "plane:slant=80,fov=90"}, "target: must not contain the horizon, but slant 80"),
         ({"target": np.zeros((8, 8, 2, 2))}, "target: 64 of 64 matrices are flat"),
         ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),
         ({"target": np.zeros((8, 8, 3))}, "target: normals: no pixel shows a surface"),

@@ -381,4 +381,4 @@ def test_info_knows_volumes_and_surfaces(here: Path, capsys: Capture) -> None:
     assert main(["info", "db/dots.npz"]) == 0
     assert capsys.readouterr().out.startswith("elements: ")
     assert main(["info", "in.tif.no"]) == 2
-    assert "there is no such file" in capsys.readouterr().err
+    assert "does not exist" in capsys.readouterr().err

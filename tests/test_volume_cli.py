@@ -88,8 +88,8 @@ def test_turntables_and_samples(here, capsys):
         ("v.npy -o out.gif --cube", "a picture is not written to .gif"),
         ("v.npy -o out.jpg --cube", "out.jpg: .jpg cannot hold uint8 with 4 channels"),
         ("v.npy -o out.tiff --cube --threads 0", "--threads"),
-        ("v.npy -o none/out.png", "there is no folder"),
-        ("w.npy -o out.png", "there is no such file"),
+        ("v.npy -o none/out.png", "does not exist"),
+        ("w.npy -o out.png", "does not exist"),
         ("out.png -o out.png", "out.png"),
         ("sample:bricks -o out.png", "sample:bricks: is an image; volumes are particles, stripes, weave_solid"),
         ("v.npy", "Missing option"),
@@ -130,7 +130,7 @@ def test_fields_in_words_and_in_files(here):
         ("two.npz", size, "two.npz: needs a single array, or one with the key"),
         ("flat.npz", size, "flat.npz: the frame at"),
         ("frames.npz", size[:2], "frames.npz: holds (2, 2, 2, 3, 3), a field of 3 axes; 2 are needed"),
-        ("none.npz", size, "none.npz: there is no such file"),
+        ("none.npz", size, "none.npz: does not exist"),
     ):
         with pytest.raises(TexrsError) as caught:
             read_field(text, About(size=extent))

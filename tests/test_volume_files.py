@@ -444,6 +444,6 @@ def test_stores_are_written_whole_and_over_none_but_their_like(tmp_path):
     (tmp_path / "mine.zarr" / "letter.txt").write_text("dear")
     with pytest.raises(FileError, match="is not a Zarr store"):
         tio.write_volume(tmp_path / "mine.zarr", volume)
-    with pytest.raises(FileError, match="there is no folder"):
+    with pytest.raises(FileError, match="does not exist"):
         tio.write_volume(tmp_path / "none" / "a.zarr", volume)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.zarr", "mine.zarr", "p.zarr"]

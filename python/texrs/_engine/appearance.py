@@ -82,7 +82,7 @@ class Appearance:
         rows, columns[, C]).
     axes : int
         2 or 3.
-    wrap : bool or one an axis
+    wrap : bool or one per axis
         Axes along which the exemplar repeats.
     radius : int
         Radius of a window; its side is 2 radius + 1.

@@ -52,8 +52,8 @@ def find_similar(
 ) -> Similarity:
     """Find the samples of an exemplar most similar to each one, far from it and from each other.
 
-    C_1 is the sample itself. Each further C_j is the sample with the nearest appearance vector that is far enough
-    from all earlier ones: more than (n - 1) / 2 samples along some axis [1]_. The whole exemplar is searched,
+    C_1 is the sample itself. Each further C_j has the nearest appearance vector of all samples that are far enough
+    from all earlier ones. This is more than (n - 1) / 2 samples along some axis [1]_. The whole exemplar is searched,
     and the result is exact. The first of equally near samples is used.
 
     Parameters

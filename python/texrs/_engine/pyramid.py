@@ -160,7 +160,7 @@ def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) 
     ----------
     image : (..., [C]) array
         Any real dtype; sides of at least 2.
-    wrap : bool or one an axis
+    wrap : bool or one per axis
         Axes along which the image is periodic. Along the others the border repeats.
     axes : int
         Number of axes without channels, 2 or 3.

@@ -30,7 +30,7 @@ def smooth(
     values : array of float32 or float64
         Array of any shape. Sums are computed in double precision.
     sigma : float or sequence
-        Standard deviation, in samples, as one number or one an axis. 0 leaves an axis unchanged.
+        Standard deviation, in samples, as one number or one per axis. 0 leaves an axis unchanged.
     mode : str or sequence
         Continuation beyond the ends of axes, as in `scipy.ndimage.gaussian_filter`. "constant" is 0 there.
     truncate : float

@@ -119,7 +119,7 @@ class Stitcher:
     ----------
     colours : (..., C) float32
         Up to four channels of any scale, on two or three axes.
-    wrap : one bool an axis
+    wrap : one bool per axis
         Axes along which the exemplar repeats.
     classes : uint8 array
         Class of each sample.

@@ -77,7 +77,7 @@ class Exemplar:
     labels : bool, optional
         If True, the values are unordered classes and are looked up at the nearest sample, whatever the interpolation.
         Default: True for one channel of integers or bool with 2 to 16 values, such as a mask of 0 and 255.
-    repeat : bool, or one an axis, optional
+    repeat : bool, or one per axis, optional
         Axes along which the example is periodic. Default: measured.
 
     Raises

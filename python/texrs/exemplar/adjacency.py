@@ -76,7 +76,7 @@ def measure_adjacency(colours: Floats, wrap: Sequence[bool]) -> Adjacency:
     ----------
     colours : (..., C) float32
         Colours of the exemplar.
-    wrap : one bool an axis
+    wrap : one bool per axis
         Axes along which the exemplar is periodic.
 
     Returns

@@ -80,7 +80,7 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     ----------
     colours : (..., C) float32
         Exemplar with two or three axes.
-    wrap : one bool an axis
+    wrap : one bool per axis
         Axes along which the exemplar is periodic.
 
     Returns

@@ -6,22 +6,22 @@ source maps store J. Points are (row, column) or (plane, row, column) in voxels 
 integers. The letters x, y and z name the axes of columns, rows and planes.
 
 ===================  ==========================================================================
-`identity`           as the exemplar stands
-`circular`           wound round an axis
-`spiral`             the same, turned by an angle
-`zigzag`             turned by an angle and by its opposite, in bands
-`rotation`              turned by an angle in a plane
-`rotation_3d`           turned in two planes
-`shear`              leaning
-`scale_ramp`         growing along an axis
-`constant`           any matrix
+`identity`           the orientation of the exemplar
+`circular`           the texture wound round an axis
+`spiral`             `circular`, rotated by an angle
+`zigzag`             rotations by an angle and by its opposite, in alternate bands
+`rotation`           rotation by an angle in a plane
+`rotation_3d`        rotations in two planes
+`shear`              shear: one axis leans towards another
+`scale_ramp`         features that grow along an axis
+`constant`           one matrix everywhere
 `from_array`         frames on a grid of any resolution
 `from_directions`    a vector at each place, completed to frames
-`from_gradient`      up a map
-`from_structure`     along the grain of a picture or a volume
-`interpolate`        frames set at points
+`from_gradient`      the direction in which a map rises
+`from_structure`     the grain of an image or a volume
+`interpolate`        interpolation of frames that are given at points
 `from_function`      a function of the point
-`read`               the vectors or frames of a file
+`read`               vectors or frames from a file
 ===================  ==========================================================================
 
 Every parameter for a field also takes its words, an array of vectors or frames, or a file of one (`as_field`).

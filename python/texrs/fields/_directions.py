@@ -1,4 +1,4 @@
-"""Fields from directions of simulations, scans or strokes: one vector a place, completed to frames."""
+"""Fields from directions of simulations, scans or strokes: one vector per place, completed to frames."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def from_directions(
     along : {"x", "y", "z"}
         Axis of the exemplar that is turned into the directions: columns, rows or planes.
     up : (3,) or (P, R, C, 3) array_like, optional
-        Up direction in volumes, (plane, row, column), one for all or one a place, such as the normals of a surface. By
+        Up direction in volumes, (plane, row, column), one for all or one per place, such as the normals of a surface. By
         default the axis least parallel to the directions.
     order : {"zyx", "xyz", "yx", "xy"}, optional
         Order of the components. Default: the order of array axes, (plane, row, column).

@@ -187,7 +187,7 @@ class Field(ABC):
         ----------
         shape : sequence of int
             Samples along each axis.
-        origin : int, or one an axis
+        origin : int, or one per axis
             Index of the first sample, on the level's own lattice.
         step : float
             Voxels from one sample to the next: 1, 2, 4 ... Sample i is at (i + 1/2) step - 1/2.

@@ -92,8 +92,8 @@ class Guide:
         Finite numbers in the same unit, which broadcast to the size of the output: the requested quantity at each
         point.
     weight : float
-        Weight of the guide compared with similarity to the exemplar, 0 to 100. At 1 a difference of a third of the
-        range of the exemplar's map costs as much as two unrelated windows.
+        Weight of the guide compared with similarity to the exemplar, 0 to 100. If it is 1, a difference of a third of
+        the range of the exemplar's map costs as much as two unrelated windows.
 
     Raises
     ------

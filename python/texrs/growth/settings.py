@@ -18,7 +18,7 @@ class Settings:
     reaches : (int, int, int)
         Distance of the neighbours whose matches are tried, 1 or 2 points.
     votes : (int, int, int)
-        Radius within which windows vote on a point. At 0 each point takes its own match.
+        Radius within which windows vote on a point. If 0, each point takes its own match.
     weights : (float, float, float)
         Weight of the requested scales compared with similarity to the exemplar.
     radii : sequence of int
@@ -28,9 +28,9 @@ class Settings:
     cell, rounds, candidates : int
         Patch-based initialisation: side of a cell, number of half-rounds of choosing, and candidates of each choice.
     contrast, continuation, repetition : float
-        Patch-based initialisation. Division of misfits by the contrast of the pieces; cost of continuing
-        exactly where a
-        neighbour ends; cost of showing the same samples as a neighbour.
+        Patch-based initialisation. ``contrast``: division of misfits by the contrast of the pieces, from 0 to 1.
+        ``continuation``: cost of continuing exactly where a neighbour ends. ``repetition``: cost of showing the same
+        samples as a neighbour.
     acceptance : float
         Acceptance threshold: the required improvement of a drawn match over the present one.
     coherence : float

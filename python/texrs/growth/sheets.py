@@ -30,7 +30,7 @@ COLOUR, SURPRISE = 0.4, 0.5
 size.
 """
 UNIT = 512
-"""Weight of a scale error. At this weight an error by a factor of e costs as much as two unrelated windows. Unit:
+"""Weight of a scale error. An error by a factor of e then costs as much as two unrelated windows. Unit:
 1/256 of a squared unit of log scale.
 """
 
@@ -101,7 +101,7 @@ def stitch_sheet(
     loose : (rows, columns) bool, optional
         Fixed pixels that patches may still replace if this makes seams less visible.
     frames : (N, 2, 2) int16, optional
-        Jacobians of the sheet, one for all pixels or one a pixel, in fixed point. By default derived from the target.
+        Jacobians of the sheet, one for all pixels or one per pixel, in fixed point. By default derived from the target.
     progress : callable, optional
         Called with the stage and its completed share.
 

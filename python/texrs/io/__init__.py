@@ -46,9 +46,10 @@ in the file. Volumes larger than memory are written slab by slab (`write_slabs`)
 255, to ``.npy`` and ``.npz`` as bool. An opaque alpha channel is left out if the format has none. A single channel is read
 without a channel axis, from ``.npy`` and ``.npz`` as it was written. ``.npz`` files have the key ``image``.
 
-The content of a file decides its format when it is read (the suffix does for TGA), and the suffix when it is written. Headers
-are compared with the limit before memory is used. `read_metadata` reads metadata, such as ICC profiles, densities and the
-record of how texrs made a file, and `write_metadata` writes them. All files are written to a temporary name and renamed.
+When a file is read, its content decides the format (for TGA, the suffix does). When it is written, the suffix decides.
+Headers are compared with the limit before memory is used. `read_metadata` reads metadata, such as ICC profiles,
+densities and the record of how texrs made a file, and `write_metadata` writes them. All files are written to a
+temporary name and renamed.
 """
 
 from __future__ import annotations
@@ -255,11 +256,12 @@ def read_volume(
     Parameters
     ----------
     path : path_like
-        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, NRRD or NIfTI (these with the extra
-        ``vol``), or the folder of a Zarr store (extra ``dask``). The content decides the format. A NIfTI file that
-        scales its samples gives float32. The finest level of OME-Zarr is read; a path inside the store names another.
-        A folder of numbered slices (``scan_1.tif`` to ``scan_48.tif``) is read in the order of the numbers. Samples without
-        a header: ``scan.raw:96x96x48:uint16`` states the width, height, depth, type and, with ``:big``, the byte order.
+        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, NRRD, NIfTI, or the folder of a Zarr
+        store. NRRD and NIfTI need the extra ``vol``, and Zarr the extra ``dask``. The content decides the format. A
+        NIfTI file that scales its samples gives float32. The finest level of OME-Zarr is read; a path inside the store
+        names another. A folder of numbered slices (``scan_1.tif`` to ``scan_48.tif``) is read in the order of the
+        numbers. Samples without a header: ``scan.raw:96x96x48:uint16`` states the width, height, depth, type and, with
+        ``:big``, the byte order.
     shape : sequence of int, optional
         (D, H, W) or (D, H, W, C) of a file without a header, if its name does not state it. Default: None.
     dtype : dtype, optional
@@ -367,8 +369,8 @@ def write_volume(
     Parameters
     ----------
     path : path_like
-        File with the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz (these three with the extra ``vol``) or .vti; or
-        folder with the suffix .zarr (extra ``dask``): OME-Zarr of one level.
+        File with the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz or .vti, or folder with the suffix .zarr.
+        NRRD and NIfTI need the extra ``vol``. A folder .zarr needs the extra ``dask``, and is OME-Zarr of one level.
     array : array_like
         Shape (D, H, W) or (D, H, W, C).
     overwrite : bool

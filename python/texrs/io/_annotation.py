@@ -155,7 +155,7 @@ def write_metadata(path: PathLike, notes: Metadata, beside: PathLike | None = No
         if made is None:
             return None
         if not apart:
-            # The place of the record is a part of the rest of such a file: write zeros first, then the digest.
+            # The record is a part of the file that it describes, so write zeros first, and then the digest of the rest.
             if BLANK in made:
                 _replace_record(name, kind, made, _fill_in(name, made))
             return None

@@ -81,8 +81,8 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
 def read_layers(path: PathLike, *, limit: int | None = None) -> tuple[dict[str, Array], str | None]:
     """Return the channels of a file by their full names, (H, W) of float16, float32 or uint32, and the description of its maps.
 
-    The image is the display window: data outside it is left out, and missing data is 0. In a file of several parts the name
-    of the part comes first.
+    The image is the display window: data outside it is left out, and missing data is 0. If a file has several parts,
+    names begin with the name of the part.
     """
     parts = _read_parts(as_path(path), as_limit(limit))
     words = parts[0][2].get(MAPS)

@@ -67,7 +67,7 @@ def check_file(path: Path) -> int:
     try:
         status = path.stat()
     except FileNotFoundError:
-        raise FileError(f"{path}: there is no such file") from None
+        raise FileError(f"{path}: does not exist") from None
     except OSError as error:
         raise FileError(f"{path}: cannot be opened ({describe_error(error)})") from None
     if stat.S_ISDIR(status.st_mode):
@@ -127,23 +127,21 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
     Parameters
     ----------
     path : path_like
-        The file to make. A symbolic link is followed.
+        File to write. A symbolic link is followed.
     overwrite : bool
-        Whether a file that exists may be replaced.
+        If True, an existing file may be replaced. Default: True.
 
     Yields
     ------
     pathlib.Path
-        A name in the same folder, with the same suffix, to write to. When the block ends, what lies
-        there takes the place of ``path`` in one step, also if the power goes; when it raises, it is
-        removed, and a former file stays as it was. What a process that was killed left of it goes
-        when the next one writes to the folder.
+        Temporary name in the same folder, with the same suffix. When the block ends, the file there replaces ``path`` in
+        one step, even if the power fails. If the block raises, the temporary file is removed, and an existing file is
+        unchanged. If the process is killed, the next process that writes to the folder removes the temporary file.
 
     Raises
     ------
     FileError
-        The folder is missing or not writable, ``path`` is a folder or no regular file, or exists
-        already.
+        The folder is missing or not writable, or ``path`` exists already, is a folder or is not a regular file.
 
     Examples
     --------
@@ -169,7 +167,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
         if exists and not os.access(final, os.W_OK):
             raise FileError(f"{target}: is write-protected")
         if not final.parent.is_dir():
-            raise FileError(f"{target}: there is no folder {target.parent}")
+            raise FileError(f"{target}: the folder {target.parent} does not exist")
     except OSError as error:
         if isinstance(error, FileError):
             raise
@@ -192,5 +190,5 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
 
 
 def find_suffix(path: Path) -> str:
-    """Return the end of a name that says what is in the file: of a compressed volume, both parts."""
+    """Return the suffix of a name that identifies the format. It has two parts for a compressed volume."""
     return path.name[-7:] if path.name.lower().endswith(".nii.gz") else path.suffix

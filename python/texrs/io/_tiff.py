@@ -47,7 +47,7 @@ SOFTWARE = "texrs"
 _SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317, 320, 322, 323, 324, 325, 338, 339})
 """Tags of the layout of pixels. tifffile continues without a tag that it cannot read."""
 _ASSOCIATED = 1
-"""Type of an extra sample: alpha by which the colours are multiplied."""
+"""Type of an extra sample: an alpha that the colours are multiplied by."""
 _OME = 2**16
 """Maximum number of characters of the metadata of OME that are searched."""
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _SEPARATED, _YCBCR = 0, 1, 2, 3, 5, 6

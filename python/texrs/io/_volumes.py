@@ -1,7 +1,7 @@
 """Volumes for other programs: NRRD by pynrrd, NIfTI by nibabel (extra ``vol``), STL surfaces.
 
-The libraries read and write headers. This module reads samples after it has compared the header with the limit and with
-the length of the file, so that neither a huge header nor a bomb of compressed zeros takes memory.
+The libraries read and write headers. This module reads samples, after it has compared the header with the limit and
+with the length of the file. Neither a huge header nor a bomb of compressed zeros can therefore fill the memory.
 
 NRRD and NIfTI list the axis that runs fastest first, so that plane, row and column are z, y and x.
 """

@@ -105,7 +105,7 @@ def _decode(data: bytes | memoryview, length: int) -> bytes:
 def _unpack(
     path: Path, data: memoryview, header: np.dtype[np.generic], encoded: bool, packer: str | None, size: int
 ) -> bytes | memoryview:
-    """Return samples after their length, or from blocks that are compressed one by one after the lengths of all."""
+    """Return the samples. They follow their length, or are in compressed blocks that follow the lengths of all blocks."""
     one = header.itemsize
     if packer is None:
         there = _decode(data, one + size) if encoded else data

@@ -106,7 +106,7 @@ def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *
     if final.exists() and not (overwrite and is_store(final)):
         raise FileError(f"{path}: exists already" if is_store(final) else f"{path}: exists and is not a Zarr store")
     if not final.parent.is_dir():
-        raise FileError(f"{path}: there is no folder {path.parent}")
+        raise FileError(f"{path}: the folder {path.parent} does not exist")
     channels = array.shape[axes] if array.ndim > axes else None
     values = array if channels is None else np.moveaxis(array, -1, 0)
     chunks = (*values.shape[: values.ndim - axes], *(min(_CHUNK[axes], n) for n in array.shape[:axes]))
@@ -185,7 +185,7 @@ def _check_complete(path: Path, array: Any) -> None:
             if missing:
                 raise FileError(
                     f"{path}: is not finished, {missing} of {prod(array.cdata_shape)} chunks are missing; "
-                    "what makes it goes on when it is run again"
+                    "repeat the call or command that writes it to continue"
                 )
             return
 

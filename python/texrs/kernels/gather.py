@@ -47,7 +47,7 @@ def gather(
     interpolation : {"nearest", "linear", "cubic"}
         Interpolation between samples. Integers are rounded to the nearest. Integers beyond 2^53 are not interpolated:
         the nearest sample is used. Default: "nearest".
-    wrap : bool or one an axis
+    wrap : bool or one per axis
         Axes along which the exemplars are periodic. Along the other axes the edge repeats.
 
     Returns

@@ -117,8 +117,8 @@ def spread(
 ) -> None:
     """Solve ``(L + screening) v = flow`` in place.
 
-    L is the Laplacian, the sum of the differences of a pixel to its neighbours. v is the difference between the result
-    of `solve` and its image. For corrections of large images, where one array less matters.
+    L is the Laplacian, the sum of the differences of a pixel to its neighbours. v is the result of `solve` minus its
+    image. Use this function for corrections of large images, where one array less matters.
 
     Parameters
     ----------

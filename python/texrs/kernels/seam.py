@@ -134,7 +134,7 @@ def cut(
     Parameters
     ----------
     a, b : array_like
-        The existing and the added image, on one canvas: (H, W) or (H, W, C), or volumes (D, H, W[, C]) with masks of
+        The existing and the added image, on one canvas: (H, W) or (H, W, C). Volumes (D, H, W[, C]) have masks of
         three axes. Any dtype; both are scaled to [0, 1] together. Finite everywhere.
     mask_a, mask_b : (H, W) or (D, H, W) array_like of bool
         Pixels that each image covers.
@@ -142,9 +142,8 @@ def cut(
         Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must cover its core. By
         default none.
     penalty : float or array_like of float, optional
-        Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus
-        the mean of its two penalties,
-        which keeps seams out of elements that should stay whole.
+        Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean
+        of its two penalties. This keeps seams out of elements that should stay whole.
     old : OldSeams, optional
         Seams that A already contains, which can then be covered. An old seam that costs more than its two replacements
         together counts as their sum. This only happens with a cost that breaks the triangle inequality.
@@ -417,7 +416,7 @@ def binary_labels(
             f"unary: must have shape (rows, columns, 2) or (planes, rows, columns, 2), got {costs.shape}"
         )
     shape = costs.shape[:-1]
-    what = f"a number or {axes} entries, one an axis"
+    what = f"a number or {axes} entries, one per axis"
     entries = (pairwise,) * axes if isinstance(pairwise, Real) else as_tuple(pairwise, "pairwise", axes, what)
     both = [entry if isinstance(entry, tuple) else (entry, entry) for entry in entries]
     if any(len(entry) != 2 for entry in both):
@@ -459,7 +458,7 @@ def _as_seams(old: object, shape: tuple[int, ...]) -> list[list[Floats]]:
         raise InvalidInput(f"old: needs OldSeams, got {type(old).__name__}")
     fields = []
     for name in ("old.kept", "old.ab", "old.ba"):
-        arrays = as_tuple(getattr(old, name[4:]), name, len(shape), f"{len(shape)} arrays, one an axis")
+        arrays = as_tuple(getattr(old, name[4:]), name, len(shape), f"{len(shape)} arrays, one per axis")
         fields.append([_as_floats(array, name, shape) for array in arrays])
     return fields
 

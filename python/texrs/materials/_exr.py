@@ -4,14 +4,14 @@
 Role             Channels of the layer            Values
 ================ ================================ ===========================================================
 colours, others  R G B, R G B A, Y, Y A           linear light, multiplied by alpha; integers as shares of their range
-normals, vectors X Y, X Y Z, X Y Z A              integers as -1 to 1, y as the role says
+normals, vectors X Y, X Y Z, X Y Z A              integers as -1 to 1, y as the role specifies
 labels           Y                                whole numbers of 32 bit
 more than 4      0, 1, 2, ...                     as above, also normals without z that have 3 or 4 channels
 ================ ================================ ===========================================================
 
-Linear floats are stored unchanged. Roles, spaces, dtypes and weights are in the header, so that integers are restored
-to the bit. 8-bit integers are half floats in the file, and 16-bit integers are floats. Files of other programs are
-read by the names of layers.
+Linear floats are stored unchanged. The header contains roles, spaces, dtypes and weights, so that integers are
+restored to the bit. 8-bit integers are half floats in the file, and 16-bit integers are floats. Files of other
+programs are read by the names of layers.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
         layers = dict(zip(shorten(list(layers)), layers.values(), strict=True))
     said = {name: as_role(role, f"roles[{name!r}]") for name, role in roles.items()}
     if unknown := said.keys() - layers.keys():
-        raise InvalidInput(f"roles: there is no layer {sorted(unknown)[0]!r} in {path}; there are {', '.join(layers)}")
+        raise InvalidInput(f"roles: must name layers of {path} ({', '.join(layers)}), got {sorted(unknown)[0]!r}")
     maps: dict[str, Map] = {}
     left: dict[str, list[str]] = {}
     taken: dict[str, list[str]] = {}

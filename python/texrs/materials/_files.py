@@ -60,7 +60,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
     for name, role in roles.items():
         chosen = [file for file in files if name in (file, stems[file])]
         if not chosen:
-            raise InvalidInput(f"roles: there is no picture {name!r} in {path}; there are {', '.join(files) or 'none'}")
+            raise InvalidInput(f"roles: must name images in {path} ({', '.join(files) or 'none'}), got {name!r}")
         said |= dict.fromkeys(chosen, as_role(role, f"roles[{name!r}]"))
     guessed, why = guess_roles(list(stems.values()))
     found = {name: said.get(name) or guessed.get(stems[name]) for name in files}

@@ -103,7 +103,7 @@ class Material(Exports):
         said, how, share = dict(roles or {}), dict(spaces or {}), dict(weights or {})
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
-                raise InvalidInput(f"{option}: there is no map {sorted(unknown)[0]!r}; there are {', '.join(maps)}")
+                raise InvalidInput(f"{option}: must name maps ({', '.join(maps)}), got {sorted(unknown)[0]!r}")
         new = [name for name, each in maps.items() if not isinstance(each, Map)]
         guessed, why = guess_roles([str(name) for name in new])
         with collect() as self._notices:
@@ -350,7 +350,7 @@ class Material(Exports):
         """
         for name in maps:
             if name not in self:
-                raise InvalidInput(f"maps: there is no map {name!r}; there are {', '.join(self)}")
+                raise InvalidInput(f"maps: must name maps of the material ({', '.join(self)}), got {name!r}")
         changed = {name: replace(each, pixels=maps[name]) if name in maps else each for name, each in self.items()}
         return Material(changed, weights=self._weights, axes=self._axes)
 

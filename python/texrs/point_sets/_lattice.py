@@ -16,9 +16,10 @@ REGULAR = 0.12
 not continued on the lattice.
 """
 FEWEST, SHARE, STEP, STRAIGHT = 3, 0.8, 0.2, 0.06
-"""Properties of a wall: minimum number of courses, minimum share of points in courses of two or more, minimum row
-distance between two courses in spacings. The last is the maximum root mean square distance of points from their course,
-in steps between courses. Random points are 0.07 steps apart or more.
+"""Limits of a wall: number of courses, share of points in courses of two or more, row distance of courses, straightness.
+
+The first three are minima, and the distance is in spacings. The last is the maximum root mean square distance of points
+from their course, in steps between courses. Random points have 0.07 steps or more.
 """
 AREAS = (0.6, 1.6)
 """Minimum and maximum area of a lattice cell, in squared spacings. Other lattices do not describe the points."""

@@ -80,8 +80,8 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
     """Find the two lines that reflect a layout along an axis so that it continues naturally.
 
     Several positions around the outermost points are tried for each line. The best is the one where points near the
-    line have neighbours as far away as points inside. In a row of a lattice this is on a point or midway between two
-    points.
+    line have neighbours as far away as points inside. This position is on a point of a lattice row, or midway between
+    two points.
 
     Parameters
     ----------
@@ -171,9 +171,9 @@ class PointLayout:
         return cls(points, (folds[0], folds[1]), spacing(points))
 
     def within(self, low: Points, high: Points) -> tuple[Points, NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the points in a box, and what each repeats.
+        """Return the points in a box, and the point that each repeats.
 
-        This is the index of the repeated point, and the axes along which it is mirrored.
+        The latter is an index, with the axes along which the point is mirrored.
         """
         along = [self.folds[a].copies(self.points[:, a], float(low[a]), float(high[a])) for a in range(2)]
         which, up, aside = np.nonzero(along[0][2][:, :, None] & along[1][2][:, None])

@@ -6,22 +6,22 @@ to fit both neighbours.
 
 Departures, with their reasons:
 
-- A patch is cut into everything that it overlaps at once, by the minimum cut of the stitcher
-  (`texrs._engine.stitcher`), instead of one strip for each neighbour and row by row. The costs of the seams that it
-  covers are known: a patch covers them where this lowers the total cost.
+- A patch is cut at once into everything that it overlaps, by the minimum cut of the stitcher
+  (`texrs._engine.stitcher`). It is not cut in strips, one for each neighbour and row by row. The costs of existing
+  seams are known, and a patch covers them where this lowers the total cost.
 - Costs are squared differences, which keep seams away from edges that do not meet. Division by the local gradient, as
   in Kwatra et al., leads seams along strong edges, where the rest of the seams is visible.
-- A seam also costs the depth of its two pixels inside elements. With this cost the differences at seams are 1.12 times
-  the usual ones over 22 textures, and 0.8 % are beyond the 99th percentile; with plain differences in strips the
-  figures are 1.32 and 2 %. The stitcher's cost for rarely adjacent colours gives the lowest figure (0.94), but it
+- A seam also costs the depth of its two pixels inside elements. With this cost, the differences at seams are 1.12
+  times the usual ones over 22 textures, and 0.8 % are beyond the 99th percentile. With plain differences in strips,
+  the figures are 1.32 and 2 %. The stitcher's cost for rarely adjacent colours gives the lowest figure (0.94), but it
   fuses similar elements such as coins and olives.
 - On a lattice a patch also pays for pixels that do not fit, because a seam through plain background does not show that
   it is out of step.
 - A patch pays for repeating samples that other patches show, and for continuing exactly where a neighbour ends. A
   charge that multiplied the match would be zero for the exact continuation, which would always win.
 - A texture with courses is quilted along them only: its images are placed so that their joints coincide.
-- In large textures rows of patches follow each other at a distance of two patches, so that several are cut in
-  parallel. Each pays for repetitions of patches that precede all of these.
+- Several rows of patches of a large texture are cut in parallel, each row two patches behind the row above. Each patch
+  pays for repetitions of patches that precede all of these.
 - A patch that shows the mirror image of its overlap is refused. The two meet
   without a seam at the mirror axis, but the mirror is conspicuous.
 """

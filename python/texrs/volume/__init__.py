@@ -7,17 +7,17 @@ converts other voxels to cubes.
 Statistics. Each can be used alone, most of them also for images. `compare` makes a report of all:
 
 ===========================  ===============================================================
-`classes`                    the colours of a texture's materials, and their shares
-`two_point_correlation`      how materials lie along the axes
-`lineal_path_function`       how long lines within one material are
-`component_statistics`       how many pieces of a material there are, and how large
-`autocorrelation`            of values along the axes
-`frequency`                  how fine a texture is
-`orientation_errors`         whether layers lie as a field turns them
-`seam_planes` `speckle`      traces of an algorithm: its lattice, and speckle
-`slice_distances`            whether each slice has the values of the exemplar
-`coherence` `cell_reuse`     which parts of the exemplar are used, in how large pieces
-`integrity`                  whether elements are whole, apart, and of one colour
+`classes`                    colours of a texture's materials, and their shares
+`two_point_correlation`      arrangement of a material along the axes
+`lineal_path_function`       lengths of lines within one material
+`component_statistics`       number and sizes of the pieces of a material
+`autocorrelation`            autocorrelation of values along the axes
+`frequency`                  mean spectral frequency: fineness of a texture
+`orientation_errors`         angles between layers and their directions after a field
+`seam_planes` `speckle`      traces of an algorithm: its lattice, and single voxels
+`slice_distances`            difference of the values of each slice from the exemplar's
+`coherence` `cell_reuse`     parts of the exemplar that are used, and size of their copies
+`integrity`                  share of elements that are whole, separate, and of one colour
 ===========================  ===============================================================
 """
 

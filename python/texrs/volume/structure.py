@@ -126,7 +126,7 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
     ----------
     values : array_like
         Values (H, W) or (D, H, W), such as a `lightness`.
-    wrap : bool or one an axis
+    wrap : bool or one per axis
         Axes along which the last plane is followed by the first.
 
     Returns

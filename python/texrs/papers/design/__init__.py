@@ -25,7 +25,7 @@ Departures from the paper, with their reasons:
 
 - An element that the border of the exemplar cuts only slides along that border. Elements do not overlap.
 
-- In a cut, the inside of an element is a hard constraint. A context band of its surroundings is offered with it.
+- The inside of an element is a hard constraint of each cut. A context band of its surroundings is offered with it.
   Without these, the minimum cut removes an element that is wholly overlapped.
 
 - Seams between patches of the large texture cost the squared difference, plus the depth inside the elements that meet

@@ -14,7 +14,7 @@ steps are:
 Departures, with their reasons:
 
 - Patches that are cut in whole replace windows that are corrected point by point (Eq. 5 to 7), which tear elements
-  larger than a window. The number of cells that look torn falls by four fifths.
+  larger than a window. The number of cells that look torn falls by 80 %.
 - An exemplar that is a plane is flattened. Its elements then have the same size everywhere, and any of them can be
   shown at any depth. Without flattening, a ramp finds only a strip of the exemplar for each of its rows, and repeats
   it. The test for a plane uses the fit of S to a linear function (of its power 2/3 for a map of areas). It also uses
@@ -22,8 +22,9 @@ Departures, with their reasons:
   plane's slope shows this plane. Along another line elements are seen from the front. If sizes increase and decrease,
   elements are half as foreshortened.
 - Other exemplars are used in several sizes, which add samples of each scale. The scale is a cost of showing a patch at
-  a place, (log S_e - log S_o)^2, and not a channel of windows, because ratios of scales are visible. For planes it
-  counts a seventh where elements are reduced, because enlarged elements are blurred. The output's map is not changed.
+  a place, (log S_e - log S_o)^2, because ratios of scales are visible. The paper has a channel of windows instead. For
+  planes, the cost of reduced elements is a seventh of that of enlarged ones, because enlarged elements are blurred.
+  The output's map is not changed.
 - The result is a set of coordinates, so the final step is a copy and not a weighted mean. Nothing is blurred.
 - A target may be a surface: another plane, normals, texture coordinates, or Jacobians (`targets`). Patches are bent to
   it, so that elements are foreshortened like the surface. The sizes on it replace S_o.
@@ -114,7 +115,7 @@ def perspective(
         determines the foreshortening of a plane, in addition to a scale map. A ``target`` that is a surface, and
         ``direction``, need it. Ignored if ``scale_map`` is a plane, which has its own.
     direction : float, (rows, columns) array or Field, optional
-        Counter-clockwise rotation of the copied texture in degrees: one number, or one a pixel. An array of another
+        Counter-clockwise rotation of the copied texture in degrees: one number, or one per pixel. An array of another
         size is stretched. A `texrs.fields.Field` of two axes, or its words such as ``"circular"`` or
         ``"zigzag:period=64,angle=30"``, gives the rotation of the field. On a plane or another surface the texture
         rotates on it.

@@ -71,10 +71,10 @@ class Outside:
 
     def describe(self, sizes: Sequence[float]) -> str:
         """Return the text for the caller."""
-        way = "augment_scales='auto' would resize it" if len(sizes) == 1 else "nor have its resized copies"
+        way = "; augment_scales='auto' adds resized copies" if len(sizes) == 1 else ""
         return (
-            f"target: {self.share:.1%} of it asks for scales that the exemplar has not, by a factor of up to "
-            f"{self.factor:.2f}; they were brought to those that it has ({way})"
+            f"target: {self.share:.1%} of it is outside the scales of the exemplar's copies, by a factor of up to "
+            f"{self.factor:.2f}, and was limited to these scales{way}"
         )
 
 
@@ -85,8 +85,8 @@ def bring_within(scale: Floats, target: Floats, sizes: Sequence[float]) -> tuple
     beyond = (target < low / slack) | (target > high * slack)
     if beyond.all():
         raise InvalidInput(
-            f"target: asks for scales from {target.min():.3g} to {target.max():.3g} where the exemplar, in all its sizes, "
-            f"has {low:.3g} to {high:.3g}; give a target within these, or larger or smaller augment_scales"
+            f"target: must be within {low:.3g} to {high:.3g}, the scales of the exemplar's copies, got "
+            f"{target.min():.3g} to {target.max():.3g}; or give other augment_scales"
         )
     factor = max(low / float(target.min()), float(target.max()) / high, 1.0)
     share = float(beyond.mean())

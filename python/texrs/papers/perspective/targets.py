@@ -86,8 +86,8 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
     near = float(seen.width([[0, 0], [0, columns], [rows, 0], [rows, columns]]).min())
     if near < NEAREST:
         raise InvalidInput(
-            f"target: the horizon of a plane at {seen.slant:g} degrees lies inside a picture that spans {seen.fov:g} degrees; "
-            "a smaller slant or fov has none in it"
+            f"target: must not contain the horizon, but slant {seen.slant:g} with fov {seen.fov:g} degrees does; "
+            "give a smaller slant or fov"
         )
     return seen.jacobians()
 

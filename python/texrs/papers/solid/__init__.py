@@ -20,13 +20,13 @@ Departures, with their reasons:
 - Patches stitched along minimum cuts replace the pyramid of corrections. Correcting single points tears and fuses
   elements larger than a window. When the particles of `texrs.samples.particles` are wound round an axis, 29 % of them
   were torn, and none are torn now (`texrs.volume.integrity`). Cells in walls gain more.
-- The cost of a cut depends on the resulting pair, the old voxel at p next to the new one at q, and not on the
-  difference of the two textures at both.
+- The cost of a cut depends on the resulting pair: the old voxel at p next to the new one at q. It does not depend on
+  the difference of the two textures at both.
 - Patches of separate elements are rotated as a whole, and patches of textures with a direction bend with the field.
-- If the elements of an image are not reliable, as in a heap, the elements of `texrs.exemplar.segmentation` still have
-  a cost for cuts, but are not repaired. Seams inside them fall to a quarter.
-- At the most visible seams half as many patches again are tried, which need not fit the existing ones. They are used
-  if less is visible then.
+- The elements of an image may be unreliable, as in a heap. The elements of `texrs.exemplar.segmentation` then still
+  have a cost for cuts, but are not repaired. The length of seams inside them falls to a quarter.
+- More patches are tried at the most visible seams, half as many as before. They need not fit the existing patches,
+  and are used if the seams become less visible.
 - Places that were shown often and overrepresented classes of colour have a cost, because cuts are cheapest if rare
   elements are left out.
 

@@ -3,7 +3,7 @@
 Section 3 of Su, Chang, Shih and Tai, with its misprints corrected:
 
 - Eq. 1 has a row vector, Delta A, and Eq. 3 a column vector, A^-1 Delta. For a rotation these turn in opposite
-  directions. Both are columns here: J Delta in Eq. 1 and F Delta in Eq. 3, where F is the frame of the field and J,
+  directions. Both are columns here, J Delta in Eq. 1 and F Delta in Eq. 3. F is the frame of the field and J,
   the paper's A, its inverse.
 - H: Z^2 -> [-1, +1]^2 of Eq. 2 is H: Z^3 -> [-1, +1]^3, and has two axes in an image.
 - The paper searches similar voxels within the n^3 neighbourhood of p, and forbids all of them. Here the whole exemplar

@@ -20,7 +20,7 @@ _ORDER = {2: "[y0:y1, x0:x1]", 3: "[z0:z1, y0:y1, x0:x1]"}
 
 
 def as_origin(origin: object, axes: int) -> tuple[int, ...]:
-    """Check the first voxel of a window: one number, or one an axis."""
+    """Check the first voxel of a window: one number, or one per axis."""
     values = [origin] * axes if isinstance(origin, numbers.Integral) else origin
     if isinstance(values, Sequence | np.ndarray) and getattr(values, "ndim", 1) > 0 and len(values) == axes:
         ends = [_as_end(v) for v in values]

@@ -164,9 +164,9 @@ class Texture(Endless):
 
         Parameters
         ----------
-        origin : int, or one an axis
+        origin : int, or one per axis
             First voxel in the world, any integers within 10^9.
-        size : int, or one an axis
+        size : int, or one per axis
             Number of voxels along each axis.
         progress : callable or True, optional
             Called with the stage and its completed share. An exception that it raises stops the work. True shows a
@@ -296,9 +296,9 @@ class Texture(Endless):
         Parameters
         ----------
         points : (..., 2) or (..., 3) array_like
-            As for `sample`.
+            Points, as for `sample`.
         interpolation : {"nearest", "linear", "cubic"}, optional
-            As for `sample`. Labels are never interpolated.
+            Interpolation, as for `sample`. Labels are never interpolated.
         progress : callable or True, optional
             Called with the stage and its completed share. An exception that it raises stops the work. True shows a
             bar.
@@ -334,7 +334,7 @@ class Texture(Endless):
         Parameters
         ----------
         points : (..., 2) or (..., 3) array_like
-            As for `sample`.
+            Points, as for `sample`.
         progress : callable or True, optional
             Called with the stage and its completed share. An exception that it raises stops the work. True shows a
             bar.
@@ -370,7 +370,7 @@ class Texture(Endless):
 
         Parameters
         ----------
-        size : int, or one an axis
+        size : int, or one per axis
             Size of a window or a chunk.
 
         Returns

@@ -5,9 +5,10 @@ chain of stages: the blocks, then one pass of the correction after the other, ea
 of a stage is computed from a box of the stage before. The latter is larger by the distance that one point depends on,
 its reach:
 
-    blocks      2 e + rounds (2 e + 1), where e is the farthest that a point lies from the centre of its cell pass
-    vote + max(n, w), where n is how far the neighbours are that propose, and w = max_i [ r sum_j |F_ij| + 1/2 ]
-                how far a window of radius r looks along an axis of the output, over all frames F in sight
+    blocks      2 e + rounds (2 e + 1), where e is the maximum distance of a point from the centre of its cell
+    pass        vote + max(n, w), where n is the distance of the neighbours whose matches are tried,
+                and w = max_i [ r sum_j |F_ij| + 1/2 ] is the extent of a window of radius r along an axis
+                of the output, over all frames F in the region
 
 Coordinates within the reach of a box's border are wrong and are cut off. The others are the same in every box.
 Finished parts of every stage are kept in a bounded memory, so that neighbours of computed parts are cheap.
