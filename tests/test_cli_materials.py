@@ -264,7 +264,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("tile uneven -o new", "uneven: all must have one size; height has"),
         ("design rock -o links", "is read as rock/rock_albedo.png, and would be lost"),
         ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is read"),
-        ("design empty -o new", "empty: no picture has a name that says what it is for"),
+        ("design empty -o new", "empty: no image has a name that gives its role"),
     ],
 )
 def test_nothing_is_lost_and_nothing_half_written(

@@ -228,7 +228,7 @@ def test_bad_materials_are_refused() -> None:
     picture = STONES["albedo"].pixels
     for maps, options, words in (
         ({}, {}, "maps: needs a mapping"),
-        ({"thing": picture}, {}, "thing: the name does not say"),
+        ({"thing": picture}, {}, "thing: the name does not give the role"),
         ({"albedo": picture, "height": picture[:-1, :, 0]}, {}, "maps: all must have one size; height has"),
         ({"normal": picture[..., 0]}, {}, "normal: a map of role normal must have 2, 3 or 4 channels, got 1"),
         ({"albedo": picture}, {"roles": {"albedo": "shiny"}}, "allowed roles are"),

@@ -128,7 +128,7 @@ def test_paraview_files_hold_the_volume(tmp_path, dtype, channels):
     whole = (tmp_path / "a.vti").read_bytes()
     for bent, words in (
         (whole[:-60], "is cut off"),
-        (whole.replace(b"base64", b"raw", 1), "says that its samples have"),
+        (whole.replace(b"base64", b"raw", 1), "states that its samples have"),
         (whole.replace(b'WholeExtent="0 ', b'WholeExtent="0 9', 1), "cut off|of another length"),
         (whole[:40], "reading failed"),
     ):

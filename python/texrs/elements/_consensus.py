@@ -83,6 +83,7 @@ def extend_mask(
         return None
     usual_ground = np.median(ground, axis=0)
     noise = 1.5 * float(np.median(np.sqrt(((ground - usual_ground) ** 2).sum(axis=1))))
+    # Alternate: find the common surroundings, then align the elements with them.
     places, usual = np.rint(points), 0.0
     for turn in range(PASSES):
         # If there are many elements, a part of them is enough to find the common colours.
@@ -103,6 +104,7 @@ def extend_mask(
         one = piece
         reach, wanted = away[one], typical[one]
         places = _align(colours, wanted, places, reach, half // 2, wrap)
+    # Put the common shape at each element.
     grown = mask.copy() if sure else np.zeros(mask.shape, bool)
     stamp(grown, places, one, wrap)
     apart = np.sqrt(((colours - usual_ground) ** 2).sum(axis=-1)) > 0.5 * float(np.median(unlike[one]))

@@ -455,6 +455,7 @@ def load(path: Path) -> ElementAnalysis:
             raise FileError(f"{path}: not an analysis of a texture's elements")
         return choose_parts(headers, path)
 
+    # Check the headers first, so that a file of another kind is not read.
     parts = read_arrays(path, choose=choose)
     version = parts[MARK].ravel().tolist()
     if version != [FORMAT]:
@@ -463,6 +464,7 @@ def load(path: Path) -> ElementAnalysis:
             "analyse the texture again"
         )
     try:
+        # Check every part, because a damaged file would fail much later, in a splice.
         image = as_image(parts["image"])
         if _decode_text(parts["hash"]) != hash_image(image):
             raise InvalidInput("its image differs from the analysed image")
@@ -478,6 +480,7 @@ def load(path: Path) -> ElementAnalysis:
                 raise InvalidInput(f"{name} of shape {parts[name].shape}")
         if parts["mask"].dtype != np.bool_ or not np.isfinite(parts["points"]).all():
             raise InvalidInput("mask or points")
+        # The similarity sets are stored only if they were computed.
         sets = None
         if "sets" in parts:
             sets = Similarity(parts["sets"].astype(np.uint32), int(parts["numbers"].ravel()[0]))
@@ -485,6 +488,7 @@ def load(path: Path) -> ElementAnalysis:
                 raise InvalidInput("similarity sets")
         known = parts["known"].astype(np.int32) if "known" in parts else None
         if known is not None:
+            # Labels must be 1, 2, ... without gaps, at least one per point.
             names = np.unique(known[known != 0])
             if len(names) < count or not np.array_equal(names, np.arange(1, len(names) + 1)):
                 raise InvalidInput("known elements")

@@ -47,6 +47,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
     drawn, report = draw(entry), entry.report
     height, width = entry.image.shape[:2]
     rows = []
+    # Proposed values have a confidence. Doubtful ones are marked.
     for name in ("box", "layout", "background"):
         sure = report.get("confidence", {}).get(name)
         said = "given" if sure is None else f"proposed, {sure:.0%} sure"
@@ -54,6 +55,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
         value = {"layout": str(entry.layout), "box": f"{entry.box[0]} x {entry.box[1]}"}.get(name, "")
         rows.append(f"<tr{' class=doubt' if advice else ''}><th>{name}<td>{escape(value)}<td>{said}{advice}")
     doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("warnings", []))
+    # Data for the script of the page, from which it makes the list of corrections.
     known = {
         "points": entry.points.round(2).tolist(),
         "box": list(entry.box),

@@ -108,11 +108,13 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
         return Start(box, layout, background, [], {})
     missing = (("box", box is None), ("background", blind), ("layout", layout is None))
     sure: dict[str, float] = {}
+    # Without a box, place it at given points, or choose it in a small image.
     if box is None:
         if points is not None and len(points) > 2:
             box, sure["box"] = _place_box(points, size), 0.5
         else:
             box, sure["box"] = _choose_box(guide, wrap, progress)
+    # The background and the layout depend on the places of the elements, so search these first.
     if points is None:
         rest = partial(_report_part, progress, 0.8, 0.9)
         points = search_similar(guide, box.centre, box.size, wrap=wrap, progress=rest).points
@@ -149,6 +151,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
     step = max(1, -(-max(guide.shape[:2]) // SMALL))
     small = downscale(guide, step)
     with answering(progress, 0.0):
+        # Search in a small image, because every box needs a search of its own.
         boxes = propose_boxes(small)
     if not boxes:
         raise InvalidInput("box: no box could be proposed for this image; give a box or the points")
@@ -170,13 +173,16 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
             best = (value, box)
         return value
 
+    # Try all proposed boxes first.
     for number, box in enumerate(boxes):
         attempt(box)
         reached = 0.5 * (number + 1) / len(boxes)
+    # Centre the best boxes on the elements that they found.
     for _, box, found in sorted(tried, key=lambda t: -t[0])[:AGAIN]:
         moved = _recentre(light, found, box)
         if moved is not None:
             attempt(moved)
+    # Resize the best boxes step by step, as long as their score rises.
     for number, (value, box, _) in enumerate(sorted(tried, key=lambda t: -t[0])[:GROWN]):
         for _ in range(STEPS):
             better = [(attempt(b), b) for b in resize_box(box, small.shape[:2])]
@@ -187,6 +193,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
         reached = 0.5 + 0.3 * (number + 1) / GROWN
     assert best is not None
     sure = _measure_confidence(light, best[1], next(f for _, b, f in tried if b == best[1]))
+    # Convert the best box to pixels of the full image, and move it inside.
     row, column = (float(c * step + (step - 1) / 2) for c in best[1].centre)
     height, width = (float(s * step) for s in best[1].size)
     whole = (guide.shape[0], guide.shape[1])

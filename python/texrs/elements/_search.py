@@ -198,14 +198,17 @@ def search_similar(
         features, patches = describe_appearance(
             colours, wrap, [extract_template(colours, centre, t, wrap) for t in turned]
         )
+    # Pad the features, so that elements at the border can be found.
     margin = tuple(max(t.box[axis] for t in templates) // 2 for axis in range(2))
     around = pad(features, (margin[0], margin[1]), wrap)
+    # Weight each channel by its variance, so that channels without content do not count.
     variance = features.reshape(-1, CHANNELS).var(axis=0, dtype=np.float64)
     weights = (variance / max(float(variance.sum()), 1e-12)).astype(np.float32)
     correlation = Correlation(around)
     best: Floats | None = None
     which = np.zeros(colours.shape[:2], np.intp)
     chosen: int | None = None
+    # Keep the best template at each pixel.
     for i, template in enumerate(templates):
         half = [n // 2 for n in template.box]
         if template in turned:
@@ -232,6 +235,7 @@ def search_similar(
         if progress is not None:
             progress((i + 1) / len(templates))
     assert best is not None
+    # Elements are at the maxima of the similarity.
     pixels = suppress_non_maxima(best, [t.inner for t in templates], which, wrap)
     scores = best[tuple(pixels.T)].astype(np.float64)
     least = -1.0

@@ -116,6 +116,7 @@ def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *
     flat, height = parts.ravel(), relief.ravel()
     both = (flat[a] > 0) & (flat[b] > 0)
     a, b = a[both], b[both]
+    # Sum the relief along the border of each pair of labels.
     low, high = np.minimum(flat[a], flat[b]).astype(np.int64), np.maximum(flat[a], flat[b])
     keys, where = np.unique(low << 32 | high, return_inverse=True)
     sums, lengths = np.bincount(where, np.maximum(height[a], height[b])), np.bincount(where)
@@ -138,12 +139,14 @@ def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *
             break
         join(p, q, borders[p][q][1])
         into[q] = p
+        # Add the borders of the joined label to those of the label that remains.
         for r, (total, length) in borders.pop(q).items():
             del borders[r][q]
             scores.pop((min(q, r), max(q, r)))
             if r != p:
                 before = borders[p].get(r, (0.0, 0))
                 borders[p][r] = borders[r][p] = (before[0] + total, before[1] + length)
+        # The new label needs new scores against its neighbours.
         near = sorted(borders[p])
         if near:
             totals, counts = np.array([borders[p][r] for r in near]).T

@@ -116,6 +116,7 @@ def stitch_sheet(
     patch = float(max(min(wanted, FITS * min(sheet.free.shape), MOST), LEAST))
     frames = sheet.frames(target, region.wrap) if frames is None else frames
     weight = np.array([round(UNIT * sheet.weight)], np.uint16)
+    # Request the scales as a guide, which weighs them against the visibility of seams.
     made = stitcher.stitch(
         region,
         frames,

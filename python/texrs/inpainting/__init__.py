@@ -191,6 +191,7 @@ def inpaint(
     """
     progress = listen(progress)
     as_method(method, "patch", "optimise")
+    # Options without a meaning in volumes are errors, not ignored.
     if is_volume(image, mask):
         flat = {
             "exemplar": exemplar is not None,
@@ -240,6 +241,7 @@ def inpaint(
 
     check_work("inpaint", pictures, shapes[0], "image", method=method)
     watch("inpaint", 0.0)
+    # Measure scale maps after all cheap checks of the arguments.
     scales, measured = _recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)

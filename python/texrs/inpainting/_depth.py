@@ -83,6 +83,7 @@ def fill_in_depth(
     if not whole.any():
         return None
     asked = plane.scales(np.argwhere(wide)).astype(np.float32)
+    # Flatten the plane, so that patches of any depth can be shown at the hole.
     sheet = Flattened.of(guidance(as_image(paint_over(picture, open_))), plane, asked, whole)
     if not sheet.free.any():
         return None
@@ -90,6 +91,7 @@ def fill_in_depth(
         if far is not None and sheet.elements is not None:
             wide = far
     own = SIDE * sheet.side(asked) if side is None else side * sheet.steps_at(float(np.median(asked)))
+    # Stitch only the surroundings of the hole, at the scales of the plane.
     region = look_around(wide, ceil(AROUND * own * float(asked.max()) / sheet.resolution), 1, wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
     grid = np.moveaxis(np.mgrid[part], 0, -1).astype(np.float32)
@@ -109,6 +111,7 @@ def fill_in_depth(
     identity = SourceMap.identity(open_.shape)
     frames = np.broadcast_to(np.eye(2, dtype=np.float32), (*open_.shape, 2, 2)).copy()
     label = np.zeros(open_.shape, np.uint32)
+    # Use only pixels of patches. Given pixels keep their own coordinates.
     new = found.patches < len(found.stitched.frames)
     number, count = np.unique(found.patches[new], return_inverse=True)
     identity.coordinates[part][new] = found.coordinates[new]

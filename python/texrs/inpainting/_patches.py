@@ -128,11 +128,13 @@ def try_sides(
 ) -> tuple[int, list[tuple[int, float]], Filled | None]:
     """Return the best side, all that were tried with what their seams show, and the filling if it was made at full size."""
     small, times = scene, 1
+    # Try sides in a reduced image if the holes are large, as long as it has enough places for patches.
     while small.holes > LARGE and min(*small.known.shape, *small.free.shape) >= SMALLEST:
         half = small.halve()
         if np.count_nonzero(mark_corners(half.free, 2 * LEAST)) < PLACES:
             break
         small, times = half, 2 * times
+    # List the sides to try, largest first. A reduced image also gets smaller sides, usual ones of the full image.
     usual = choose_usual_side(min(scene.free.shape))
     sides = list_sides(small, choose_usual_side(min(small.free.shape)), SIZES)
     if times > 1:
@@ -145,6 +147,7 @@ def try_sides(
 
     best, made = 0, None
     wanted = sorted({min(number, len(sides) - 1) for number in STARTS})
+    # Try a few sides, then the neighbours of the best one, until neither is better.
     while wanted and 0 not in shown.values():
         for number in wanted:
             found = fill(number)
@@ -158,6 +161,7 @@ def try_sides(
     chosen = times * sides[best]
     if times == 1:
         return chosen, tried, made
+    # A side that fitted the reduced image may be too large in the full one.
     while not mark_corners(scene.free, chosen).any():
         chosen -= 1
     return chosen, tried, None

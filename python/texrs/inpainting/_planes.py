@@ -195,6 +195,7 @@ def fill_parts(
     """
     everywhere = np.ones_like(hole)
     seen = [p.shown if p.large is None else p.large for p in parts]
+    # Divide the holes between the parts, up to the lines where the parts meet.
     owner = share_out(hole, seen, [everywhere if p.reach is None else p.reach for p in parts])
     shades = np.zeros(hole.shape, np.uint8)
     belongs = owner.copy()
@@ -203,6 +204,7 @@ def fill_parts(
         if part.large is None:
             shades[part.shown] = 255 - 40 * min(number, 5)
     belongs[belongs < 0] = len(parts) - 1
+    # Compare patches in even light, so that they can be copied from a darker place.
     known = even_light(pixels, hole, [(belongs == n) & ~hole for n in range(len(parts))] if light else [])
     identity = SourceMap.identity(hole.shape)
     coordinates, label = identity.coordinates, identity.label

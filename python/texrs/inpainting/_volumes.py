@@ -95,6 +95,7 @@ def inpaint_volume(
     labelled, tried = False, list[list[float]]()
     composite = result = volume.copy()
     if hole_.any():
+        # Work on the part of the volume around the hole.
         painted = paint_over(volume, hole_)
         part = choose_part(hole_)
         with answering(progress, "exemplar", 0.0):
@@ -105,6 +106,7 @@ def inpaint_volume(
         if weight and labelled:
             raise InvalidInput("screening: labels cannot be mixed; leave it out, or pass 0")
         best: Filled | None = None
+        # Try smaller patches only while the border of the hole is visible.
         for each in [side] if side else list_sides(choose_side(wide, known.shape), labels=labelled):
             made = fill_part(volume[part], known, hole_[part], wide[part], each, number, weight, watch, progress)
             tried.append([each, round(made.step, 3)])
@@ -114,12 +116,14 @@ def inpaint_volume(
         assert best is not None
         side, count, seams = best.side, best.count, best.seams
         corner = np.array([s.start for s in part], np.float32)
+        # Insert the part, whose coordinates are relative to its first voxel.
         new = best.label > 0
         source.coordinates[part][new] = best.places[new] + corner
         source.label[part][new] = best.label[new]
         composite, result = volume.copy(), volume.copy()
         composite[part], result[part] = best.composite, best.image
     watch("done", 1.0)
+    # Draw the stages: each patch has a shade, and the hole is empty.
     shades = np.zeros(shape, np.uint8)
     new_ = source.label > 0
     shades[new_] = 55 + source.label[new_] * 67 % 200
@@ -285,6 +289,7 @@ def stitch(
     here = hole[part]
     region = Region.whole(here.shape, (False,) * 3)
     own = np.stack(np.meshgrid(*(np.arange(s.start, s.stop) for s in part), indexing="ij"), axis=-1)
+    # Voxels of the hole must not be copied: the guide gives them a high cost.
     forbidden = np.zeros((hole.size, 4), np.int16)
     forbidden[hole.reshape(-1), 0] = CODE
     asked = np.zeros(4 * region.points, np.int16)
@@ -308,6 +313,7 @@ def stitch(
         demand=Demand(forbidden.reshape(-1), asked, np.full(region.points, 2**16 - 1, np.uint16)),
         progress=stage(progress, "patches"),
     )
+    # Insert the part into the volume. Other voxels are copied from themselves.
     places = np.stack(np.meshgrid(*(np.arange(n) for n in hole.shape), indexing="ij"), axis=-1)
     label = np.zeros(hole.shape, np.uint32)
     found = np.rint(made.places.reshape(*region.shape, 3) / ONE).astype(np.intp)

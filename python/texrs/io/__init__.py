@@ -517,10 +517,12 @@ def _write(
     if spacing is None and like is not None and holds_spacing(array, suffix):
         spacing = read_spacing(like)
     steps = as_spacing(spacing, suffix)
+    # Stores are folders, which another function writes whole or not at all.
     if suffix == STORE:
         _zarr.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
         return
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
+        # Image formats have no bool, so write 0 and 255.
         if array.dtype == np.bool_ and suffix not in (".npy", ".npz"):
             array = array.astype(np.uint8) * np.uint8(255)
         flat = array[..., 0] if array.ndim > axes and array.shape[-1] == 1 else array
@@ -532,6 +534,7 @@ def _write(
             case ".tif" | ".tiff":
                 channels = flat.shape[axes] if flat.ndim > axes else 1
                 planes = flat.reshape(-1, *flat.shape[axes - 2 : axes], channels)
+                # Only ImageJ's form of TIFF stores a spacing.
                 if spacing is None:
                     _tiff.write_tiff(temporary, planes, channels, planes.nbytes, description, tags)
                 elif _tiff.keeps_spacing(planes.dtype, channels):

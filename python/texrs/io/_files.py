@@ -157,6 +157,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
     target = as_path(path)
     try:
         final = Path(os.path.realpath(target))
+        # Check the target first, so that nothing is computed for a file that cannot be written.
         if final.is_dir():
             raise FileError(f"{target}: is a folder, the name of a file is needed")
         exists = os.path.lexists(final)
@@ -175,6 +176,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
     temporary = name_temporary(final, find_suffix(final))
     try:
         yield temporary
+        # Keep the permissions of the existing file. If it appeared in the meantime, do not replace it.
         if exists:
             shutil.copymode(final, temporary)
         elif not overwrite and os.path.lexists(final):

@@ -182,9 +182,11 @@ def check(value: object, suffix: str, axes: int) -> Array:
     check_memory(array.size * array.itemsize, "array")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
     form, volume = _NUMPY if suffix == STORE else FORMATS[suffix], axes == 3
+    # An opaque alpha channel can be left out without loss.
     array = _drop_alpha(array, form, axes, suffix)
     channels = array.shape[axes] if array.ndim > axes else 1
     if not form.holds(array.dtype, channels, volume):
+        # Name formats that can hold the array, image formats first.
         common = sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))
         able = [s for s in common if FORMATS[s].holds(array.dtype, channels, volume)]
         what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
@@ -192,6 +194,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
         raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")
     if max(array.shape[:axes]) > form.longest:
         raise InvalidInput(f"array: a side of {suffix} may have {form.longest} pixels, got shape {array.shape}")
+    # These formats also limit the values.
     if suffix == ".gif":
         colours = np.unique(array.reshape(-1, channels), axis=0)
         if len(colours) > 256:

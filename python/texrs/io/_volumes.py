@@ -61,6 +61,7 @@ def read_nrrd(path: Path, limit: int) -> Array:
     """Read an NRRD volume whose samples are in the file or in another file of its folder, raw or compressed by gzip."""
     with _open(path) as (file, length):
         header, end = _read_nrrd_header(path, file, length)
+        # Read one file of samples in the same folder only, because a header must not name any file of the machine.
         beside = header.get("data file", header.get("datafile"))
         if beside is not None and (
             not isinstance(beside, str) or beside in ("", ".", "..") or re.search(r"[/\\%\s]|^LIST$", beside)
@@ -77,6 +78,7 @@ def read_nrrd(path: Path, limit: int) -> Array:
         dtype = np.dtype(_NRRD_TYPES[kind])
         if header.get("endian", "little") == "big":
             dtype = dtype.newbyteorder(">")
+        # NRRD lists the fastest axis first. The channels can be any axis.
         sizes = [int(n) for n in np.atleast_1d(header["sizes"])]
         kinds = [str(kind).lower() for kind in header.get("kinds", [])]
         channel = _find_channel(path, sizes, kinds)
@@ -201,6 +203,7 @@ def read_nifti(path: Path, limit: int) -> Array:
         colours = len(fields) if fields and all(dtype[n] == np.uint8 for n in fields) else 0
         if not colours and (dtype.kind not in "uif" or dtype.itemsize > 8):
             raise FileError(f"{path}: holds samples of {dtype}; integers, floats and RGB are read")
+        # Missing axes have length 1. Axes after the third one are channels.
         count = int(header["dim"][0])
         sizes = [int(n) for n in header["dim"][1 : 1 + max(0, min(count, 7))]]
         sizes += [1] * (3 - len(sizes))
@@ -211,11 +214,12 @@ def read_nifti(path: Path, limit: int) -> Array:
         channels = several[0] if several else 1
         offset = float(header["vox_offset"])
         if not need <= offset <= (length or _LONGEST_HEADER) or offset != int(offset):
-            raise FileError(f"{path}: says that its samples start at byte {offset:g}")
+            raise FileError(f"{path}: states that its samples start at byte {offset:g}")
         check_size(path, tuple(sizes[2::-1]), max(channels, colours), dtype.itemsize // (colours or 1), limit)
         file.seek(int(offset))
         whole = prod(sizes)
         flat = _read_samples(path, file, length and length - int(offset), whole, dtype, compressed=False)
+        # Samples with a scale factor become floats, as other programs read them.
         slope, intercept = header.get_slope_inter() if not colours else (None, None)
     if colours:
         volume = flat.view(np.uint8).reshape(*sizes[2::-1], colours)

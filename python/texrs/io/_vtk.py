@@ -49,6 +49,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         pieces = root.findall("ImageData/Piece")
         if root.tag != "VTKFile" or len(pieces) != 1:
             raise FileError(f"{path}: is not image data of one piece")
+        # The extent counts points. Cells are one fewer along each axis.
         low, high = (np.array(pieces[0].get("Extent", "").split(), int)[a::2] for a in (0, 1))
         groups = {kind: pieces[0].find(kind) for kind in ("PointData", "CellData")}
         kind, group = next(((k, g) for k, g in groups.items() if g is not None and len(g)), ("", None))
@@ -67,6 +68,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         size = dtype.itemsize * channels * check_size(path, tuple(sides), channels, dtype.itemsize, limit)
         header = np.dtype(end + ("u8" if root.get("header_type") == "UInt64" else "u4"))
         data = memoryview((chosen.text or "").strip().encode())
+        # Samples are text, or base64 in place, or appended at the end of the file.
         form, encoded = chosen.get("format", "ascii"), True
         if form == "appended":
             mark = content.find(b"_", content.find(b">", start)) + 1
@@ -111,11 +113,11 @@ def _unpack(
         there = _decode(data, one + size) if encoded else data
         length = int(np.frombuffer(there, header, count=1)[0])
         if length != size:
-            raise FileError(f"{path}: says that its samples have {length} bytes; its extent needs {size}")
+            raise FileError(f"{path}: states that its samples have {length} bytes; its extent needs {size}")
         return memoryview(there)[one:]
     blocks = int(np.frombuffer(_decode(data, one) if encoded else data, header, count=1)[0])
     if not 0 < blocks <= size:
-        raise FileError(f"{path}: says that its samples are in {blocks} blocks")
+        raise FileError(f"{path}: states that its samples are in {blocks} blocks")
     whole = (3 + blocks) * one
     lengths = np.frombuffer(_decode(data, whole) if encoded else data, header, count=3 + blocks)[3:].tolist()
     # The lengths are a separate text.

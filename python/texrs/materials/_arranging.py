@@ -57,6 +57,7 @@ def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]
         if one is not None:
             made[stem] = replace(one, file=stem)
             covered |= words
+    # Maps whose quantities are in no file of the convention stay under their own names.
     for title, each in maps.items():
         lost = _find_words(each.role) - built
         if find_map(maps, each.role) is not each:

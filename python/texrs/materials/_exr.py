@@ -141,6 +141,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
     known = parse(words, channels)
     full_names = {id(pixels): full for full, pixels in channels.items()}
     layers: dict[str, dict[str, Array]] = {}
+    # A file of texrs lists its maps in the header. Other files are divided by the names of channels.
     if known:
         layers = {
             name: {str(k): channels[full] for k, full in enumerate(told["names"])} for name, told in known.items()
@@ -154,6 +155,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
             layers.setdefault(title or PICTURE, {})[letter] = pixels
         layers = {name: part for layer, letters in layers.items() for name, part in split_layer(layer, letters).items()}
         layers = dict(zip(shorten(list(layers)), layers.values(), strict=True))
+    # Roles that the caller states come first, then roles of the header, then roles of names.
     said = {name: as_role(role, f"roles[{name!r}]") for name, role in roles.items()}
     if unknown := said.keys() - layers.keys():
         raise InvalidInput(f"roles: must name layers of {path} ({', '.join(layers)}), got {sorted(unknown)[0]!r}")
@@ -180,9 +182,10 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
         if role.coloured and has_alpha(stored):
             stored = divide(stored, f"{path}: {name}")
         maps[name] = Map(stored if stored.shape[-1] > 1 else stored[..., 0], role, "linear", layer=layer)
+    # Report the layers that are not used, and the assumptions about the others.
     lines = [f"{show_names(names)} not used: {why}" for why, names in left.items()]
     if not maps:
-        raise FileError(f"{path}: no layer has a name that says what it is for; say it by roles ({'; '.join(lines)})")
+        raise FileError(f"{path}: no layer has a name that gives its role; give roles ({'; '.join(lines)})")
     for line in lines:
         ignore(f"{path}: {line}")
     if any(each.role.coloured for each in maps.values()):

@@ -62,6 +62,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
         if not chosen:
             raise InvalidInput(f"roles: must name images in {path} ({', '.join(files) or 'none'}), got {name!r}")
         said |= dict.fromkeys(chosen, as_role(role, f"roles[{name!r}]"))
+    # Guess the roles that the caller does not state.
     guessed, why = guess_roles(list(stems.values()))
     found = {name: said.get(name) or guessed.get(stems[name]) for name in files}
     taken = {name: role for name, role in found.items() if role is not None}
@@ -70,13 +71,14 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
         left["the name gives no role"] = unknown
         lines = "; ".join(describe_unused(left))
         raise FileError(
-            f"{path}: no picture has a name that says what it is for, such as albedo.png; say it by roles"
+            f"{path}: no image has a name that gives its role, such as albedo.png; give roles"
             f"{f' ({lines})' if lines else ''}"
         )
     if len(taken) > MOST:
         raise FileError(f"{path}: has {len(taken)} maps, up to {MOST} are allowed")
     maps = {name: read_map(files[name], role, axes) for name, role in taken.items()}
     shape = next(iter(maps.values())).pixels.shape[:axes]
+    # A file without a role in its name can still contain labels, by its values.
     labels = {name: pixels for name in unknown if (pixels := read_labels(files[name], shape)) is not None}
     left["the name gives no role"] = [name for name in unknown if name not in labels]
     for line in describe_unused(left):
@@ -84,6 +86,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
     if labels:
         assume(f"{path}: {show_names(list(labels))} read as {REASON}")
     maps |= {name: Map(pixels, Role.LABELS, "linear") for name, pixels in labels.items()}
+    # The names of the maps are the file names without their common beginning.
     short = shorten([stems[name] for name in maps])
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)

@@ -127,6 +127,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
     colour, opacity = find_map(maps, Role.COLOUR), find_opacity(maps)
     see_through = opacity is not None and bool((opacity < 1).any())
     shape = next(iter(maps.values())).pixels.shape[:2]
+    # Opacity is the alpha of the base colours. If all values are 0 or 1, viewers need not blend.
     if colour is not None or see_through:
         shown = to_depth(encode_srgb(take_colour(colour, shape)), depth)
         if see_through and opacity is not None:
@@ -137,6 +138,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
         rough["baseColorTexture"] = add("basecolor", shown)
     else:
         rough["baseColorFactor"] = [GREY, GREY, GREY, 1.0]
+    # Occlusion, roughness and metallic share one image, as red, green and blue.
     packed = find_map(maps, Role.ORM) is not None
     open_ = packed or find_map(maps, Role.OCCLUSION) is not None
     surface = packed or find_map(maps, Role.ROUGHNESS, Role.METALLIC) is not None
@@ -148,6 +150,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
             rough |= {"metallicRoughnessTexture": texture, "metallicFactor": 1.0, "roughnessFactor": 1.0}
         if open_:
             material["occlusionTexture"] = texture
+    # Heights give normals if there are no normals.
     slopes = measure_slopes(maps, (True, True))
     if slopes is not None or find_map(maps, Role.NORMAL, Role.NORMAL_DX) is not None:
         normals = take_normals(maps, list_signed(maps), slopes, shape)
@@ -155,6 +158,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
     emission = find_map(maps, Role.EMISSION)
     if emission is not None:
         light = take_colour(emission, shape)
+        # Images hold values up to 1, so store brighter light with a factor.
         strength = max(1.0, float(light.max()))
         material["emissiveTexture"] = add("emission", to_depth(encode_srgb(light / np.float32(strength)), depth))
         material["emissiveFactor"] = [1.0, 1.0, 1.0]
@@ -189,6 +193,7 @@ def lay_out(
     extensions = sorted({name for material in materials for name in material.get("extensions", ())})
     if extensions:
         document["extensionsUsed"] = extensions
+    # Append every array to one buffer, and describe it by an accessor.
     data = b""
     for number, (shape, mesh) in enumerate(shapes):
         numbers: dict[str, int] = {}

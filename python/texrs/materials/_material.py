@@ -104,6 +104,7 @@ class Material(Exports):
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
                 raise InvalidInput(f"{option}: must name maps ({', '.join(maps)}), got {sorted(unknown)[0]!r}")
+        # The names of arrays give their roles. Maps have a role already.
         new = [name for name, each in maps.items() if not isinstance(each, Map)]
         guessed, why = guess_roles([str(name) for name in new])
         with collect() as self._notices:
@@ -139,7 +140,7 @@ class Material(Exports):
             assume(f"{name}: read as {REASON}")
         if chosen is None:
             raise InvalidInput(
-                f"{name}: the name does not say what the map is for; say it by roles, as {name!r}: 'other'"
+                f"{name}: the name does not give the role of the map; give roles, such as {name!r}: 'other'"
             )
         allowed = CHANNELS.get(chosen)
         if allowed is not None and image.shape[-1] not in allowed:

@@ -163,6 +163,7 @@ def compose(
         outputs.append(ElementTree.Element("output", name=f"{key}_out", type=type_, nodename=source))
         taken.attrib |= {"nodegraph": graph.attrib["name"], "output": f"{key}_out"}
 
+    # Colours: opacity is a map, or the fourth channel of the colours.
     opacity = image(Role.OPACITY, "opacity_image", "float") if Role.OPACITY in files else None
     feed("base", "float", None, "1.0")
     if Role.COLOUR not in files:
@@ -177,6 +178,7 @@ def compose(
             opacity = node("extract", "opacity_channel", "float", **{"in": (">color4", both), "index": index})
     if opacity is not None:
         feed("opacity", "color3", node("convert", "opacity", "color3", **{"in": (">float", opacity)}))
+    # Roughness and metallic are maps, channels of a packed map, or constants.
     packed = image(Role.ORM, "orm_image", "vector3") if Role.ORM in files else None
     for role, key, channel, usual in (
         (Role.ROUGHNESS, "specular_roughness", 1, ROUGH),
@@ -196,10 +198,12 @@ def compose(
         if kind == "color4":
             light = node("convert", "emission", "color3", **{"in": (">color4", light)})
         feed("emission_color", "color3", light)
+    # Normals were converted to y up before.
     normal = next((role for role in (Role.NORMAL, Role.NORMAL_DX) if role in files), None)
     if normal is not None:
         bent = image(normal, "normal_image", "vector3")
         feed("normal", "vector3", node("normalmap", "normal", "vector3", **{"in": (">vector3", bent)}))
+    # The material refers to the surface, and to the displacement if heights are shown.
     root.append(surface)
     material = ElementTree.Element("surfacematerial", name=name if name[:1].isalpha() else f"M_{name}", type="material")
     reference = {"name": "surfaceshader", "type": "surfaceshader", "nodename": f"SR_{name}"}
@@ -214,6 +218,7 @@ def compose(
         reference = {"name": "displacementshader", "type": "displacementshader", "nodename": f"DP_{name}"}
         ElementTree.SubElement(material, "input", reference)
     root.append(material)
+    # A graph lists its outputs last. An empty graph is not allowed.
     graph.extend(outputs)
     if not len(graph):
         root.remove(graph)

@@ -182,8 +182,10 @@ def tile(
     check_work("tile", [pixels], wanted, "image" if size is None else "size", way=LARGER)
     evened = None if flatten_lighting is None else as_bool(flatten_lighting, "flatten_lighting")
     with collect() as notices:
+        # An axis that tiles already stays as it is, unless it gets another size.
         free = [cyclic[a] and overlap is None and wanted == (rows, columns) for a in range(2)]
         already = [] if evened else find_tiled(given, free)
+        # Uneven light shows as a step at the border, so it is evened out if nothing forbids it.
         if evened is None:
             evened = len(already) < sum(cyclic) and not _keeps_colours(image, weight) and is_uneven(given)
         if evened:
@@ -205,6 +207,7 @@ def tile(
             progress=listen(progress),
         )
         made = join()
+        # If the border is visible, try other joints, and keep the least visible one.
         for refused in REFUSED:
             if find_boldest(made) <= SEEN or not made.report["joints"] or made.report["in_step"]:
                 break
@@ -243,6 +246,7 @@ def _join_edges(
     found: dict[int, Joined] = {}
     reasons: dict[str, str] = {}
     elements = None if len(already) == sum(wrap) else find_whole_elements(exemplar.guidance)
+    # A larger result is quilted. Otherwise the ends of the image are joined.
     if larger:
         source = extend(exemplar.guidance, size, wrap, watch)
     else:
@@ -259,6 +263,7 @@ def _join_edges(
         "source_regions": (source.label * 85 % 256).astype(np.uint8),
         "before_blending": composite,
     }
+    # Check the finished image: the report measures the visibility of its borders and seams.
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
         "size": list(source.shape),

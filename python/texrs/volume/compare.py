@@ -135,6 +135,7 @@ class Comparison:
             row("parts of several colours", self.integrity.mixed, ".3f")
             rows.append(("torn elements / all", "", f"{self.integrity.torn:.3f}", ""))
             rows.append(("crumbs in 100 000", "", f"{self.integrity.crumbs:.1f}", ""))
+        # Align the columns.
         widths = [max(len(r[i]) for r in rows) for i in range(4)]
         lines = [r[0].ljust(widths[0]) + "".join("  " + r[i].rjust(widths[i]) for i in (1, 2, 3)) for r in rows]
         return "\n".join(line.rstrip() for line in lines)
@@ -209,6 +210,7 @@ def compare(
         )
     if source is not None and (not isinstance(source, SourceMap) or source.shape != second.shape[:count]):
         raise InvalidInput(f"source: needs the source map of the output, over {second.shape[:count]}")
+    # Classify both arrays, and choose the classes whose pieces are counted.
     if classes is None:
         labels = _as_labels(first, "exemplar"), _as_labels(second, "output")
         kinds = int(max(a.max() for a in labels)) + 1
@@ -222,10 +224,12 @@ def compare(
         pick = tuple(range(kinds // 2 + kinds % 2, kinds)) if chosen is None else _choose(chosen, kinds)
         before, after = statistics.lightness(first, axes=count), statistics.lightness(second, axes=count)
     grey = before, after
+    # Compare both arrays with windows of the same size.
     masks = tuple(np.isin(a, pick) for a in labels)
     seams = np.concatenate(structure.seam_planes(grey[1]))
     window = min(64, *first.shape[:count], *second.shape[:count])
     orientation, turned = None, None
+    # Compare the output's layers with the exemplar's normal, turned by the field.
     if field is not None:
         check_field(field, count)
         field = space(field, spacing).over(second.shape[:count])

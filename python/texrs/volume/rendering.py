@@ -277,6 +277,7 @@ def turntable(
     ground = np.array([as_int(b, "background", 0, 255) for b in shade], np.float32)
     colours = guidance(as_image(volume, "volume", axes=3))
     half = np.array(colours.shape[:3]) / 2
+    # Choose the size of a pixel so that the volume fits into the image in every view.
     wide = float(np.hypot(half[0], half[2]))
     tall = abs(cos(radians(above))) * half[1] + abs(sin(radians(above))) * wide
     pixel = 2 * max(wide, float(tall)) * _MARGIN / side

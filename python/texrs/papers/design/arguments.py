@@ -111,6 +111,7 @@ def check_arguments(
     sides = size if size is not None else [2 * n for n in exemplars[0].shape]
     rows, columns = as_size(sides, minimum=MINIMUM_SIDE, way=LARGER)
     first, cyclic = as_seed(seed), as_wrap(wrap, usual=True)
+    # These depend on the size of the result.
     shares = as_shares(weights, len(exemplars), (rows, columns))
     as_method(method, None, "paper")
     if density is not None and (weights is not None or method is not None):
@@ -136,6 +137,7 @@ def check_arguments(
         method == "paper",
         progress or (lambda stage, share: None),
     )
+    # Compare the memory of the work with the limit before it begins.
     check_work("design", [e.pixels for e in exemplars], (rows, columns), way=LARGER, method=method)
     return arguments
 

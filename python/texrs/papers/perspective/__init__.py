@@ -234,9 +234,11 @@ def perspective(
         return average_windows(asked, progress)
     stage(progress, "sheet")
     with answering(progress, "sheet", 0.0):
+        # Prepare the exemplar: a flattened plane, or copies in several sizes.
         laid = lay_out(asked)
     if laid.outside.share > 0 and asked.strength > 0:
         warnings.warn(laid.outside.describe(laid.sizes), stacklevel=2)
+    # Stitch patches of it, each at the requested scale.
     found = stitch_sheet(
         laid.sheet,
         Region.whole(laid.wanted.shape, asked.wrap),
@@ -246,6 +248,7 @@ def perspective(
         seed=asked.seed,
         progress=progress,
     )
+    # Reduced parts of the exemplar are smoothed in the look-up, because they would alias.
     source = SourceMap.from_coordinates(
         found.coordinates, asked.exemplar.shape, label=found.patches, jacobian=found.frames
     ).with_finish(asked.wrap, interpolation=asked.interpolation, antialias=True)

@@ -131,6 +131,7 @@ class Request:
         if fov is not None and (isinstance(scale_map, Plane) or is_words(scale_map)):
             raise InvalidInput("fov: the plane has one already")
         as_choice(target_green, "target_green", ("up", "down"))
+        # The size of the target is the default size of the result.
         asked = as_target(target, target_green)
         if size is None:
             size = find_size(asked) or [2 * n for n in known.shape]
@@ -143,6 +144,7 @@ class Request:
             raise InvalidInput(
                 "method: the paper's knows no surfaces and no directions; give a scale map as target, or leave out the method"
             )
+        # Measure the scale map, and bring the target to the size of the result.
         plane, scale, measured = find_scale(known, scale_map, scale_measurement)
         mine = as_map(scale, "scale_map", known.shape)
         kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said

@@ -253,6 +253,7 @@ def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tu
     best, halves = cost(found), None
     too_large = prod((b - a) * side for a, b in zip(start, stop, strict=True)) > MOST
     longest = max(range(missing.ndim), key=lambda axis: stop[axis] - start[axis])
+    # Try to halve the box along each axis, and take the cheapest pair of halves.
     for axis in range(missing.ndim):
         middle = (start[axis] + stop[axis]) // 2
         if middle == start[axis]:
@@ -267,6 +268,7 @@ def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tu
     if halves is None:
         yield start, stop
         return
+    # Divide the halves again. Their boxes are relative to the half.
     for half in halves:
         offset = [s.start for s in half]
         for a, b in _divide_missing(missing[half], side, margin):

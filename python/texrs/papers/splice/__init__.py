@@ -319,6 +319,7 @@ def splice(
             seed=number,
             watch=watch,
         )
+    # Compose a net of its knots, unless the caller chose another way.
     if net or (net is None and wanted is None and method is None and is_net(mine)):
         theirs_cells = find_entry_cells(theirs, watch)
         return splice_nets(

@@ -106,6 +106,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     stays = (number[np.maximum(scene.own, 0)] > 0) | (scene.own == 0) | mark_scraps(scene.own, step, edit.cyclic)
     known = np.asarray(seen & stays[base[..., 0], base[..., 1]], bool)
     rest = np.where(known, number[parts.region[base[..., 0], base[..., 1]]], 0).astype(np.uint32)
+    # Lay the moved elements, complete the background, and cut the elements into it.
     label, places = paste_elements(parts, match, np.flatnonzero(~still), rest, edit.cyclic)
     bare = fill_holes(scene, base, known, label > 0, seed, watch)
     if bare is None:
@@ -114,6 +115,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     whole = cut_in(scene, bare, places, label, element, room=rest == 0) if label.any() else bare
     pasted, everywhere, light = label > 0, np.ones(known.shape, bool), scene.light
     nothing = np.zeros(known.shape, np.uint8)
+    # The draft before filling, for the image of the stage.
     before = np.where(pasted[..., np.newaxis], places, base)
     draft = Draft(before, known | pasted, everywhere, nothing, nothing, np.zeros((*known.shape, 2), bool))
     return Rearrangement(

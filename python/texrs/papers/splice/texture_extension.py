@@ -231,6 +231,7 @@ def _stamp(
     if not kept:
         raise InvalidInput("elements: must have whole elements, but the border cuts every one")
     chosen = np.array(kept)
+    # Number the stray pieces after the elements, and find their centres.
     pieces, count = label(stray)
     where = np.nonzero(pieces)
     area = np.bincount(pieces[where], minlength=count + 1)[1:]

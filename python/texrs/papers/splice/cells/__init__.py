@@ -122,6 +122,7 @@ def splice_cells(
     watch("cells", 0.6)
     joined = join(a.image, cells, charts, size)
     watch("cells", 1.0)
+    # Look up the joined cells, and correct the pixels that a cell stretches.
     places, frames = charts.places[joined.pixel], charts.measure_frames(joined.pixel, joined.chart)
     if refine:
         places, frames = refine_charts(a, cells, charts, joined, places, frames, seed, watch)

@@ -227,6 +227,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
     share = count / (cells.area[of] * factor.prod())
     found, covered = [], np.zeros(shape, bool)
     turn = np.where(cells.whole[of], np.where(share >= SEEN, 0, 1), 2)
+    # Place whole cells first, those that are most visible before others.
     for k in np.lexsort((of, -share, turn)).tolist():
         if share[k] < (SEEN, HINTED, SEEN)[turn[k]]:
             continue
@@ -237,6 +238,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
             found.append(outline)
     stamped = paint(np.array(found).reshape(-1, cells.outlines.shape[1], 2), shape)
     usual = cells.size**2 * factor.prod()
+    # Large free areas are cells also. The rest is given to the nearest cell.
     pieces, _ = label((drawn > CLOSED) & ~covered)
     room = renumber(pieces.astype(np.int32), np.bincount(pieces.ravel()) >= ROOM * usual)
     labels = np.where((room > 0) & (stamped == 0), room + len(found), stamped)

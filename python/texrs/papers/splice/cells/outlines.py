@@ -108,6 +108,7 @@ def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int
     fine = np.ascontiguousarray(np.take_along_axis(fine, around[..., None], axis=1).T)
     goal = np.ascontiguousarray(np.roll(goal, -start, axis=1).T)
     stride = np.asarray(STRETCH * ((STRIDES - FINE) / FINE) ** 2, np.float32)
+    # Dynamic programming over the points: the least cost of each offset from the even places.
     total = np.full((wide, count), np.inf, np.float32)
     back = np.zeros((points, wide, count), np.int8)
     for i in range(points + 1):
@@ -126,6 +127,7 @@ def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int
             away = fine[:, FINE * i : FINE * i + wide] - goal[:, i, None]
             least += (away * away).sum(axis=0)
         total = least
+    # Follow the best choices back, from the start to itself.
     at = np.full(count, APART)
     rows = np.arange(count)
     out = np.zeros((count, points), np.intp)
