@@ -13,7 +13,7 @@ from texrs.cli import main
 
 NAN = np.where(GREY > 128, np.nan, np.float32(1))
 INPUTS: dict[str, tuple[bytes | None, str]] = {
-    "missing": (None, "no such file"),
+    "missing": (None, "does not exist"),
     "empty": (b"", "empty"),
     "text": (b"hello, this is no picture\n" * 9, "content is none of"),
     "truncated": (png(COLOURS)[:-900], "bad.png"),

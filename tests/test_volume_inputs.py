@@ -121,7 +121,7 @@ def test_samples_without_a_header_need_what_they_are(tmp_path):
     ):
         with pytest.raises(InvalidInput, match=says):
             tio.read_volume(scan, **options)
-    with pytest.raises(FileError, match="no such file"):
+    with pytest.raises(FileError, match="does not exist"):
         tio.read_volume(tmp_path / "other.raw", shape=(1, 1, 1), dtype="uint8")
 
 

@@ -172,7 +172,7 @@ def texture_mesh(
     atlas : int, optional
         Side of the atlas, 16 to 16384. If None, the vertices get colours instead. Default: 1024.
     padding : int
-        Width of the border that is painted around each chart of the atlas, in texels, 0 to 64. They show the texture
+        Width of the border that is painted around each chart of the atlas, in texels, 0 to 64. It shows the texture
         in the plane of the nearest triangle, so that seams between charts are not visible. Default: 4.
     unwrap : bool
         If True, xatlas lays out the whole mesh again, and existing UVs are not used. Default: False.

@@ -1,4 +1,4 @@
-"""The photographs that come with scikit-image, under their names there.
+"""The photographs that come with scikit-image, under the names that they have there.
 
 All of them are part of the scikit-image package, so nothing is downloaded. Scikit-image names these sources: brick and
 gravel from CC0Textures and grass from DeviantArt (CC0); coffee by Rachel Michetti (CC0); rocket by SpaceX and

@@ -234,7 +234,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
             knot = knots[row, k]
             cells.append((knot[0] + tall, knot[1]))
             for side in (0, 1):
-                # The ropes of knot k lead to knots k and k + 1 of the next row if its row is odd, else to k - 1, k.
+                # In the next row, knot k is tied to k and k + 1 if its own row is odd, else to k - 1 and k.
                 other = knots[(row + 1) % rows_of, (k + side - 1 + row % 2) % across]
                 regular = np.array([tall, (side - 0.5) * wide])
                 turn = np.array(scene.period)

@@ -61,7 +61,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
     for i, point in enumerate(points):
         window = scene.window((point[0], point[1]), 25)
         rows, cols = window.where
-        # Only the 12 nearest sites can border the cell of this site.
+        # Only the nearest sites border the cell of this site, and 12 are enough.
         away = (points - point + np.array(scene.period) / 2) % scene.period
         away -= np.array(scene.period) / 2
         near = np.argsort((away**2).sum(1))[1:13]
