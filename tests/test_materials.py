@@ -218,7 +218,7 @@ def test_what_names_do_not_say_is_left_out_and_said(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="roles: must name images in .*got 'rock'"):
         Material.read(tmp_path, roles={"rock": "mask"})
     (tmp_path / "empty").mkdir()
-    with pytest.raises(FileError, match="no picture has a name"):
+    with pytest.raises(FileError, match="no image has a name"):
         Material.read(tmp_path / "empty")
     with pytest.raises(FileError, match="is not a folder of maps"):
         Material.read(tmp_path / "licence.txt")
