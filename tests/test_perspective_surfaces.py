@@ -262,7 +262,7 @@ def test_a_column_that_repeats(weave):
         ({"target": "floor"}, "target: needs plane:slant=DEGREES"),
         ({"target": "plane:tilt=9"}, "target: needs plane:slant=DEGREES"),
         ({"target": "plane:slant=steep"}, "target: needs plane:slant=DEGREES"),
-        ({"target": "plane:slant=99"}, "target: slant: needs a number from 0 to 88"),
+        ({"target": "plane:slant=99"}, "target: slant: must be a number between 0 and 88"),
         ({"target": "plane:slant=80,fov=90"}, "target: must not contain the horizon, but slant 80"),
         ({"target": np.zeros((8, 8, 2, 2))}, "target: 64 of 64 matrices are flat"),
         ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),

@@ -330,5 +330,5 @@ def test_a_photograph_is_extended_to_a_size() -> None:
     ).report["added"]
     assert up["top"] < 35 < up["bottom"]
     assert up["top"] + up["bottom"] == 80
-    with pytest.raises(InvalidInput, match=r"size: needs \(180, 240\)"):
+    with pytest.raises(InvalidInput, match=r"size: must be at least \(180, 240\) pixels"):
         texrs.extend(FLOOR, size=(100, 300), view=PLANE)
