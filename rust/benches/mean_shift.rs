@@ -1,4 +1,4 @@
-//! A noisy wave, filtered with radii that segmentation uses.
+//! Mean-shift filtering of a noisy wave, with radii that segmentation uses.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;

@@ -1,4 +1,4 @@
-//! Correlation of a template with an image of eight channels whose spectra are computed before.
+//! Correlation of a template with an image of eight channels, whose spectra are already computed.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::hash::Noise;

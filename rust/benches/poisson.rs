@@ -1,4 +1,4 @@
-//! Rectangles with every kind of edge, and a disc under a mask.
+//! The Poisson solver on rectangles with every boundary condition, and on a disc under a mask.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::par::{self, Monitor};

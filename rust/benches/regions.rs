@@ -1,4 +1,4 @@
-//! A noisy wave, with the parameters of segmentation.
+//! Segmentation of a noisy wave, with the usual parameters.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;

@@ -1,4 +1,4 @@
-//! Images and volumes filled with patches, with and without a field.
+//! The stitcher on images and volumes, with and without a field.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::fixed::{Frame, Frames, ONE, identity};

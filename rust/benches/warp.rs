@@ -1,4 +1,4 @@
-//! A dense mesh and scattered points, bent by a wave.
+//! Warps of a dense mesh and of scattered points along a wave.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::par::{self, Monitor};

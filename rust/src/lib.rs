@@ -39,7 +39,7 @@
 //! |---|---|
 //! | [`appearance`] | appearance vectors: descriptions of the neighbourhood of each exemplar sample |
 //! | [`guide`] | soft constraints on an output -> `appearance` |
-//! | [`blocks`] | patch-based initialisation: each cell gets a matching piece -> `appearance`, `guide` |
+//! | [`blocks`] | patch-based initialisation: each cell gets a matching patch -> `appearance`, `guide` |
 //! | [`pyramid`] | upsampling of coordinates to the next resolution |
 //! | [`optimize`] | correction of coordinates until every window resembles one of the exemplar -> `appearance`, `guide` |
 //! | [`stitcher`] | patches transformed by frames, cut along the least visible seams and healed -> `guide` |

@@ -327,7 +327,7 @@ impl<const D: usize> Appearance<D> {
                 } else {
                     noise.below(centres.len() as u64, [k as u32, 0, 0, 0]) as usize
                 };
-                // Weight the colours like the projection does.
+                // Weight the colours in the same way as the projection.
                 self.cut(centres.get(pick), &mut window);
                 for (k, x) in sample.iter_mut().enumerate() {
                     *x = f32::from(window[k]) * weights[k / self.channels];

@@ -48,7 +48,7 @@ impl Projection {
             .iter()
             .flatten()
             .fold(0.0f64, |m, x| m.max(x.abs()));
-        // components || A uniform exemplar has zero vectors.
+        // A uniform exemplar has zero vectors.
         if longest == 0.0 || components.variance <= FLAT {
             return Self {
                 length,

@@ -130,7 +130,7 @@ pub fn blocks<const D: usize>(
     monitor.expect((options.rounds * list.len()) as u64);
     for round in 0..=options.rounds {
         if round > 0 {
-            // Cells that take turns do not touch, so all of a round can choose at once.
+            // All cells of a round choose at once, from the places before the round.
             let even = round % 2 == 0;
             origins = par::map(list.len(), |c| {
                 let idle = list[c].even != even

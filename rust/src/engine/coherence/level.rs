@@ -111,7 +111,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             Frames::Dense(_) => None,
         };
         let classes = self.classes();
-        // Number of each point's last turn with a change, counted from 1; 0 before.
+        // The number of the turn, from 1, that last changed each point; 0 if none did.
         let mut changed = vec![0u32; places.len()];
         let turns = self.options.passes << D;
         monitor.expect(turns as u64);

@@ -171,7 +171,7 @@ pub fn correct<const D: usize>(
 
 impl<const D: usize> Level<'_, D> {
     /// Returns the number of points between two checks for cancellation. It is much larger than the reach of windows,
-    /// which is computed twice.
+    /// because the points within reach are read for both slabs.
     fn slab(&self) -> usize {
         SLAB.max(8 * self.margin())
     }

@@ -83,7 +83,8 @@ pub struct Quilt<'a> {
     whole: Index,
     /// The images at half the size. None if an axis is fixed: then all places are compared exactly.
     half: Option<Index>,
-    /// The position of the pixel that each pixel shows among those of all images, or [`FREE`].
+    /// The image pixel that each pixel of the texture shows, as a position among the pixels of all images, or
+    /// [`FREE`].
     place: Vec<u32>,
     label: Vec<u32>,
     seams: Vec<[f32; 2]>,
@@ -202,7 +203,7 @@ impl<'a> Quilt<'a> {
     /// Copies the first patch, without a cut.
     ///
     /// # Errors
-    /// Returns an error if the window does not fit, or if there is not such a patch at the place.
+    /// Returns an error if the window does not fit, or if the image has no room for a patch at the place.
     pub fn lay_first(&mut self, window: &Window, picture: usize, at: [usize; 2]) -> Result<()> {
         self.check(window)?;
         let patch = self.options.patch;
@@ -255,7 +256,8 @@ impl<'a> Quilt<'a> {
         Ok(())
     }
 
-    /// Returns the pixel that each pixel shows, as a position among those of all images, and the number of its patch.
+    /// Returns the image pixel that each pixel shows, as a position among the pixels of all images, and the number of
+    /// its patch.
     pub fn into_map(self) -> (Vec<u32>, Vec<u32>) {
         (self.place, self.label)
     }
@@ -272,7 +274,7 @@ impl<'a> Quilt<'a> {
         Err(Error::value("waves", message))
     }
 
-    /// Returns the positions of the pixels that a match copies, in each `step`-th row and column.
+    /// Returns the positions of the image pixels that a match copies, in each `step`-th row and column.
     fn places(&self, found: &Match, step: usize) -> impl Iterator<Item = u32> + use<'_> {
         let picture = &self.pictures[found.exemplar];
         let (width, [rows, columns]) = (picture.shape[1], self.options.patch);
@@ -355,7 +357,8 @@ impl<'a> Quilt<'a> {
         })
     }
 
-    /// Returns the position of the pixel that a match copies to each pixel of the bounds. Outside the window it is 0.
+    /// Returns the position of the image pixel that a match copies to each pixel of the bounds. Outside the window it
+    /// is 0.
     fn spread(&self, found: &Match, around: &Around) -> Vec<u32> {
         let [_, width] = around.bounds.shape();
         let [top, left] = around.inner;

@@ -3,14 +3,15 @@
 use super::{CELL, Quilt, Window};
 use crate::kernels::patch_search::Match;
 
-/// Penalty of a patch that shows the same as all other patches, in units of a good match. Few places fit if elements
-/// are on a plain background, and a patch from elsewhere would cut them.
+/// Penalty of a patch that shows the same as all other patches, in units of the cost of a good match. Few places fit
+/// if elements are on a plain background. A larger penalty would then select patches that cut elements.
 const REPETITION: f64 = 10.0;
 /// Share of matches that count as good.
 const GOOD: f64 = 0.1;
-/// The same penalty on a lattice, in units of a typical match: all places are similar there, and must meet exactly.
+/// The same penalty on a lattice, in units of the cost of a typical match: all places are similar there, and must meet
+/// exactly.
 const ON_LATTICE: f64 = 2.5;
-/// Penalty of a patch that continues the patch of the exemplar next to it, in units of a typical match.
+/// Penalty of a patch that continues the patch of the exemplar next to it, in units of the cost of a typical match.
 const CONTINUATION: f64 = 2.0;
 /// Largest deviation of a patch from the lattice, in units of the lattice's shorter shift.
 const IN_STEP: f64 = 0.15;

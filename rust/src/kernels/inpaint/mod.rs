@@ -1,8 +1,8 @@
 //! Exemplar-based filling of holes: from the rim inwards, the best matching patch is cut into the known pixels.
 //!
-//! After Criminisi, Perez and Toyama (*Region filling and object removal by exemplar-based inpainting*, IEEE TIP 2004)
-//! with the graph-cut paste of Kwatra et al. (*Graphcut textures*, SIGGRAPH 2003), combined as in Shen et al. 2006,
-//! section 3.4:
+//! The method follows Criminisi, Perez and Toyama (*Region filling and object removal by exemplar-based inpainting*,
+//! IEEE TIP 2004). Patches are pasted by the graph cuts of Kwatra et al. (*Graphcut textures*, SIGGRAPH 2003). Shen et
+//! al. 2006, section 3.4, combined both:
 //!
 //! 1. take the hole with the most known pixels around it, and the window over it whose known fraction is nearest to
 //!    0.6;

@@ -176,7 +176,7 @@ impl Window {
             let (r, c) = (i / columns, i % columns);
             *core = self.keep[i] || (known[i] && rim(r, c) && !hole_beside(r, c));
         }
-        // The pairs of pixels to keep and holes, which lie outside every overlap.
+        // The pairs of pixels to keep and holes, which are outside every overlap.
         self.ends.clear();
         for i in 0..rows * columns {
             let beside = [

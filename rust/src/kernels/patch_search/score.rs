@@ -268,8 +268,8 @@ fn add(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32])
     }
 }
 
-/// [`add`] in SIMD registers, with the same operations in the same order. It is 2x as fast as the
-/// code that the compiler generates, as measured.
+/// [`add`] in SIMD registers, with the same operations in the same order. It is 2x as fast as compiled plain code
+/// (measured).
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 #[inline(always)]
 fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {

@@ -110,8 +110,8 @@ impl Forest {
         })
     }
 
-    /// Joins similar regions over all edges. `edges` contains those that do not lie inactive.
-    /// Returns the pairs of roots that these edges did not join.
+    /// Joins similar regions over all edges. `edges` contains the edges that are not inactive. Returns the pairs of
+    /// roots that these edges did not join.
     pub(super) fn join_alike(
         &mut self,
         edges: &[Edge],

@@ -1,5 +1,5 @@
-//! Edges that need not be sorted: they are heavier than the two other edges of a triangle. They lie
-//! inactive until one of these edges has separated two regions.
+//! Edges that need not be sorted because they are heavier than the two other edges of a triangle. They stay inactive
+//! until one of these edges has separated two regions.
 //!
 //! A region is *full* after an edge was too heavy for it. All later edges are heavier, so the
 //! region does not change any more. Let u-v be the heaviest edge of a triangle u, v, y. There are
@@ -49,7 +49,7 @@ wide_fn! {
     }
 }
 
-/// Returns the edges that do not lie inactive, in the order of their numbers.
+/// Returns the edges that are not inactive, in the order of their numbers.
 pub(super) fn list_others(weights: &[f32], frame: &Frame) -> Result<Vec<Edge>> {
     let ([rows, columns], stride) = (frame.shape, frame.stride);
     let row = DIRECTIONS * stride;
@@ -82,10 +82,9 @@ pub(super) fn list_others(weights: &[f32], frame: &Frame) -> Result<Vec<Edge>> {
 }
 
 wide_fn! {
-    /// Computes the weights beyond which the edges of a row lie inactive, one line for each
-    /// direction. The bound is the minimum over the triangles of an edge of the heavier of their
-    /// two other edges. With `WITNESS`, triangles whose two other edges are both marked are
-    /// ignored.
+    /// Computes the weights above which the edges of a row are inactive, one line for each direction. The bound is the
+    /// minimum over the triangles of an edge of the heavier of their two other edges. With `WITNESS`, triangles whose
+    /// two other edges are both marked are ignored.
     fn bound<const WITNESS: bool>(rows: [&[f32]; 3], stride: usize, out: &mut [f32]) {
         let n = stride - 2;
         // A line of one of the three rows that starts at the first pixel or at a neighbour of it.

@@ -143,7 +143,7 @@ proptest! {
 
 #[test]
 fn what_is_no_grid_is_solved() {
-    // Chains, stars, combs, cyclic grids, a volume, and a full matrix.
+    // Test chains, stars, combs, periodic grids, a volume, and a full matrix.
     let chain: Vec<_> = (1..5000).map(|i| (i - 1, i, 1.0)).collect();
     let star: Vec<_> = (1..3000).map(|i| (0, i, 1.0)).collect();
     let comb: Vec<_> = (1..2000)

@@ -154,7 +154,7 @@ impl Dual {
         }
     }
 
-    /// Returns the face next to an original face, modulo the rows if the strip is cyclic.
+    /// Returns the face next to an original face, modulo the rows if they wrap around.
     pub(super) fn beside(&self, f: u32, direction: usize) -> u32 {
         let (width, last) = (self.width as u32, (self.rows * self.width) as u32);
         match direction {

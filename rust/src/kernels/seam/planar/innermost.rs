@@ -151,7 +151,7 @@ impl Dual {
         i64::from(downwards(to, direction ^ 2)) - i64::from(downwards(f, direction))
     }
 
-    /// Returns the target and the cost of a step in a strip that is not cyclic, ignoring P.
+    /// Returns the target and the cost of a step in a strip whose rows do not wrap around, ignoring P.
     #[inline(always)]
     fn plain(&self, f: u32, direction: usize) -> (u32, u32) {
         let (at, width) = (f as usize, self.width);

@@ -5,8 +5,8 @@
 //! Fulkerson 1956, and Hassin, *Maximum flow in (s,t) planar networks*, Information Processing
 //! Letters 1981. The path may turn back, in contrast to a row-by-row recurrence.
 //!
-//! If the rows are cyclic, the seam must be closed. The method is that of Reif, *Minimum s-t cut of
-//! a planar undirected network in O(n log^2 n) time*, SIAM J. Computing 1983:
+//! If the rows wrap around, the seam must be closed. The method is that of Reif, *Minimum s-t cut of a planar
+//! undirected network in O(n log^2 n) time*, SIAM J. Computing 1983:
 //!
 //! 1. a shortest path P leads from the left to the right border of the dual; some cheapest seam
 //!    crosses it once;
@@ -48,8 +48,8 @@ pub struct Strip<'a> {
     /// Cost of separating each pixel from the next one in its row: rows x columns, the last column
     /// is ignored.
     pub across: &'a [u32],
-    /// Cost of separating each pixel from the next one in its column: rows x columns. The last row
-    /// is ignored unless the strip is cyclic.
+    /// Cost of separating each pixel from the next one in its column: rows x columns. The last row is ignored unless
+    /// the rows wrap around.
     pub along: &'a [u32],
 }
 
