@@ -56,7 +56,7 @@ def test_files_stay_where_they_are(tmp_path: Path, textures: TextureDatabase, sa
     with pytest.raises(InvalidInput, match="contradicts|mask"):  # The mask of the old picture is not that of this one.
         textures.add(file, "buttons", replace=True, mask=~DOTS.mask, layout="disjoint")
     changed = textures["buttons"]
-    assert said == ["buttons: made anew, for the entry is of another image"]
+    assert said == ["buttons: analysed again, because the entry is of another image"]
     assert (changed.image == DOTS.image[::-1]).all()
     assert (before.image == DOTS.image).all()
     file.unlink()
@@ -77,7 +77,7 @@ def test_a_damaged_entry_is_said_and_remade(textures: TextureDatabase, said: lis
         np.savez(path, **{**parts, "texrs_elements": np.array(0)})
     after = textures["dots"]
     assert len(said) == 1
-    assert said[0].startswith("dots: made anew")
+    assert said[0].startswith("dots: analysed again")
     np.testing.assert_array_equal(after.points, before.points)
     np.testing.assert_array_equal(after.mask, before.mask)
     assert after.sets is not None
@@ -93,7 +93,7 @@ def test_entries_are_remade_with_their_options(textures: TextureDatabase, said: 
     assert kept["layout"] == "disjoint"
     (textures.path / "turned.npz").unlink()
     after = textures["turned"]
-    assert said[0].startswith("turned: made anew")
+    assert said[0].startswith("turned: analysed again")
     assert (after.report, after.wrap, after.layout) == (before.report, before.wrap, before.layout)
     np.testing.assert_array_equal(after.points, before.points)
 
@@ -104,7 +104,7 @@ def test_an_entry_of_another_version_is_remade(textures: TextureDatabase, said: 
     table["textures"]["dots"]["version"] = 0
     manifest.write_text(json.dumps(table))
     assert len(textures["dots"].points) > 3
-    assert "is of version 0" in said[0]
+    assert "has version 0" in said[0]
     assert textures.list()[0].version == texrs.elements.FORMAT
 
 
@@ -122,7 +122,7 @@ def test_a_damaged_manifest_is_remade_from_the_entries(
     before = manifest.read_text()
     manifest.unlink() if text is None else manifest.write_text(text)
     assert list(textures) == ["dots"]
-    assert "made anew from 1 entries" in said[0]
+    assert "rebuilt from 1 entries" in said[0]
     assert manifest.read_text() == before
 
 
@@ -156,7 +156,7 @@ def test_a_manifest_whose_values_are_hostile(textures: TextureDatabase, said: li
 
 def test_a_warning_where_nobody_listens(textures: TextureDatabase) -> None:
     (textures.path / "dots.npz").write_bytes(b"")
-    with pytest.warns(UserWarning, match="dots: made anew"):
+    with pytest.warns(UserWarning, match="dots: analysed again"):
         TextureDatabase(textures.path)["dots"]
 
 
@@ -202,7 +202,7 @@ def test_one_name_given_by_several_processes_at_once(tmp_path: Path, said: list[
         assert answers == ["ok"] * count
     else:
         assert answers.count("ok") == 1
-        assert sum("name: one is there already, of another image" in answer for answer in answers) == count - 1
+        assert sum("name: one exists already, with another image" in answer for answer in answers) == count - 1
         winner = answers.index("ok")
         assert (textures["one"].image == np.roll(DOTS.image, winner, axis=-1) // (winner + 1)).all()
     # The manifest, the entry and the pixels are of one picture.
@@ -270,19 +270,19 @@ def test_a_texture_is_removed_with_the_copy_of_its_pixels(textures: TextureDatab
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda db: db.add(DOTS.image), "name: is needed for an array"),
-        (lambda db: db.add(DOTS.image, "../up", **GIVEN), "name: letters, digits"),
+        (lambda db: db.add(DOTS.image), "name: is required for an array"),
+        (lambda db: db.add(DOTS.image, "../up", **GIVEN), "name: must be up to 100 letters, digits"),
         (
             lambda db: db.add(DOTS.image[::-1], "dots", mask=DOTS.mask[::-1], layout="disjoint"),
-            "name: dots is there already",
+            "name: dots exists already",
         ),
         (lambda db: db.add(DOTS.image, "x", boxes=3), "boxes: is not an option"),
-        (lambda db: db["nobody"], "name: there is no texture 'nobody'"),
+        (lambda db: db["nobody"], "name: texture 'nobody' is not in"),
         (lambda db: db.matrix(cell=3), "cell: must be an integer"),
         (lambda db: db.matrix([], []), "rows: no textures"),
-        (lambda db: db.matrix(["dots"], ["nobody"]), "name: there is no texture 'nobody'"),
-        (lambda db: db.matrix("dots"), "rows: needs several names"),
-        (lambda db: db.remove("nobody"), "name: there is no texture 'nobody'"),
+        (lambda db: db.matrix(["dots"], ["nobody"]), "name: texture 'nobody' is not in"),
+        (lambda db: db.matrix("dots"), "rows: must be a sequence of names"),
+        (lambda db: db.remove("nobody"), "name: texture 'nobody' is not in"),
     ],
 )
 def test_bad_input(textures: TextureDatabase, call, message: str) -> None:
@@ -299,13 +299,11 @@ def test_folders_that_are_none(tmp_path: Path, textures: TextureDatabase) -> Non
         TextureDatabase(3)  # type: ignore[arg-type]
     (textures.path / "dots.npz").write_bytes(b"")
     (textures.path / "dots.npy").unlink()
-    with pytest.raises(FileError, match="its image dots.npy is gone"):
+    with pytest.raises(FileError, match="its image dots.npy is missing"):
         textures["dots"]
     (textures.path / "manifest.json").write_text('{"version": 9, "textures": {}}')
-    with pytest.raises(FileError, match="is of version 9"):
+    with pytest.raises(FileError, match="has version 9"):
         textures.list()
     (textures.path / "manifest.json").write_text('{"layout": 1, "textures": {}}')
-    with pytest.raises(
-        FileError, match="is of version 1, this texrs reads version 2; add the textures to a new folder"
-    ):
+    with pytest.raises(FileError, match="has version 1, this texrs reads version 2; add the textures to a new folder"):
         textures.list()

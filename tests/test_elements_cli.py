@@ -100,7 +100,7 @@ def test_database(here: Path, capsys: Capture) -> None:
     assert iio.imread("sheet.png").shape == (108, 108, 3)
     (here / "db" / "dots.npz").write_bytes(b"x")
     assert main(["database", "db", "matrix", "dots", "-o", "one.png", "--cell", "32", "-q"]) == 0
-    assert "dots: made anew" in capsys.readouterr().err
+    assert "dots: analysed again" in capsys.readouterr().err
     assert iio.imread("one.png").shape == (72, 72, 3)
     assert main(["database", "db", "splice", "dots", "leaves_and_flowers", "-o", "s.png", "--size", "44x40", "-q"]) == 0
     assert iio.imread("s.png").shape == (40, 44, 3)
@@ -117,7 +117,7 @@ def test_database(here: Path, capsys: Capture) -> None:
     assert capsys.readouterr().out.startswith("dots\t")
     for command, message in (
         ("splice dots -o s.png", "NAME: splice needs two names"),
-        ("splice dots nobody -o new.png", "NAME: there is no texture 'nobody'"),
+        ("splice dots nobody -o new.png", "NAME: texture 'nobody' is not in"),
         ("remove", "NAME: remove needs names"),
         ("list --cell 32", "--cell: needs matrix, got list"),
         ("splice dots dots -o new.png --each all", "--each: needs matrix, got splice"),
@@ -155,7 +155,7 @@ def test_database(here: Path, capsys: Capture) -> None:
         ("database db rename", "add\\|list\\|remove\\|splice\\|matrix: must be one of"),
         ("database db list", "db: the folder does not exist"),
         ("database db add", "IMAGE: add needs images"),
-        ("database in.png add in.png", "in.png: no folder"),
+        ("database in.png add in.png", "in.png: a folder cannot be created"),
         ("database db add in.png mask.png --name both", "IMAGE: --name"),
     ],
 )

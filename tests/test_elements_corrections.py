@@ -71,7 +71,7 @@ def test_corrections_are_made_again_with_the_analysis(found: ElementAnalysis, tm
     textures = texrs.TextureDatabase(tmp_path / "db")
     textures.add(DOTS.image, "dots", mask=DOTS.mask, layout="disjoint", corrections=steps)
     (tmp_path / "db" / "dots.npz").write_bytes(b"x")
-    with pytest.warns(UserWarning, match="made anew"):
+    with pytest.warns(UserWarning, match="analysed again"):
         np.testing.assert_array_equal(textures["dots"].points, wanted.points)
 
 

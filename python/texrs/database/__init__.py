@@ -1,4 +1,4 @@
-"""A folder of analysed textures, and what can be spliced from it."""
+"""Database: a folder of analysed textures that can be spliced with each other."""
 
 from __future__ import annotations
 

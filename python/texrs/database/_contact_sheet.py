@@ -1,4 +1,4 @@
-"""The sheet of a matrix: a small picture of each splice."""
+"""Contact sheet of a matrix: a thumbnail of each splice."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from texrs._typing import Array
 __all__ = ["ContactSheet"]
 
 GAP = 4
-"""Pixels between the pictures of a sheet."""
+"""Space between the thumbnails of a sheet, in pixels."""
 
 
 class ContactSheet:
-    """Small pictures in rows and columns, with those of the textures along the left and the upper edge."""
+    """Thumbnails in rows and columns, with the textures along the left and the upper edge."""
 
     def __init__(self, rows: int, columns: int, side: int) -> None:
         self.side, step = side, side + GAP
         self.picture = np.full(((rows + 1) * step, (columns + 1) * step, 3), 255, np.uint8)
 
     def put(self, row: int, column: int, image: Array | None) -> None:
-        """Put a picture into its place; grey where there is none."""
+        """Put a thumbnail into its position. None leaves it grey."""
         side = self.side
         small = np.full((side, side, 3), 128, np.uint8) if image is None else make_thumbnail(image, side)
         top, left = row * (side + GAP), column * (side + GAP)
@@ -30,7 +30,7 @@ class ContactSheet:
 
 
 def make_thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
-    """Return a small picture of an image, for people."""
+    """Return a thumbnail of an image."""
     from skimage.transform import resize
 
     guide = as_rgb(guidance(as_image(image)))

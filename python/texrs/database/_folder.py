@@ -1,4 +1,4 @@
-"""The folder of a database: its manifest, changed by one process at a time, and entries that say all of it again."""
+"""Folder of a database: entries, and a manifest that one process changes at a time and that entries can restore."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ from texrs.errors import FileError, InvalidInput, TexrsError
 
 MANIFEST, LOCK = "manifest.json", ".lock"
 VERSION = 2
-"""Of the manifest."""
+"""Version of the manifest."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 PATIENCE, PAUSE = 60.0, 0.05
-"""Seconds that another process may keep the manifest, and between two looks."""
+"""Maximum time, in seconds, to wait for the lock of another process, and time between two attempts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What the manifest says of a texture."""
+    """Description of a texture in the manifest."""
 
     name: str
     file: str
-    """Of the entry, in the folder."""
+    """File name of the entry, in the folder."""
     image: str
-    """File of the image: in the folder, or elsewhere."""
+    """File of the image, in the folder or elsewhere."""
     hash: str
     version: int
     layout: Layout
     box: tuple[int, ...]
     elements: int
     options: Mapping[str, Any] = field(repr=False)
-    """With which it was analysed."""
+    """Options of its analysis."""
 
 
 class Folder:
-    """The manifest of a folder, and how entries get into it."""
+    """The manifest of a folder, and the operations that change its entries."""
 
     def __init__(self, path: FilePath, log: Callable[[str], object] | None) -> None:
         self.path, self._say, self._made = path, log, False
         if not path.is_dir() and (path.exists() or not path.parent.is_dir()):
-            raise FileError(f"{path}: no folder can be made there")
+            raise FileError(f"{path}: a folder cannot be created there")
 
     def keep(
         self,
@@ -64,16 +64,16 @@ class Folder:
         pixels: Array | None = None,
         replace_other: bool = True,
     ) -> ElementAnalysis:
-        """Write an entry, its ``pixels`` into the file ``image`` where they are given, and what the manifest says of it."""
+        """Write an entry, its ``pixels`` to the file ``image`` if they are given, and its record in the manifest."""
         plain = {k: _to_plain(v) for k, v in options.items()}
-        # With all that the manifest needs, should that be lost.
+        # Store everything that the manifest contains, so that a lost manifest can be rebuilt.
         entry = replace(entry, report={**entry.report, "database": {"image": image, "options": plain}})
         file = f"{name}.npz"
         record = _record_of(name, file, entry)
         with self._lock_manifest():
             found = self._parse()
             found = self._scan() if found is None else found
-            # Another process may have taken the name while this one analysed.
+            # Another process may have taken the name during the analysis.
             if not replace_other:
                 check_free(found, name, record.hash)
             if pixels is not None:
@@ -84,7 +84,7 @@ class Folder:
         return entry
 
     def drop(self, name: str) -> bool:
-        """Forget a texture, with the copy of its pixels where there is one; return whether it was there."""
+        """Remove a texture, with the copy of its pixels if there is one. Return whether it existed."""
         if not self.path.is_dir():
             return False
         with self._lock_manifest():
@@ -93,7 +93,7 @@ class Folder:
             record = found.pop(name, None)
             if record is None:
                 return False
-            # A file that is left over is no entry, but an entry without its file would be damaged.
+            # Write the manifest first: a leftover file is harmless, but an entry without its file would be damaged.
             self._write(found)
             for file in (record.file, f"{name}.npy" if record.image == f"{name}.npy" else None):
                 if file is not None:
@@ -101,14 +101,14 @@ class Folder:
         return True
 
     def read(self) -> dict[str, Record]:
-        """Read the manifest; remake it from the entries where it is damaged."""
+        """Read the manifest, or rebuild it from the entries if it is damaged."""
         found = self._parse()
         if found is None:
             with self._lock_manifest():
                 found = self._parse()
                 if found is None:
                     found = self._scan()
-                    self.warn(f"{self.path / MANIFEST}: damaged; made anew from {len(found)} entries")
+                    self.warn(f"{self.path / MANIFEST}: damaged; rebuilt from {len(found)} entries")
                     self._write(found)
         return found
 
@@ -116,7 +116,7 @@ class Folder:
         try:
             text = (self.path / MANIFEST).read_text(encoding="utf-8")
         except FileNotFoundError:
-            # With entries it was lost; without, nobody has written it yet.
+            # If there are entries, the manifest was lost. Otherwise nobody has written it yet.
             return None if any(self.path.glob("*.npz")) else {}
         except (OSError, UnicodeDecodeError):
             return None
@@ -125,7 +125,7 @@ class Folder:
             version = int(table.get("version", 1))
             if version != VERSION:
                 raise FileError(
-                    f"{self.path / MANIFEST}: is of version {version}, this texrs reads version {VERSION}; "
+                    f"{self.path / MANIFEST}: has version {version}, this texrs reads version {VERSION}; "
                     "add the textures to a new folder"
                 )
             return {name: _read_record(name, item) for name, item in table["textures"].items()}
@@ -153,7 +153,7 @@ class Folder:
 
     @contextmanager
     def _lock_manifest(self) -> Iterator[None]:
-        """Keep other processes, and threads, from changing the manifest."""
+        """Lock the manifest against changes by other processes and threads."""
         number, end = self._open_lock(), time.monotonic() + PATIENCE
         try:
             while not (_lock_file(number) and self._is_lock(number)):
@@ -161,12 +161,12 @@ class Folder:
                     raise FileError(f"{self.path}: another process has kept it locked for {PATIENCE:g} s")
                 time.sleep(PAUSE)
                 if not self._is_lock(number):
-                    # Whoever had it found nothing to keep, and took the folder away.
+                    # The process that had the lock removed its empty folder, so create the folder again.
                     os.close(number)
                     number = self._open_lock()
             yield
         finally:
-            # What failed leaves no folder that it made, and that holds nothing.
+            # After a failure, remove the folder if this process created it and it is empty.
             if self._made and os.name == "posix" and self._is_lock(number) and os.listdir(self.path) == [LOCK]:
                 with suppress(OSError):
                     (self.path / LOCK).unlink()
@@ -174,7 +174,7 @@ class Folder:
             os.close(number)
 
     def _open_lock(self) -> int:
-        """Open the file that is locked, in the folder, which is made where it is missing."""
+        """Open the lock file, and create the folder if it is missing."""
         for _ in range(100):
             try:
                 with suppress(FileExistsError):
@@ -182,20 +182,20 @@ class Folder:
                     self._made = True
                 return os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
             except FileNotFoundError:
-                # Taken away in between.
+                # Another process removed the folder in between.
                 continue
             except OSError as error:
                 raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None
-        raise FileError(f"{self.path}: is made and taken away by other processes")
+        raise FileError(f"{self.path}: other processes keep creating and removing the folder")
 
     def _is_lock(self, number: int) -> bool:
-        """Return whether the file that was opened is the one that lies there."""
+        """Return whether the opened file is still the lock file in the folder."""
         with suppress(OSError):
             return os.path.samestat(os.fstat(number), os.stat(self.path / LOCK))
         return False
 
     def warn(self, sentence: str) -> None:
-        """Report what had to be remade."""
+        """Report that a damaged or outdated file was rebuilt."""
         if self._say is not None:
             self._say(sentence)
         else:
@@ -203,13 +203,13 @@ class Folder:
 
 
 def check_free(found: Mapping[str, Record], name: str, hash: str) -> None:
-    """Check that no texture of another image has the name."""
+    """Check that no texture with another image has the name."""
     if name in found and found[name].hash != hash:
-        raise InvalidInput(f"name: {name} is there already, of another image; replace=True replaces it")
+        raise InvalidInput(f"name: {name} exists already, with another image; use replace=True to replace it")
 
 
 def _lock_file(number: int) -> bool:
-    """Lock a file until it is closed, which the system does for a process that dies."""
+    """Lock a file until it is closed. If a process dies, the operating system closes its files."""
     try:
         try:
             import fcntl
@@ -233,7 +233,7 @@ def _record_of(name: str, file: str, entry: ElementAnalysis) -> Record:
 
 
 def _read_record(name: str, item: Mapping[str, Any]) -> Record:
-    # A file of the folder: neither a path nor "..".
+    # The manifest must name a file in the folder, not a path or "..".
     if not NAME.fullmatch(name) or not re.fullmatch(rf"{NAME.pattern}\.npz", item["file"]):
         raise ValueError(name)
     return Record(
@@ -250,7 +250,7 @@ def _read_record(name: str, item: Mapping[str, Any]) -> Record:
 
 
 def _to_plain(value: Any) -> Any:
-    """Return an option as text, numbers, and lists and tables of them; a mask by its runs."""
+    """Return an option as text, numbers, lists and mappings. A mask is stored as its runs."""
     if isinstance(value, np.ndarray) and value.dtype.kind in "b" and value.ndim == 2:
         changes = np.flatnonzero(np.diff(value.ravel().astype(np.int8), prepend=0))
         return {"shape": list(value.shape), "changes": changes.tolist()}
@@ -266,7 +266,7 @@ def _to_plain(value: Any) -> Any:
 
 
 def restore_option(value: Any) -> Any:
-    """Return an option as it was before `_to_plain` wrote it."""
+    """Return an option in the form that it had before `_to_plain`."""
     if isinstance(value, dict) and "shape" not in value:
         return ElementSearch(**value)
     if isinstance(value, dict):

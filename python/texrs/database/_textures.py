@@ -1,4 +1,4 @@
-"""A folder of analysed textures, and what can be spliced from it."""
+"""Database: a folder of analysed textures that can be spliced with each other."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
 KEPT = 256 << 20
-"""Bytes of entries that are kept while all are spliced with all, about."""
+"""Approximate maximum bytes of entries in memory while a matrix is spliced."""
 
 
 class AnalyseOptions(TypedDict, total=False):
-    """What `texrs.elements.analyse` takes, and an entry is remade with."""
+    """Options of `texrs.elements.analyse`. They are stored, so that an entry can be analysed again."""
 
     box: Sequence[float] | None
     mask: object
@@ -46,7 +46,7 @@ class AnalyseOptions(TypedDict, total=False):
 
 
 class SpliceOptions(TypedDict, total=False):
-    """What `texrs.splice` takes besides two textures and a size."""
+    """Options of `texrs.splice`, without the two textures and the size."""
 
     seed: int
     method: Literal["paper", "preview"] | None
@@ -65,35 +65,35 @@ class Matrix:
     """Splices of several textures with each other."""
 
     rows: tuple[str, ...]
-    """Those that give their elements."""
+    """Names of the textures that supply the elements."""
     columns: tuple[str, ...]
-    """Those that give their arrangement."""
+    """Names of the textures that supply the arrangement."""
     results: Mapping[tuple[str, str], Synthesis]
-    """All of them, but for those that were passed on as they were made."""
+    """Splices by names. It is empty if they were passed to ``each``."""
     sheet: NDArray[np.uint8]
-    """All of them in a picture, the textures themselves along its left and its upper edge."""
+    """Image of all splices, with the textures along its left and its upper edge."""
     failed: Mapping[tuple[str, str], str]
-    """Why some could not be made; their places on the sheet are grey."""
+    """Reasons for missing splices, by names. Their positions on the sheet are grey."""
 
 
 class TextureDatabase:
-    """A folder with a manifest and one file a texture.
+    """A folder with a manifest and one file per texture.
 
-    An entry is remade when its image has changed, when it is of another version, and when it is damaged, which is said.
-    Several processes may use a folder at once: files take their names when they are whole, and one process at a time
-    writes a texture. Of several that add different images by one name the first to write keeps it.
+    An entry is analysed again, with a warning, if its image has changed, if it has another version, or if it is
+    damaged. Several processes may use a folder at once: files get their names when they are complete, and one process
+    at a time writes a texture. If several processes add different images under one name, the first one keeps it.
 
     Parameters
     ----------
     path : path_like
-        The folder; if it is not there it is made, in a folder that is, when the first texture is kept.
+        Folder. If it is missing, it is created with the first texture, but its parent must exist.
     log : callable, optional
-        Called with a sentence when something had to be remade; by default a warning is given.
+        Function called with a sentence when something was rebuilt. Default: a Python warning.
 
     Raises
     ------
     FileError
-        It is no folder and cannot be made, or is of a later version.
+        The path is not a folder and cannot be created, or the folder has another version.
 
     Examples
     --------
@@ -126,11 +126,11 @@ class TextureDatabase:
         return isinstance(name, str) and name in self._folder.read()
 
     def __getitem__(self, name: str) -> ElementAnalysis:
-        """Return an entry, remade if it has to be."""
+        """Return an entry, analysed again if necessary."""
         return self.analyse(name)
 
     def list(self) -> list[Record]:
-        """Return what the manifest says of all textures, by name.
+        """Return the records of all textures, sorted by name.
 
         Returns
         -------
@@ -160,26 +160,33 @@ class TextureDatabase:
         progress: Progress | bool | None = None,
         **options: Unpack[AnalyseOptions],
     ) -> ElementAnalysis:
-        """Analyse a texture and keep it.
+        """Analyse a texture and store it.
 
         Parameters
         ----------
         image : path_like or (H, W[, C]) array
-            A file, which stays where it is, or pixels, of which a copy is kept.
+            Image: a file, which stays where it is, or pixels, which are copied.
         name : str, optional
-            Letters, digits, ``.``, ``_`` and ``-``; by default that of the file.
+            Name of up to 100 letters, digits, ``.``, ``_`` and ``-``. Default: the name of the file.
         replace : bool
-            Whether another texture of that name may be replaced.
+            If True, replace a texture of this name with another image. Default: False.
         similarity : bool
-            Whether the similarity sets are made now and kept too: refinements then need not make them.
+            If True, also compute and store the similarity sets, which save time in later refinements. Default: False.
         progress : callable or True, optional
-            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+            Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
         **options
-            What `texrs.elements.analyse` takes: ``box`` (row, column, height, width) around one element; ``mask`` (H, W) bool,
-            the foreground; ``background``, points or (H, W) bool between the elements; ``layout`` ("disjoint", "connected"
-            or "jointed"); ``points`` (n, 2), the elements; ``search``, an `ElementSearch`; ``method`` (None or "paper");
-            ``wrap``, whether the texture repeats; ``seed``; ``corrections``, as `texrs.elements.correct` takes them. They are
-            kept, and an entry is made anew with them.
+            Options of `texrs.elements.analyse`. They are stored, so that an entry can be analysed again.
+
+            - ``box``: (row, column, height, width) around one element.
+            - ``mask``: (H, W) bool, the foreground.
+            - ``background``: points, or (H, W) bool, between the elements.
+            - ``layout``: "disjoint", "connected" or "jointed".
+            - ``points``: (n, 2), the elements.
+            - ``search``: an `ElementSearch`.
+            - ``method``: None or "paper".
+            - ``wrap``: if True, the texture is tileable.
+            - ``seed``: seed of the random choices.
+            - ``corrections``: corrections, as for `texrs.elements.correct`.
 
         Returns
         -------
@@ -188,9 +195,9 @@ class TextureDatabase:
         Raises
         ------
         InvalidInput
-            A name that is taken or cannot be that of a file, or what `texrs.elements.analyse` refuses.
+            The name is taken or cannot be a file name, or `texrs.elements.analyse` refuses the image.
         FileError
-            The file cannot be read, or the entry not written.
+            The file cannot be read, or the entry cannot be written.
 
         Examples
         --------
@@ -208,18 +215,20 @@ class TextureDatabase:
             raise InvalidInput(
                 f"{unknown[0]}: is not an option; must be one of {', '.join(sorted(AnalyseOptions.__annotations__))}"
             )
+        # Use the name of the file, if no name is given, after checking that it is a valid name.
         file = os.path.abspath(os.fspath(image)) if isinstance(image, str | os.PathLike) else None
         if name is None:
             if file is None:
-                raise InvalidInput("name: is needed for an array")
+                raise InvalidInput("name: is required for an array")
             name = FilePath(file).stem
             if not NAME.fullmatch(name):
                 raise InvalidInput(
-                    f"image: {name!r} cannot be the name of a texture, which has letters, digits, '.', '_' and '-'; "
+                    f"image: {name!r} cannot be the name of a texture, only letters, digits, '.', '_' and '-' can; "
                     "give a name"
                 )
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise InvalidInput(f"name: letters, digits, '.', '_' and '-' are allowed, up to 100; got {name!r}")
+            raise InvalidInput(f"name: must be up to 100 letters, digits, '.', '_' and '-', got {name!r}")
+        # Refuse a taken name before the analysis, which is slow.
         pixels = as_image(image) if file is None else io.read(file)
         if not as_bool(replace, "replace"):
             check_free(self._folder.read(), name, hash_image(pixels))
@@ -236,17 +245,17 @@ class TextureDatabase:
         )
 
     def remove(self, name: str) -> None:
-        """Forget a texture: its entry, and the copy of pixels that were given as an array; image files stay.
+        """Remove a texture: its entry, and the copy of pixels that were given as an array. Image files stay.
 
         Parameters
         ----------
         name : str
-            What it is called.
+            Name of the texture.
 
         Raises
         ------
         InvalidInput
-            There is no such texture.
+            The database does not contain the texture.
         FileError
             The folder cannot be written to.
 
@@ -268,18 +277,18 @@ class TextureDatabase:
         except OSError as error:
             raise FileError(f"{self.path}: {name} cannot be removed ({error.strerror})") from None
         if not gone:
-            # Another process was quicker.
+            # Another process removed the texture first, so report that it is missing.
             self._find_record(name)
 
     def analyse(self, name: str, *, progress: Progress | bool | None = None) -> ElementAnalysis:
-        """Return an entry, made anew if its image or the version is another one, or if it is damaged.
+        """Return an entry, analysed again if its image or version has changed, or if it is damaged.
 
         Parameters
         ----------
         name : str
-            Of the texture.
+            Name of the texture.
         progress : callable or True, optional
-            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+            Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
 
         Returns
         -------
@@ -288,9 +297,9 @@ class TextureDatabase:
         Raises
         ------
         InvalidInput
-            There is no such texture.
+            The database does not contain the texture.
         FileError
-            The entry cannot be made anew either, because its image is gone.
+            The entry is damaged or outdated, and cannot be analysed again because its image is missing.
 
         Examples
         --------
@@ -308,20 +317,21 @@ class TextureDatabase:
         entry: ElementAnalysis | None = None
         reason = ""
         if record.version != FORMAT:
-            reason = f"is of version {record.version}, this is {FORMAT}"
+            reason = f"has version {record.version}, not {FORMAT}"
         else:
             try:
                 entry = load(self.path / record.file)
             except TexrsError as error:
                 reason = str(error).removeprefix(f"{self.path / record.file}: ")
+        # A missing image does not matter as long as the entry is valid.
         image = self._read_image(record)
         if image is None:
             if entry is None:
-                raise FileError(f"{self.path / record.file}: {reason}, and its image {record.image} is gone")
+                raise FileError(f"{self.path / record.file}: {reason}, and its image {record.image} is missing")
             return entry
         if entry is not None and hash_image(image) == hash_image(entry.image):
             return entry
-        self._folder.warn(f"{name}: made anew, for the entry {reason or 'is of another image'}")
+        self._folder.warn(f"{name}: analysed again, because the entry {reason or 'is of another image'}")
         options = {k: restore_option(v) for k, v in record.options.items()}
         similar = bool(options.pop("similarity", False))
         entry = analyse(image, progress=progress, **options)
@@ -336,7 +346,7 @@ class TextureDatabase:
         progress: Progress | bool | None = None,
         **options: Unpack[SpliceOptions],
     ) -> Synthesis:
-        """Return the elements of one texture in the arrangement of another.
+        """Splice the elements of one texture into the arrangement of another.
 
         Parameters
         ----------
@@ -345,12 +355,12 @@ class TextureDatabase:
         layout : str
             Name of the texture whose layout they take.
         size : (rows, columns), optional
-            Of the result, in pixels; that of ``elements`` by default.
+            Size of the result in pixels. Default: the size of ``elements``.
         progress : callable or True, optional
-            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+            Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
         **options
-            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.
+            Options of `texrs.splice`: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``, ``align``,
+            ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.
 
         Returns
         -------
@@ -359,7 +369,7 @@ class TextureDatabase:
         Raises
         ------
         InvalidInput
-            There is no such texture, or what `texrs.splice` refuses.
+            The database does not contain a texture, or `texrs.splice` refuses an argument.
 
         Examples
         --------
@@ -387,36 +397,36 @@ class TextureDatabase:
         progress: Progress | bool | None = None,
         **options: Unpack[SpliceOptions],
     ) -> Matrix:
-        """Splice textures with each other, as figure 8 of the paper shows it.
+        """Splice textures with each other, as in figure 8 of the paper.
 
         Parameters
         ----------
         rows : sequence of str, optional
-            Names of the textures whose elements are shown. By default all.
+            Names of the textures that supply the elements. Default: all.
         columns : sequence of str, optional
-            Names of the textures whose arrangement they take. By default all.
+            Names of the textures that supply the arrangement. Default: all.
         size : (rows, columns), optional
-            Of each result.
+            Size of each result in pixels. Default: the size of the texture that supplies the elements.
         cell : int
-            Side of a picture on the sheet, 16 to 1024.
+            Side of a thumbnail on the sheet in pixels, 16 to 1024. Default: 160.
         each : callable, optional
-            Called as ``each(a, b, result)`` with each splice when it is made, to write it, say: then none is kept, and memory
-            is that of one and of about 256 MB of entries, however many there are.
+            Function called as ``each(a, b, result)`` after each splice, for example to write it. Results are then not
+            kept. Memory is limited to one result and about 256 MB of entries, for any number of splices.
         progress : callable or True, optional
-            Called as ``progress("matrix", share)``; raising stops the work. True shows a bar.
+            Function called as ``progress("matrix", share)``; raising stops the work. True shows a bar.
         **options
-            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.
+            Options of `texrs.splice`: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``, ``align``,
+            ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.
 
         Returns
         -------
         Matrix
-            What could not be spliced is named with the reason, and grey on the sheet.
+            Splices, their contact sheet, and the reasons for missing ones, which are grey on the sheet.
 
         Raises
         ------
         InvalidInput
-            There is no such texture, or an option that `texrs.splice` has not.
+            The database does not contain a texture, or `texrs.splice` does not have an option.
         Cancelled
             The work was stopped.
 
@@ -435,7 +445,7 @@ class TextureDatabase:
         progress = listen(progress)
         if each is not None:
             if not callable(each):
-                raise InvalidInput(f"each: needs a function to call, or None; got {each!r}")
+                raise InvalidInput(f"each: must be a function or None, got {each!r}")
             check_call(each, "each", "a", "b", "result")
         side = as_int(cell, "cell", 16, 1024)
         down, across = (self._choose(names, which) for names, which in ((rows, "rows"), (columns, "columns")))
@@ -444,6 +454,7 @@ class TextureDatabase:
         results: dict[tuple[str, str], Synthesis] = {}
         failed: dict[tuple[str, str], str] = {}
         sheet = ContactSheet(len(down), len(across), side)
+        # Draw the textures themselves along the left and upper edges of the sheet.
         for j, b in enumerate(across, start=1):
             with answering(progress, "matrix", 0.0):
                 sheet.put(0, j, read(b).image)
@@ -457,6 +468,7 @@ class TextureDatabase:
                 try:
                     with answering(progress, "matrix", share):
                         made = splice(read(a), read(b), size, **options)
+                # A limit stops the matrix, but a pair that cannot be spliced is only reported.
                 except LimitExceeded:
                     raise
                 except InvalidInput as error:
@@ -476,19 +488,19 @@ class TextureDatabase:
         found = self._folder.read()
         if not isinstance(name, str) or name not in found:
             there = ", ".join(sorted(found)[:8]) or "none"
-            raise InvalidInput(f"name: there is no texture {name!r} in {self.path}; there are {there}")
+            raise InvalidInput(f"name: texture {name!r} is not in {self.path}; must be one of {there}")
         return found[name]
 
     def _choose(self, names: Sequence[str] | None, which: str) -> tuple[str, ...]:
-        """Return names that are there; all by default."""
+        """Return existing names; all of them by default."""
         if isinstance(names, str):
-            raise InvalidInput(f"{which}: needs several names, got {names!r}")
+            raise InvalidInput(f"{which}: must be a sequence of names, got {names!r}")
         chosen = []
         for name in self if names is None else as_items(names, which):
             self._find_record(name)
             chosen.append(name)
         if not chosen:
-            raise InvalidInput(f"{which}: no textures to splice")
+            raise InvalidInput(f"{which}: must be at least one name, got none")
         return tuple(chosen)
 
     def _read_entry(self, kept: Cache[str, ElementAnalysis], name: str) -> ElementAnalysis:
@@ -502,6 +514,6 @@ class TextureDatabase:
 
 
 def count_bytes(entry: ElementAnalysis) -> int:
-    """Return the bytes of the arrays of an entry."""
+    """Return the size of an entry's arrays in bytes."""
     arrays = (entry.image, entry.points, entry.mask, entry.scores, entry.angles, entry.scales, entry.sets)
     return sum(array.nbytes for array in arrays if array is not None)
