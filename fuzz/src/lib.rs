@@ -141,7 +141,11 @@ pub fn agreed<T: Debug + Send>(work: impl Fn(&Monitor) -> Result<T> + Sync) -> O
     match (one, two) {
         (Ok(one), Ok(two)) => {
             // Floats are printed exactly, and all NaN values compare equal.
-            assert_eq!(format!("{one:?}"), format!("{two:?}"), "one thread and two threads differ");
+            assert_eq!(
+                format!("{one:?}"),
+                format!("{two:?}"),
+                "one thread and two threads differ"
+            );
             Some(one)
         }
         (Err(one), Err(two)) => {

@@ -68,6 +68,7 @@ pub(super) fn inpaint<'py>(
         };
         fill(&mut canvas, index, &options, monitor)
     })?;
+    // Return each patch as a row of five numbers.
     let patches: Vec<i64> = filled
         .patches
         .iter()

@@ -15,7 +15,7 @@ pub struct Padding<const D: usize> {
 impl<const D: usize> Padding<D> {
     pub(super) fn new(colours: &[Colour], grid: &Grid<D>, rim: usize) -> Self {
         let wide = Grid::new(grid.shape().map(|n| n + 2 * rim), [false; D])
-            .expect("an exemplar that fits, so its rim does");
+            .expect("an exemplar whose margin fits");
         let colours = (0..wide.len())
             .map(|i| {
                 let sample = wide.point(i);

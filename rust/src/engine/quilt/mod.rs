@@ -131,7 +131,7 @@ impl<'a> Quilt<'a> {
         };
         let channels = first.colours.len() / (first.shape[0] * first.shape[1]).max(1);
         memory::room("a quilt", points, 20)?;
-        memory::room("the pictures of a quilt", count * channels, 16)?;
+        memory::room("the images of a quilt", count * channels, 16)?;
         for got in [
             pixels.exemplar.len(),
             pixels.coordinates.len(),

@@ -273,7 +273,9 @@ impl<const D: usize> Stitching<'_, D> {
                 self.instance(canvas.patches[p], canvas.places[p]) == Some(instance.key)
             })
             .collect();
+        // The patch must show at least the rest of the element, or cover all that is visible of it.
         let core = if grow {
+            // Find the points of the complete element, and extend them by one point to keep its outline.
             let whole: Vec<bool> = (0..n)
                 .map(|i| {
                     chart.mask[i]
@@ -296,6 +298,7 @@ impl<const D: usize> Stitching<'_, D> {
         if !core.contains(&true) {
             return Ok(None);
         }
+        // Cut the patch in, and count the points that each instance gains or loses.
         let view = (self.cutter).view(canvas, &chart.window, &chart.mask, &core);
         let cutting = self.cutter.cut(&view, &proposal, self.monitor)?;
         let mut changes: Vec<(Key, i64)> = Vec::new();
@@ -314,6 +317,7 @@ impl<const D: usize> Stitching<'_, D> {
                 change(self.instance(patch, proposal.places[i]), 1);
             }
         }
+        // The move is worth it if the seams, the balance and the instances together cost less.
         let source = self.cutter.source();
         let balance = self.balance.after(
             source,

@@ -50,6 +50,7 @@ impl<const D: usize> Mesh<D> {
                 }
             }
         };
+        // The wanted difference of two nodes, from the mean of their frames.
         let slope = |axis: usize, i: usize, j: usize| {
             let both = f64::from(self.frames[i][row][axis]) + f64::from(self.frames[j][row][axis]);
             both * 0.5 / f64::from(ONE) * self.spacing[axis]
@@ -75,6 +76,7 @@ impl<const D: usize> Mesh<D> {
             .collect();
         let (mut residual, mut image) = (vec![0.0; n], vec![0.0; n]);
         apply(&x, &mut image);
+        // The residual is the right-hand side minus the operator at the start.
         edges(&mut |axis, i, j| {
             let d = slope(axis, i, j) * weight(axis);
             residual[j] += d;
@@ -84,6 +86,7 @@ impl<const D: usize> Mesh<D> {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let mut direction = residual.clone();
         let mut norm = dot(&residual, &residual);
+        // Iterate conjugate gradients until the residual is negligible.
         for _ in 0..STEPS {
             if norm < 1e-8 {
                 break;

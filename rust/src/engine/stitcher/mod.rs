@@ -174,9 +174,10 @@ pub fn stitch<const D: usize>(
     check(region, frames, given, options)?;
     // The search needs spectra of the exemplar and of templates of its size.
     let spectra = source.grid().len().saturating_mul(source.channels() + 4);
-    memory::room("what patches are searched in", spectra, 24)?;
+    memory::room("the patch search", spectra, 24)?;
     memory::room("the stitched region", region.grid.len(), 24 * D)?;
     let mut canvas = Canvas::new(region.grid, matches!(frames, Frames::Dense(_)))?;
+    // Place the given points on the canvas.
     for (p, _) in given.points.iter().enumerate().filter(|(_, held)| **held) {
         let stays = !given.loose.get(p).is_some_and(|&loose| loose);
         canvas.patches[p] = if stays { HELD } else { LOOSE };
@@ -203,10 +204,12 @@ pub fn stitch<const D: usize>(
         laid: 0,
         monitor,
     };
+    // Fill, cover the worst seams again, and heal torn elements.
     this.fill()?;
     this.recover(this.patches.len(), options.patch)?;
     let healed = if options.heal { this.heal()? } else { 0 };
     let mut canvas = this.canvas;
+    // Patches may exceed the end of a periodic axis, so wrap their coordinates.
     for place in &mut canvas.places {
         *place = bring_around(source.grid(), *place);
     }

@@ -273,6 +273,7 @@ pub(super) mod v3 {
                         avx._mm256_add_ps(distance, square)
                     };
                 }
+                // Select the samples within the limit and inside the window.
                 let mut mask = avx._mm256_cmp_ps::<_CMP_LE_OQ>(distance, limit);
                 if block + 1 == blocks {
                     mask = avx._mm256_and_ps(mask, last);

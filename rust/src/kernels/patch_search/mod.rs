@@ -180,7 +180,7 @@ impl Index {
     ) -> Result<Self> {
         // Check the memory, then plan blocks for the largest patch that fits.
         let samples = exemplars.iter().map(|e| e.data.len()).sum();
-        memory::room("what patches are searched in", samples, 24)?;
+        memory::room("the patch search", samples, 24)?;
         let longest = |axis: usize| exemplars.iter().map(|e| e.shape[axis]).max().unwrap_or(1);
         let max_patch = [max_patch[0].min(longest(0)), max_patch[1].min(longest(1))];
         let shapes: Vec<_> = exemplars.iter().map(|e| e.shape).collect();

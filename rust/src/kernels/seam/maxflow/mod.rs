@@ -214,6 +214,7 @@ impl<const D: usize> Solver<D> {
         self.orphans.clear();
         self.time = 0;
         self.value = 0;
+        // Nodes need the flags of their ends only if an axis wraps.
         let cyclic = layout.cyclic.contains(&true);
         let shape = graph.grid.shape();
         let mut bad = None;
@@ -258,6 +259,7 @@ impl<const D: usize> Solver<D> {
                 }
             }
         });
+        // The closure above cannot return an error, so report an invalid pair here.
         match bad {
             None => Ok(()),
             Some((axis, at, f, b)) => Err(Error::value(
