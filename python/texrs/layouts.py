@@ -1,8 +1,8 @@
-"""Drawn layouts: points, lattices, cells and courses that elements are arranged in.
+"""Drawn layouts: points, lattices, cells and courses as arrangements of elements.
 
-Each is a `texrs.elements.ElementAnalysis` like that of an image, with a drawing of the layout as its image. It can be
-the second argument of `texrs.splice`, and an entry of a `texrs.TextureDatabase`. `from_dict` makes one from a
-description in plain JSON types, as the command line does.
+Each layout is a `texrs.elements.ElementAnalysis` like that of an image, with a drawing of the layout as its image. It
+can be the second argument of `texrs.splice`, and an entry of a `texrs.TextureDatabase`. `from_dict` creates a layout
+from a description in plain JSON types, as the command line does.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ Points = NDArray[np.float64]
 GROUND, ELEMENT = 208, 72
 """Grey values of the background and of the elements in the drawing."""
 DISC = 0.35
-"""Radius of a drawn point, as a share of the usual distance to the nearest point."""
+"""Radius of a drawn point, as a share of the median distance to the nearest point."""
 SHORTEST = 16
-"""Minimum pixels along a side."""
+"""Minimum side of a drawing, in pixels."""
 LARGEST = 1 << 24
-"""Maximum pixels of a drawing."""
+"""Maximum number of pixels of a drawing."""
 MOST = 1 << 18
 """Maximum number of points or bricks."""
 
@@ -46,7 +46,7 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
         Size of the drawing, sides of at least 16. With ``texrs.splice(layout_scale=1)`` its pixels are those of the
         result.
     wrap : bool or (bool, bool)
-        If True, the layout repeats along rows and columns.
+        If True, the layout repeats along rows and columns. Default: False.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     Raises
     ------
     InvalidInput
-        If there are too few points, or some are outside.
+        There are too few points, or some are outside or equal.
 
     Examples
     --------
@@ -92,14 +92,15 @@ def lattice(
     *,
     origin: Sequence[float] | None = None,
 ) -> ElementAnalysis:
-    """Return the points of a lattice, which continues beyond the drawing.
+    """Return a layout of the points of a lattice, which continues beyond the drawing.
 
     Parameters
     ----------
     size : int or (rows, columns)
         Size of the drawing, sides of at least 16.
     first, second : (row, column)
-        Vectors from a point to two of its neighbours, in pixels: ``(0, 20)`` and ``(17.3, 10)`` for hexagons.
+        Vectors from a point to two of its neighbours, in pixels. Hexagons have, for example, ``(0, 20)`` and ``(17.3,
+        10)``.
     origin : (row, column), optional
         One of the points. Default: the middle of the drawing.
 
@@ -111,7 +112,7 @@ def lattice(
     Raises
     ------
     InvalidInput
-        If the vectors are parallel, or the drawing contains fewer than three or too many points.
+        The vectors are parallel, or the drawing contains fewer than three or too many points.
 
     Examples
     --------
@@ -130,6 +131,7 @@ def lattice(
     if np.prod(shape) / area > MOST:
         raise InvalidInput(f"first, second: must give at most {MOST} points in {shape}; use longer vectors")
     middle = (np.array(shape) - 1) / 2 if origin is None else np.array(_as_pair(origin, "origin"))
+    # The coordinates of the corners in the basis bound the indices of all visible points.
     corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)]) - middle
     ends = corners @ np.linalg.inv(basis)
     low, high = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)
@@ -147,10 +149,10 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> ElementAnaly
     Parameters
     ----------
     labels : (H, W) array of int
-        Cell of each pixel, any positive number; 0 is joint. There must be at least three cells, and sides of at least
-        16.
+        Cell of each pixel, any positive number; 0 is a joint. There must be at least three cells, and sides of at
+        least 16.
     wrap : bool or (bool, bool)
-        If True, the layout repeats along rows and columns.
+        If True, the layout repeats along rows and columns. Default: False.
 
     Returns
     -------
@@ -160,7 +162,7 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> ElementAnaly
     Raises
     ------
     InvalidInput
-        If there are fewer than three labels.
+        There are fewer than three labels.
 
     Examples
     --------
@@ -193,24 +195,25 @@ def courses(
     joint: float = 2.0,
     seed: int = 0,
 ) -> ElementAnalysis:
-    """Return a wall of courses of bricks or stones. Each course is independent of the others.
+    """Return a layout of courses of bricks or stones, each independent of the others.
 
     Parameters
     ----------
     size : int or (rows, columns)
         Size of the drawing, sides of at least 16.
     height : float, or sequence of float
-        Height of a course in pixels, joint included, at least 4. Several heights repeat in order.
+        Height of a course in pixels, including the joint, at least 4. Several heights repeat in order.
     length : float
-        Usual length of a brick in pixels, joint included, at least 4.
+        Mean length of a brick in pixels, including the joint, at least 4.
     shift : float
-        Shift of each course against the one above, in brick lengths: 0.5 is a running bond, 0 a stack.
+        Shift of each course relative to the course above, in brick lengths: 0.5 is a running bond, 0 a stack. Default:
+        0.5.
     vary : float
-        Variation of lengths, 0 to 0.9: bricks are ``1 - vary`` to ``1 + vary`` times the usual length.
+        Variation of lengths, 0 to 0.9: bricks are ``1 - vary`` to ``1 + vary`` times the mean length. Default: 0.
     joint : float
-        Width of the joints in pixels, 0 to half of the height.
+        Width of the joints in pixels, 0 to half of the height and of the shortest length. Default: 2.
     seed : int
-        Seed that chooses varying lengths.
+        Seed of the varying lengths. Default: 0.
 
     Returns
     -------
@@ -220,7 +223,7 @@ def courses(
     Raises
     ------
     InvalidInput
-        If a number is out of its range, or so large that fewer than three bricks are visible.
+        A number is out of its range, or so large that fewer than three bricks are visible.
 
     Examples
     --------
@@ -241,6 +244,7 @@ def courses(
         raise InvalidInput(f"height, length: must give at most {MOST} bricks in {shape}; use larger ones")
     noise, labels = np.random.default_rng(number), np.zeros(shape, np.int32)
     rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
+    # Label the courses from the top. Each course begins up to one brick to the left of the drawing.
     top, course, count = 0.0, 0, 0
     while top < shape[0]:
         tall = heights[course % len(heights)]
@@ -256,13 +260,14 @@ def courses(
 
 
 def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
-    """Make a layout from a description in plain JSON types.
+    """Create a layout from a description in plain JSON types.
 
     Parameters
     ----------
     description : mapping
-        ``{"layout": "points", "places": [[row, column], ...], "size": [128, 128]}``, or ``"lattice"``, ``"cells"`` or
-        ``"courses"`` with the arguments of the function of that name.
+        Name and arguments of a layout: ``{"layout": "points", "places": [[row, column], ...], "size": [128, 128]}``.
+        The other layouts are ``"lattice"``, ``"cells"`` and ``"courses"``, with the arguments of the function of that
+        name.
 
     Returns
     -------
@@ -271,7 +276,7 @@ def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
     Raises
     ------
     InvalidInput
-        If the layout does not exist, or has no such argument, or the argument is out of range.
+        The layout or one of its arguments does not exist, or an argument is out of range.
 
     Examples
     --------
@@ -332,7 +337,7 @@ def _draw_points(at: Points, shape: tuple[int, int], wrap: tuple[bool, bool]) ->
     grid = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)
     far, nearest = cKDTree(at).query(grid, distance_upper_bound=radius)
     owner: Labels = np.where(np.isfinite(far), nearest + 1, 0).reshape(shape).astype(np.int32)
-    # A point whose disc is below others keeps its pixel.
+    # Give each point its own pixel, even if other discs cover it.
     pixel = np.clip(np.rint(at), 0, np.array(shape) - 1).astype(np.intp)
     owner[pixel[:, 0], pixel[:, 1]] = np.arange(1, len(at) + 1)
     image = np.where(owner > 0, ELEMENT, GROUND).astype(np.uint8)
