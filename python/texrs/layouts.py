@@ -77,6 +77,7 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     at = np.asarray(at, np.float64)
     if not 3 <= len(at) <= MOST:
         raise InvalidInput(f"places: must be between 3 and {MOST} points, got {len(at)}")
+    # Pixels extend half a pixel around their centres.
     outside = ((at < -0.5) | (at > np.array(shape) - 0.5)).any(axis=1)
     if outside.any():
         raise InvalidInput(f"places: must be inside the size {shape}, got {at[outside][0].tolist()}")
@@ -181,6 +182,7 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> ElementAnaly
     check_memory(4 * given.size, "labels")
     image = np.full(given.shape, GROUND, np.uint8)
     found = ElementAnalysis.of_labels(image, given, layout=Layout.JOINTED, wrap=wrap)
+    # Draw dark joints between light cells, even if the labels contain no joints.
     image[~found.mask] = ELEMENT
     return found
 
@@ -293,6 +295,7 @@ def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
         )
     function = _MADE[description["layout"]]
     given = {str(name): value for name, value in description.items() if name != "layout"}
+    # Check the arguments here, because a TypeError of the call would not name the layout.
     known = inspect.signature(function).parameters
     for name in given:
         if name not in known:

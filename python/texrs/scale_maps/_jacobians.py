@@ -69,15 +69,15 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
 
     A surface is foreshortened by the cosine of its slant, along the slope. Across the slope, elements keep their size.
     The texture is not rotated: horizontal lines stay horizontal, as on a cloth that is laid on the surface. For a
-    surface that can be unrolled along its axis, such as a cylinder, this is exactly how a flat texture wraps around
-    it. For others, such as a ball, it is an approximation.
+    surface that can be unrolled along its axis, such as a cylinder, this is how a flat texture wraps around it.
+    For others, such as a ball, it is an approximation.
 
     Parameters
     ----------
     normals : (rows, columns, 3) array
-        Normals: x to the right, y up, z towards the viewer. Integers mean 2 v - 1, as in a normal map. Floats mean 2 v
-        - 1 too if they are never negative and do not have length 1. Zeros and NaN mark pixels without a surface, which
-        count as seen from the front.
+        Normals: x to the right, y up, z towards the viewer. Integers mean 2 v - 1, as in a normal map. Floats that are
+        never negative and do not have length 1 are decoded in the same way. Zeros and NaN mark pixels without a surface,
+        which count as seen from the front.
     green : {"up", "down"}
         Direction of y: "up" (OpenGL) or "down" (DirectX). Default: "up".
 
