@@ -266,7 +266,7 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
     ("value", "axes", "words"),
     [
         (np.zeros((4, 4)), 3, "field: needs a field of 3 axes, got ndarray"),
-        (np.zeros((4, 4, 4, 4)), 3, r"field: needs directions \(R, C, 2\) or \(P, R, C, 3\), or frames"),
+        (np.zeros((4, 4, 4, 4)), 3, r"field: must be directions, \(R, C, 2\) or \(P, R, C, 3\), or frames"),
         (np.ones((4, 4, 2)), 3, r"field: holds \(4, 4, 2\), a field of 2 axes; 3 are needed"),
         (np.zeros((4, 4, 4, 3)), 3, "directions: all have length 0"),
         (7, 3, "field: needs a field of 3 axes, got int"),
@@ -275,7 +275,7 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
         ("flow.npy:up=1x", 3, "up= needs three numbers"),
         ("flow.npy:signed=1", 3, "signed= needs yes or no"),
         ("flow.npy:along=w", 3, "along: must be one of z, y, x"),
-        ("cubes.npy", 3, "cubes.npy: needs directions"),
+        ("cubes.npy", 3, "cubes.npy: must be directions"),
     ],
 )
 def test_what_is_no_field(

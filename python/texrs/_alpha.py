@@ -54,7 +54,7 @@ def multiply(pixels: Array, name: str) -> Array:
 def divide(pixels: Array, name: str) -> Array:
     """Return linear colours of an EXR file divided by their alpha.
 
-    They stay as they are if clear pixels show that the file is not multiplied by alpha.
+    They do not change if clear pixels show that the file is not multiplied by alpha.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def divide(pixels: Array, name: str) -> Array:
 
 
 def undo(pixels: Array) -> Array:
-    """Return linear colours divided by their alpha. Clear pixels stay as they are.
+    """Return linear colours divided by their alpha. Clear pixels do not change.
 
     Examples
     --------

@@ -229,7 +229,7 @@ def write_image(
         grids.append(grids[-1].halved())
     start, apart = tuple(origin or (0,) * axes), (1.0,) * axes
     if spacing is not None:
-        steps = as_tuple(spacing, "spacing", axes, f"{axes} numbers, one an axis")
+        steps = as_tuple(spacing, "spacing", axes, f"{axes} numbers, one for each axis")
         apart = tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
     if unit is not None:
         as_instance(unit, "unit", str)
