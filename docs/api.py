@@ -58,7 +58,7 @@ TASKS = (
         ("Synthesis", "SourceMap", "RenderOptions", "CopyStatistics", "ResultList"),
         ("metrics",),
     ),
-    Task("Pictures to train on", ("augment",), (), ("transforms",)),
+    Task("Images to train on", ("augment",), (), ("transforms",)),
     Task("Files", ("files",), (), ("io",)),
     Task("Limits, threads and errors", ("batch",), ("threads",), ("limits", "errors")),
     Task("Kernels", (), (), ("kernels",)),
@@ -76,12 +76,12 @@ def list_modules() -> list[ModuleType]:
 
 
 def list_names(task: Task) -> dict[str, list[str]]:
-    """Return the modules of a task and the full names of the functions and classes in them; first those of texrs itself."""
+    """Return the full names of the functions and classes of a task by module, first those of texrs itself."""
     found = {"": [f"texrs.{name}" for name in task.names]}
     for module in list_modules():
         path = module.__name__
         if path.split(".")[1:2] and path.split(".")[1] in task.modules:
-            # A name that texrs itself has is described there.
+            # Skip names that texrs itself exports, because they are listed there.
             values = [(n, getattr(module, n)) for n in module.__all__ if not n.startswith("_")]
             own = [n for n, v in values if is_described(v) and getattr(texrs, n, None) is not v]
             found[path] = [f"{path}.{n}" for n in own]
@@ -89,7 +89,7 @@ def list_names(task: Task) -> dict[str, list[str]]:
 
 
 def is_described(value: object) -> bool:
-    """Return whether a value has a page: a function or a class."""
+    """Return whether a value is a function or a class, which have a page each."""
     return not isinstance(value, ModuleType) and (inspect.isroutine(value) or inspect.isclass(value))
 
 
@@ -102,7 +102,7 @@ def find(name: str) -> Any:
 
 
 def check_tasks() -> list[str]:
-    """Return the public names that no task has, or that several have."""
+    """Return a message for each public name that is in no task or in several tasks."""
     listed = [name for task in TASKS for names in list_names(task).values() for name in names]
     public = [f"texrs.{n}" for n in texrs.__all__ if is_described(getattr(texrs, n))]
     modules = [m for n in texrs.__all__ if isinstance(m := getattr(texrs, n), ModuleType)]
@@ -171,7 +171,7 @@ def make_page(name: str) -> str:
 def take_summary(value: object) -> str:
     """Return the first paragraph of a docstring."""
     text = (inspect.getdoc(value) or "").partition("\n\n")[0]
-    # References are below the docstring, not beside the summary.
+    # Drop marks of references, because the table does not contain the list of references.
     return re.sub(r"\s*\[\d+\]_", "", " ".join(text.split()))
 
 
@@ -229,7 +229,7 @@ def read_parameters(function: object) -> Iterator[tuple[str, str, str]]:
 
 
 def list_rows(function: Callable[..., Any], options: dict[str, str]) -> Iterator[tuple[str, ...]]:
-    """Return the rows of a table: the parameter, its option, what it means, its unit, its range and its default."""
+    """Return the rows of a table: parameter, option, meaning, unit, range and default."""
     known = inspect.signature(function).parameters
     for name, kind, text in read_parameters(function):
         if name not in known or name == "progress":
@@ -249,16 +249,16 @@ def list_rows(function: Callable[..., Any], options: dict[str, str]) -> Iterator
 
 
 def show_default(value: object) -> str:
-    """Return a default as it is written; nothing for None."""
+    """Return a default value as code, or an empty string for None."""
     if value is inspect.Parameter.empty:
-        return "must be given"
+        return "required"
     value = value.value if isinstance(value, enum.Enum) else value
     plain = value is True or value is False or isinstance(value, str | int | float | tuple | list)
     return "" if value is None else f"`{value!r}`" if plain else f"`{type(value).__name__}()`"
 
 
 def list_options() -> dict[str, dict[str, str]]:
-    """Return the option for each parameter of the verbs that are commands; fields of a dataclass by its class."""
+    """Return the options of each command by parameter. Fields of a dataclass are listed under its class."""
     from texrs.cli import COMMANDS, make_command
 
     found = {}
@@ -289,12 +289,12 @@ def make_tables(names: tuple[str, ...], options: dict[str, dict[str, str]]) -> s
 
 
 def as_markdown(text: str) -> str:
-    """Return a cell of a docstring in Markdown."""
+    """Return text of a docstring as a table cell in Markdown."""
     return text.replace("``", "`").replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
 
 
 def write_tables(folder: Path) -> None:
-    """Write a page for each guide, to be included in it."""
+    """Write the tables of parameters of each guide as a page that the guide includes."""
     folder.mkdir(parents=True, exist_ok=True)
     options = list_options()
     for guide, names in TABLES.items():

@@ -1,4 +1,4 @@
-"""How the documentation is built: `make docs`. Pages that say what the code says are made from the code."""
+"""Sphinx configuration of the documentation, which `make docs` builds. Reference pages are generated from the code."""
 
 import sys
 from pathlib import Path
@@ -30,7 +30,7 @@ exclude_patterns = [
     "generated/gallery/*.py",
 ]
 default_role = "py:obj"
-# Options begin with two dashes.
+# Smart quotes would replace the two dashes of options.
 smartquotes = False
 myst_enable_extensions = ["deflist", "colon_fence"]
 myst_heading_anchors = 3
@@ -47,7 +47,7 @@ html_static_path = ["static"]
 html_extra_path = ["generated/extra"]
 html_css_files = ["texrs.css"]
 html_show_sourcelink = False
-# Pages that no section holds.
+# Pages outside of all sections, which have no sidebar.
 ALONE = ("index", "install", "five-minutes", "promises", "coming-from", "conventions", "help", "genindex", "search")
 MADE = ("words", "comparison", "performance", "commands", "results", "messages")
 html_sidebars = {name: [] for name in (*ALONE, *(f"generated/{name}" for name in MADE))}
@@ -73,7 +73,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "remove_config_comments": True,
     "reset_modules": ("matplotlib",),
-    # Its page loads tables from elsewhere.
+    # The page of computation times would load scripts from another server.
     "write_computation_times": False,
     "show_memory": False,
     "show_signature": False,

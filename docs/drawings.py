@@ -1,4 +1,4 @@
-"""Drawings that explain: one for each idea, beside a true result; and each paper as printed beside what the verb does."""
+"""Drawings for the pages of ideas and papers: each idea with a real result, and each paper as printed and by default."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Panels = Any
 
 
 def lay(count: int, width: float = 11.0) -> tuple[Any, Panels]:
-    """Return a figure and its panels, side by side."""
+    """Return a figure and its panels in one row."""
     figure, panels = plt.subplots(1, count, figsize=(width, width / count + 0.45), layout="constrained")
     return figure, np.atleast_1d(panels)
 
 
 def stack(figure: Any) -> None:
-    """Put its panels below each other, for a phone."""
+    """Put the panels of a figure below each other, for a phone."""
     for panel, place in zip(figure.axes, figure.add_gridspec(len(figure.axes), 1), strict=True):
         panel.set_subplotspec(place)
     figure.set_size_inches(3.2, 3.4 * len(figure.axes))
@@ -41,7 +41,7 @@ def show(panel: Any, image: Any, title: str, **options: Any) -> None:
 
 
 def colour_places(coordinates: Any, shape: tuple[int, ...]) -> Any:
-    """Show places in an example as colours: further down is redder, further right greener."""
+    """Show positions in an example as colours: red increases downwards, green increases to the right."""
     red, green = (coordinates[..., axis] / (shape[axis] - 1) for axis in (0, 1))
     return np.clip(np.stack([red, green, np.full_like(red, 0.45)], axis=-1), 0, 1)
 
@@ -55,7 +55,7 @@ def source_map() -> Any:
     source = made.source_map
     figure, panels = lay(4)
     show(panels[0], sample.image, "the example")
-    show(panels[1], made.image, "the result: three of its pixels")
+    show(panels[1], made.image, "the result, with three pixels")
     for row, column in ((26, 59), (57, 89), (84, 70)):
         there = source.coordinates[row, column][::-1]
         panels[0].plot(*there, "o", ms=6, mfc="none", mec=ACCENT, mew=2)
@@ -73,9 +73,9 @@ def source_map() -> Any:
                 arrowstyle="->",
             )
         )
-    show(panels[2], colour_places(source.coordinates, sample.image.shape), "the source map: places as colours")
+    show(panels[2], colour_places(source.coordinates, sample.image.shape), "the source map, as colours")
     labels = source.render(sample.labels, interpolation="nearest")
-    show(panels[3], volume.label_to_color(labels), "labels, through the same map")
+    show(panels[3], volume.label_to_color(labels), "labels through the source map")
     key = panels[2].inset_axes((0.02, 0.03, 0.22, 0.3))
     place = np.stack(np.meshgrid(range(112), range(112), indexing="ij"), axis=-1)
     show(key, colour_places(place, (112, 112)), "")
@@ -95,7 +95,7 @@ def element() -> Any:
     dots = texrs.ElementAnalysis.of_sample(samples.dots((128, 128)))
     one = min(dots.instances, key=lambda i: np.hypot(i.centre[0] - 64, i.centre[1] - 64))
     row, column = one.centre
-    show(panels[3], dots.image, "one: its mask, box and surroundings")
+    show(panels[3], dots.image, "an element: mask, box, surroundings")
     panels[3].contour(
         np.pad(one.mask, 1),
         [0.5],
@@ -135,11 +135,11 @@ def scale_map() -> Any:
     side.plot([screen, screen], [0.2, 2.3], color=INK, lw=1)
     side.plot(*eye, "o", color=INK, ms=8)
     side.text(0.1, 2.15, "eye", fontsize=9)
-    side.text(screen + 0.1, 2.15, "picture", fontsize=9)
+    side.text(screen + 0.1, 2.15, "image", fontsize=9)
     side.set_xlim(-0.3, 7)
     side.set_ylim(-0.8, 3)
     side.set_axis_off()
-    show(panels[1], floor.image, "a floor, and its sizes as circles")
+    show(panels[1], floor.image, "a floor, with sizes as circles")
     for row in (20, 60, 105, 160):
         for column in (40, 96, 152):
             panels[1].add_patch(plt.Circle((column, row), 10 * scale[row, column], fill=False, ec="white", lw=2))
@@ -151,7 +151,7 @@ def scale_map() -> Any:
     show(
         panels[3],
         texrs.perspective(floor.image, scale, target=hill, seed=3).image,
-        "grown for another: large in the middle",
+        "the result for another scale map",
     )
     return figure
 
@@ -171,7 +171,7 @@ def frame_field() -> Any:
                 color=colour, width=0.012,
             )  # fmt: skip
 
-    show(panels[0], example, "the example, and its axes")
+    show(panels[0], example, "the example, with its axes")
     panels[0].quiver(
         [30, 30], [30, 30], [0, 50], [50, 0], angles="xy", scale_units="xy", scale=1, color=[ACCENT, BLUE], width=0.02
     )
@@ -179,10 +179,10 @@ def frame_field() -> Any:
     panels[1].set_xlim(0, size)
     panels[1].set_ylim(size, 0)
     panels[1].set_aspect("equal")
-    show(panels[1], np.ones((size, size, 3)), "a field: where these axes go")
+    show(panels[1], np.ones((size, size, 3)), "the field: axes at each point")
     draw(panels[1], grid, 24)
-    show(panels[2], made.image, "the texture that follows it")
-    show(panels[3], made.image, "one above the other")
+    show(panels[2], made.image, "the result")
+    show(panels[3], made.image, "the result, with the field")
     draw(panels[3], grid[::2], 24)
     return figure
 
@@ -191,7 +191,7 @@ def wrap() -> Any:
     gravel = samples.photograph("brick").image[:192, :192]
     figure, panels = lay(4)
     tile, along = texrs.tile(gravel).image, texrs.tile(gravel, wrap=(False, True)).image
-    show(panels[0], tile, "wrap: what leaves comes in again", cmap="gray")
+    show(panels[0], tile, "opposite borders are joined", cmap="gray")
     rows, columns = tile.shape[:2]
     arrow = {"arrowstyle": "-|>", "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
     for at, colour in ((0.3, ACCENT), (0.7, ACCENT)):
@@ -213,7 +213,7 @@ def wrap() -> Any:
     for panel, image, title in zip(
         panels[1:],
         (gravel, along, tile),
-        ("as photographed, 2 × 2", "cyclic to the sides alone, 2 × 2", "cyclic along both, 2 × 2"),
+        ("the photograph, 2 × 2", "periodic along x only, 2 × 2", "periodic along x and y, 2 × 2"),
         strict=True,
     ):
         show(panel, np.tile(image, (2, 2)), title, cmap="gray")
@@ -235,15 +235,15 @@ Measured = list[tuple[str, str, str]]
 
 
 def tell(figures: dict[str, Any], names: dict[str, str]) -> Measured:
-    """Return rows of a table: what, as printed, by default."""
+    """Return rows of a table: measure, value as printed, value by default."""
     return [(words, *(f"{getattr(figures[m], name):.3f}" for m in (PRINTED, OURS))) for name, words in names.items()]
 
 
 JUDGED = {
-    "torn": "seams inside of elements, as a share of their outlines",
-    "broken": "lines that break off at seams",
-    "seam_blur": "detail that is missing beside seams",
-    "repetition": "what is shown again exactly alike",
+    "torn": "length of seams inside elements, divided by the length of outlines",
+    "broken": "share of lines that break off at seams",
+    "seam_blur": "share of detail that is missing next to seams",
+    "repetition": "exact repetition; 1 is the value of random patches",
 }
 
 
@@ -273,7 +273,7 @@ def perspective() -> tuple[Any, Measured]:
         for name, options in ((PRINTED, {"method": "paper"}), (OURS, {}))
     }
     figures = {name: evaluate(floor.image, each.source_map) for name, each in made.items()}
-    given = [("the example", floor.image), ("the scale asked for", scale_maps.picture(turned))]
+    given = [("the example", floor.image), ("the target scale map", scale_maps.picture(turned))]
     return compare(given, [(n, m.image) for n, m in made.items()]), tell(
         figures, {n: JUDGED[n] for n in ("torn", "broken")}
     )
@@ -287,7 +287,7 @@ def solid() -> tuple[Any, Measured]:
         for name, options in ((PRINTED, {"method": "paper"}), (OURS, {}))
     }
     figures = {name: volume.integrity(stone, each.source_map) for name, each in made.items()}
-    names = {"torn": "share of the voxels in elements that are torn", "crumbs": "crumbs of elements, in 100 000 voxels"}
+    names = {"torn": "share of element voxels in torn elements", "crumbs": "crumbs of elements in 100 000 voxels"}
     shown = [(n, volume.render_block(m.image, 320)) for n, m in made.items()]
     return compare([("the example", volume.render_block(stone, 240))], shown), tell(figures, names)
 
@@ -297,7 +297,7 @@ PAPERS: tuple[Callable[[], tuple[Any, Measured]], ...] = (design, splice, perspe
 
 
 def write_drawings(out: Path) -> None:
-    """Write each drawing twice, and a table a paper to be included; nothing is made again while the package is as it was."""
+    """Write each drawing in two widths, and a table for each paper. Drawings newer than the package are kept."""
     folder = out / "drawings"
     folder.mkdir(parents=True, exist_ok=True)
     newest = max(f.stat().st_mtime for f in [Path(__file__), *Path(texrs.__file__).parent.rglob("*.py")])

@@ -1,10 +1,10 @@
-"""The last hand on the built pages: images with sizes, in copies as small as a window needs, and no script that nothing uses.
+"""Optimise the built pages: give images their sizes and smaller copies, and remove unused scripts and icons.
 
-Beside a picture of the sources stand copies in WebP, as wide as a phone and as the text column; browsers take what fits.
-Of drawings there is one for phones. All
-but the first of a page are loaded when they come near. The theme loads the index of the search on every page, icons twice, as a
-font and as a script, and rules for two thousand of them: the search page keeps its own, the font stays, and the icons in use.
-Some marks of docutils and of the gallery are put right for readers that do not see: links without words, lists without items.
+Each image gets copies in WebP with the widths of a phone and of the text column, and browsers choose among them. A
+drawing also has a version for phones. All images of a page except the first one are loaded when they come near the
+window. The theme loads the search index on every page, and icons both as a font and as a script, with rules for two
+thousand icons. Only the search page keeps the search index. The font stays, and only rules of used icons are kept.
+Marks of docutils and of the gallery are corrected for screen readers: links without text, and lists without items.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from urllib.parse import unquote
 from PIL import Image
 
 WIDTHS = (480, 960)
-"""Of the copies, in pixels: a phone or half a column, and a column."""
+"""Widths of the copies, in pixels: for a phone or half a text column, and for a whole text column."""
 QUALITY = 74
 SIZES = "(max-width: 720px) 94vw, (max-width: 1200px) 66vw, 820px"
 THUMBNAIL = "16rem"
 NARROW = "(max-width: 720px)"
-"""Where drawings stand with their panels below each other: what `drawings.py` calls -narrow."""
+"""Windows that show the narrow version of a drawing, whose panels are below each other."""
 
 
 def finish(app: object, error: Exception | None) -> None:
-    """Rewrite all pages, and the theme's rules: what Sphinx calls when it has built them."""
+    """Rewrite all pages and the theme's style sheet. Sphinx calls this after the build."""
     root = Path(app.outdir)  # type: ignore[attr-defined]
     if error is None and app.builder.format == "html":  # type: ignore[attr-defined]
         icons: set[str] = set()
@@ -50,7 +50,7 @@ def finish(app: object, error: Exception | None) -> None:
 
 
 def drop_scripts(text: str, name: str) -> str:
-    """Leave out the script that draws icons, and, but of the search page, those of the search."""
+    """Remove the script that draws icons, and on all pages except the search page the scripts of the search."""
     unused = ["scripts/fontawesome"]
     if name != "search.html":
         unused += ["searchtools", "language_data", "searchindex"]
@@ -58,7 +58,7 @@ def drop_scripts(text: str, name: str) -> str:
 
 
 def name_parts(text: str) -> str:
-    """Name the links below thumbnails, whose words are hidden, and make the entries of a list of references its items."""
+    """Label the links below thumbnails, whose text is hidden, and mark references as items of their list."""
     text = re.sub(
         r'<p><a class="reference internal" (href="[^"]*")><span class="doc">([^<]*)</span></a></p>',
         r'<p><a class="reference internal" \1 aria-label="\2"><span class="doc">\2</span></a></p>',
@@ -68,7 +68,7 @@ def name_parts(text: str) -> str:
 
 
 def drop_icons(sheet: str, used: set[str]) -> str:
-    """Leave out the rules of icons that no page shows."""
+    """Remove the rules of icons that no page shows."""
 
     def keep(found: re.Match[str]) -> str:
         return found.group(0) if used & set(re.findall(r"fa-[a-z0-9-]+", found.group(0).partition("{")[0])) else ""
@@ -77,7 +77,7 @@ def drop_icons(sheet: str, used: set[str]) -> str:
 
 
 def rewrite(text: str, folder: Path, drawings: Path) -> str:
-    """Give each image of a page in a folder its size, its copies, and when it is loaded."""
+    """Add the size, the copies and the loading mode to each image of a page in a folder."""
     count = 0
 
     def list_copies(near: str, copies: list[tuple[str, int]]) -> str:
@@ -121,7 +121,7 @@ def rewrite(text: str, folder: Path, drawings: Path) -> str:
 
 @cache
 def make_copies(file: Path) -> tuple[int, int, list[tuple[str, int]]]:
-    """Write the copies of a picture that are smaller than it is; return its size, and their names and widths."""
+    """Write the copies of an image; return its size, and the names and widths of copies with a smaller file."""
     with Image.open(file) as picture:
         width, height = picture.size
         copies = []

@@ -23,7 +23,7 @@ VALUE = "…"
 
 @dataclass(frozen=True)
 class Kind:
-    """Messages of one form: what causes them, and what helps if they do not say it themselves."""
+    """A form of messages, with its cause, and the remedy of messages that do not contain one."""
 
     pattern: re.Pattern[str]
     cause: str
@@ -44,7 +44,7 @@ KINDS = (
     ),
     kind(
         r"exists|is there already|already (?:there|has)|overwrite|--force|would be lost",
-        "A result would replace something.",
+        "The result would replace an existing file.",
         "Write to another name, or use `--force`.",
     ),
     kind(
@@ -55,12 +55,12 @@ KINDS = (
     ),
     kind(
         r"no such|not found|cannot be (?:read|opened|written)|does not exist|is not there|missing|lacks?\b|has no ",
-        "Something that is needed is not there.",
+        "A required file, value or package is missing.",
         "Check the name and the path.",
     ),
     kind(
         r"damaged|truncated|broken|not a (?:valid )?\w+ file|corrupt|ends (?:early|before)",
-        "The file is damaged, or of another format.",
+        "The file is damaged, or has another format.",
         "Read it with another program and save it again.",
     ),
     kind(
@@ -81,27 +81,27 @@ KINDS = (
     ),
     kind(
         r"shape|axes|dimensions?|channels?|rows|columns|planes|size",
-        "The array has another shape.",
+        "The array has the wrong shape.",
         "Check the order of axes in [Conventions](../conventions.md).",
     ),
     kind(
         r"dtype|integers?|float|bool|numbers?|finite|NaN|type|got a|must be a|needs? an? |is not an? ",
-        "The value has another type.",
+        "The value has the wrong type.",
         "Give a value of the type in the message.",
     ),
     kind(
         r"marks (?:nothing|all|no)|nothing|empty|covers",
         "The mask or the selection is empty or complete.",
-        "Check it, and invert it if it is black where it marks (`--invert`).",
+        "Check it. If it marks pixels in black, invert it (`--invert`).",
     ),
     kind(
         r"cannot (?:hold|contain|be kept|keep)|is (?:not )?written|are (?:not )?written|format",
         "The format cannot contain these data.",
-        "Use a format of the message, or convert the data.",
+        "Use a format from the message, or convert the data.",
     ),
     kind(
         r"is no |holds? no|not (?:an?|the) |cut off|not all of|not packed|not JSON",
-        "The file or the value is of another kind.",
+        "The file or the value is of the wrong kind.",
         "Give one of the kind in the message.",
     ),
     kind(
@@ -111,13 +111,13 @@ KINDS = (
     ),
     kind(
         r"not read|are read|reads? |decoded|encoding|holds|content|Pillow|compressed",
-        "The file contains something that texrs does not read.",
+        "The file contains data that texrs does not read.",
         "Convert it with another program to a format in [Files](../guides/files.md).",
     ),
     kind(
         r"version|made by|made again|SHA-256|says how",
         "The file is from another version, or its inputs changed.",
-        "Make it again with this version.",
+        "Generate it again with this version.",
     ),
     kind(
         r"folder|suffix|locked|other processes|write-protected|removed|gone",
@@ -125,7 +125,7 @@ KINDS = (
         "Choose another path, or end the other process.",
     ),
     kind(r"up to|allowed", "The value or the size is out of its range.", "Give a value in the range of the message."),
-    kind(r"is needed|belongs", "An argument is missing.", "Give it."),
+    kind(r"is needed|belongs", "An argument is missing.", "Give the argument that the message names."),
     kind(
         r"field|function|steps?|corrections|points?",
         "A part of the argument cannot be used.",
@@ -133,23 +133,23 @@ KINDS = (
     ),
     kind(
         r"needs? |must |belongs? ",
-        "A requirement of the message is not met.",
+        "A requirement in the message is not met.",
         "Give everything that the message names.",
     ),
     kind(
         r"found|shows|measur|unsure|plane|horizon|lattice|elements?",
-        "The image does not show what is needed.",
-        "Give it by hand, with the argument in the message.",
+        "texrs did not find the required elements, plane or lattice in the image.",
+        "Give them by hand, with the argument in the message.",
     ),
 )
 REST = Kind(
-    re.compile(""), "A condition of the message is not met.", "Read the description of the argument in the reference."
+    re.compile(""), "A condition in the message is not met.", "Read the description of the argument in the reference."
 )
 
 
 @dataclass(frozen=True)
 class Message:
-    """A message, where it is raised, and what helps."""
+    """A message, the module that raises it, its cause and its remedy."""
 
     text: str
     module: str
@@ -158,20 +158,20 @@ class Message:
 
     @property
     def argument(self) -> str:
-        """The argument that it is about; empty where it is any."""
+        """Name of the argument that the message begins with, or an empty string."""
         found = re.match(r"([\w., -]{1,40}?): ", self.text)
         return "" if found is None else found.group(1)
 
 
 def list_messages(package: Path) -> Iterator[Message]:
-    """Return the messages of a package, without those whose text is made elsewhere."""
+    """Return the messages of a package, except messages whose text is not in the ``raise`` statement."""
     for file in sorted(package.rglob("*.py")):
         module = ".".join(file.relative_to(package.parent).with_suffix("").parts)
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             call = node.exc if isinstance(node, ast.Raise) else None
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in ERRORS and call.args:
                 text = read_text(call.args[0])
-                # A message of which only the values are known says nothing.
+                # Skip a message that consists of values only.
                 if len(re.sub(r"\W|…", "", text)) > 6:
                     yield Message(text, module, *explain(text))
 
@@ -185,7 +185,7 @@ def read_text(node: ast.expr) -> str:
 
 
 def explain(text: str) -> tuple[str, str]:
-    """Return the cause and the remedy of a message: its own words where it has them."""
+    """Return the cause and the remedy of a message. If the message contains a remedy, return this one."""
     found = next((k for k in KINDS if k.pattern.search(text)), REST)
     own = REMEDY.search(text)
     if own:
@@ -198,7 +198,7 @@ def explain(text: str) -> tuple[str, str]:
 
 
 def make_messages(package: Path) -> str:
-    """Return the page."""
+    """Return the page of messages."""
     messages = {m.text: m for m in list_messages(package)}
     groups: dict[str, list[Message]] = {}
     for message in messages.values():
@@ -223,5 +223,5 @@ def tabulate(messages: list[Message]) -> str:
         remedy = re.sub(r"\[([^]]+)\]\(([^)]+)\.md\)", r'<a href="\2.html">\1</a>', escape(each.remedy, quote=False))
         remedy = re.sub(r"`([^`]+)`", r"<code>\1</code>", remedy)
         rows += f"<tr><td>{escape(each.text, quote=False)}</td><td>{each.cause}</td><td>{remedy}</td></tr>\n"
-    head = "<thead><tr><th>it says</th><th>cause</th><th>do</th></tr></thead>"
+    head = "<thead><tr><th>message</th><th>cause</th><th>remedy</th></tr></thead>"
     return f'<table class="table messages">\n{head}\n<tbody>\n{rows}</tbody></table>'

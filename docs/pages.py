@@ -1,4 +1,4 @@
-"""Pages that are made from the code: the commands by their parsers, the words of ARCHITECTURE.md."""
+"""Pages that are generated from the code: commands, API, results, messages, performance, comparison and glossary."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NOTICE = "% Made by docs/pages.py.\n\n"
 
 
 def write_pages(docs: Path) -> None:
-    """Write all such pages anew, to the folder ``generated``."""
+    """Write all generated pages to the folder ``generated``."""
     out = docs / "generated"
     for each in ("api", "parameters", "results.md", "messages.md", "commands.md", "performance.md", "words.md"):
         if (out / each).is_dir():
@@ -38,7 +38,7 @@ def write_pages(docs: Path) -> None:
 
 
 def list_commands() -> str:
-    """Return what each command says of itself."""
+    """Return the page of all commands, with the help text of each."""
     import typer
 
     from texrs.cli import GROUPS, app, make_command
@@ -46,7 +46,7 @@ def list_commands() -> str:
     group: Any = typer.main.get_command(app)
     wide = {"resilient_parsing": True, "terminal_width": 100, "max_content_width": 100}
     top = group.make_context("texrs", [], **wide)
-    text = f"{NOTICE}# Commands\n\nWhat `texrs COMMAND --help` says.\n\n"
+    text = f"{NOTICE}# Commands\n\nThis page contains the output of `texrs COMMAND --help` for each command.\n\n"
     for title, commands in GROUPS.items():
         text += f"## {title}\n\n"
         for name, short in commands.items():
@@ -60,40 +60,41 @@ def list_commands() -> str:
 
 
 def list_words(architecture: Path) -> str:
-    """Return the glossary of ARCHITECTURE.md."""
+    """Return the page with the glossary of ARCHITECTURE.md."""
     table = architecture.read_text(encoding="utf-8").partition("## The words")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| (.+?) \| (.+?) \|$", table, re.MULTILINE)[1:]
     words = "".join(f"{word}\n  {meaning}\n\n" for word, meaning in sorted(rows, key=lambda row: row[0].lower()))
-    intro = "The words of the interface, of messages and of the code, each with one meaning."
+    intro = "The terms of the interface, of messages and of the code. Each term has one meaning."
     return f"{NOTICE}# Glossary\n\n{intro}\n\n```{{glossary}}\n{words.rstrip()}\n```\n"
 
 
 # --- comparison ------------------------------------------------------------------------------------------------------
 
 COMPARED = """
-Each of ten pictures, of {side} pixels a side, by what texrs has for three tasks, and by what others have that is installed
-where this page was made. The pictures stand in <a href="../shown/comparison.html">the page of the comparison</a>, which this
-command writes:
+This page compares texrs with other programs in three tasks, for ten images with a side of {side} pixels. It includes
+the programs that were installed when the page was generated. <a href="../shown/comparison.html">The page of the
+comparison</a> shows all images. This command writes it:
 
 ```sh
 texrs compare -o comparison.html
 ```
 
-Your own pictures, one task, and programs that are not found by themselves:
+This command compares your own images in one task, and gives the path of a program that is not found automatically:
 
 ```text
 texrs compare stones.jpg bark.jpg --task more --program embark=PATH -o comparison.html
 ```
 
-Of every figure less is better, 0 is what the example has itself, and the best of each column is bold; what costs nothing stands
-there for comparison alone. Figures see some of what eyes see: a texture in which things are torn may have good ones.
+Lower values are better, and 0 is the value of the example itself. The best value of each column is bold. Trivial
+methods, such as copies, are listed only for comparison. The measures do not replace looking at the images: a texture
+with torn elements can have good values.
 """
 
 
 def write_comparison(out: Path) -> None:
-    """Compare methods on built-in pictures: the means in a page of the documentation, the pictures in one of their own.
+    """Compare methods on built-in images, and write a page with the means and a page with the images.
 
-    Nothing is compared again while the package is as it was.
+    If both pages are newer than the package, they are kept.
     """
     from texrs import samples
     from texrs.cli._compare import USUAL
@@ -113,7 +114,9 @@ def write_comparison(out: Path) -> None:
     for task, about in TASKS.items():
         some = [r for r in found.results if r.task == task]
         text += f"\n## {about.title}\n\n{about.lead}\n\n```{{raw}} html\n{tabulate(some, True)}\n```\n"
-    text += "\n## Not here\n\nWhat was not installed, and how to get it:\n\n"
+    text += (
+        "\n## Not installed\n\nMethods that were not installed when the page was generated, and how to get them:\n\n"
+    )
     text += "".join(f"- {each.method} ({TASKS[each.task].title.lower()}): {each.get}\n" for each in found.missing)
     page.write_text(text, encoding="utf-8")
     shown.write_text(found.page(), encoding="utf-8")
@@ -122,19 +125,19 @@ def write_comparison(out: Path) -> None:
 # --- installation ----------------------------------------------------------------------------------------------------
 
 INSTALLED = """
-## What it takes
+## Size and time of the installation
 
-From an empty environment of Python {python} to a first picture, as `benches/install_table.py` measured on {date} with a wheel
-of {wheel} MB: seconds of the processor, and what the environment takes beyond an empty one.
+`benches/install_table.py` measured these numbers on {date}, in an empty environment of Python {python} and with a
+wheel of {wheel} MB. Times are processor seconds. Sizes are the growth of the environment.
 
-| | packages | MB | to install, s | first picture, s | which shows |
+| | packages | MB | installation, s | first image, s | first image |
 |---|---|---|---|---|---|
 {rows}
 """
 
 
 def tabulate_installs(file: Path) -> str:
-    """Return a table of what installations take, or nothing where nothing was measured."""
+    """Return a table of the sizes and times of installations, or an empty text if they were not measured."""
     import json
 
     if not file.exists():
@@ -150,36 +153,44 @@ def tabulate_installs(file: Path) -> str:
 # --- performance -----------------------------------------------------------------------------------------------------
 
 MEASURED = """
-No figure stands here that a command did not give: times hang on the processor, on what else it does, and on the picture. How
-long each method took on ten pictures, in processor seconds, says [the comparison](comparison.md); for yours, it is said by
-`texrs compare photo.jpg -o compared.html`.
+All numbers on this page come from commands. Times depend on the processor, on its load, and on the image. The
+processor seconds of each method for ten images are in [the comparison](comparison.md).
+`texrs compare photo.jpg -o compared.html` measures them for your own image.
 {peers}
 ## The commands
 
-What is measured, and by which command, from a checkout of the sources. Each prints a table; most interleave rounds and take
-medians, since a machine that does other things shows in the mean. `make bench-kernels` measures the kernels in Rust alone, and
-`make bench-guard` counts the instructions of eight of them.
+These commands run in a checkout of the sources, and each prints a table. Most of them interleave rounds and report
+medians, because a mean depends on the other load of the machine. `make bench-kernels` measures only the kernels in
+Rust, and `make bench-guard` counts the instructions of eight kernels.
 """
 
 
 PEERS = """
-## Beside others
+## Compared with other programs
 
-What `make bench` wrote: {processor}, {cores} cores, {system}, Python {python}, {date}, while the machine did {load:.0f} things
-at once. Milliseconds of the processor, in one thread, the median of {rounds} rounds in which all took turns, and the least and
-the most; how many times as long as texrs, and how many were asked for before that was measured (*not reached* where it fell
-short); megabytes that the work took beyond what was there when all was ready. Results were compared first, as it says.
-The floor is what copying what is given once takes. What is *published* was measured by others, on other hardware, as their
-paper says. Where threads are compared, the least time that passed counts; a busy machine has no second core to give.
+`make bench` measured these numbers on {date}: {processor}, {cores} cores, {system}, Python {python}, at a load of
+{load:.0f}. The results of all programs were compared before the times were measured.
 
-| work | who | ms | spread | ratio | asked | MB |
+| column | contents |
+|---|---|
+| work | the task, and how the results were compared |
+| ms | processor milliseconds in one thread: the median of {rounds} interleaved rounds |
+| spread | the smallest and the largest time. *published*: measured by others on other hardware, as the paper states |
+| ratio | time divided by the time of texrs |
+| target | the ratio, time or memory that was required before the measurement; *not reached* if it was missed |
+| MB | memory of the work, without the memory of the loaded program and its input |
+
+The row *floor* is the time to copy the input once. If numbers of threads are compared, ms is the smallest elapsed
+time, because a busy machine may have no free second core.
+
+| work | program | ms | spread | ratio | target | MB |
 |---|---|---|---|---|---|---|
 {rows}
 """
 
 
 def tabulate_peers(file: Path) -> str:
-    """Return a table of what was measured, or nothing where nothing was."""
+    """Return a table of the comparison with other programs, or an empty text if it was not measured."""
     import json
 
     if not file.exists():
@@ -187,7 +198,7 @@ def tabulate_peers(file: Path) -> str:
     found = json.loads(file.read_text(encoding="utf-8"))
     rows = []
     for case in found["cases"]:
-        said = f"**{case['case']}**{' (time that passes)' if case['wall'] else ''}: {case['check']}"
+        said = f"**{case['case']}**{' (elapsed time)' if case['wall'] else ''}: {case['check']}"
         for each in case["rows"]:
             own = each is case["rows"][0]
             asked = f"at most {case['most_ms']:g} ms" if own and case["most_ms"] else ""
@@ -207,7 +218,7 @@ def tabulate_peers(file: Path) -> str:
             rows.append(f"| {said} | {who} | {' | '.join(figures)} | {_figure(each['ratio'])} | {asked} | {size} |")
             said = ""
         for each in case["absent"]:
-            rows.append(f"| | {each['who']} | not here: {each['get']} | | | {each['asked'] or ''} | |")
+            rows.append(f"| | {each['who']} | not installed: {each['get']} | | | {each['asked'] or ''} | |")
         rows.append(f"| | *floor* | {_figure(case['floor'])} | | | | |")
     return PEERS.format(rows="\n".join(rows), rounds=found["rounds"], **found["machine"])
 
@@ -218,11 +229,11 @@ def _figure(ms: float) -> str:
 
 
 def list_benches(folder: Path) -> str:
-    """Return a page of what each bench measures, as its own first words say it."""
+    """Return the page of performance: for each bench its command, and the first line of its docstring."""
     import ast
 
     text = f"{NOTICE}# Performance\n{MEASURED.format(peers=tabulate_peers(folder / 'peers.json'))}\n"
-    groups = {"How fast": "_speed", "Beside others": "_vs_peers", "How well": ""}
+    groups = {"Speed": "_speed", "Other measurements": ""}
     files = sorted(folder.glob("*.py"))
     for title, ending in groups.items():
         some = [file for file in files if file.stem.endswith(ending)]
@@ -230,8 +241,8 @@ def list_benches(folder: Path) -> str:
         rows = []
         for file in some:
             said = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
-            # What is no command is a helper of those that are.
+            # A file whose docstring does not name its own command is a helper.
             if f"benches/{file.name}" in said:
                 rows.append(f"| `python benches/{file.name}` | {said.splitlines()[0]} |")
-        text += f"### {title}\n\n| command | what it measures |\n|---|---|\n" + "\n".join(rows) + "\n\n"
+        text += f"### {title}\n\n| command | measurement |\n|---|---|\n" + "\n".join(rows) + "\n\n"
     return text

@@ -14,7 +14,7 @@ VERBS = (
     "design", "design_variants", "tile", "inpaint", "splice", "self_splice", "synthesize", "solid", "perspective", "rectify",
     "remove", "extend", "PlaneTexture.window", "CornerTiles.window",
 )  # fmt: skip
-"""Functions that return a `Synthesis`; `SolidTexture.window` is that of `PlaneTexture`."""
+"""Functions that return a `Synthesis`. `SolidTexture.window` is the method of `PlaneTexture`."""
 COMMON = {
     "ignored": "Parts of the input that were not used, one sentence each. Only if there are any.",
     "assumed": "Facts about the input that it does not state, one sentence each. Only if there are any.",
@@ -23,14 +23,14 @@ COMMON = {
 }
 """Keys that the report of any verb may contain."""
 MATERIAL_STAGES = {
-    "guide": "All maps of the material as one image, by which places were chosen. Only for a `texrs.Material`."
+    "guide": "All maps of the material as one image, which was used to choose places. Only for a `texrs.Material`."
 }
 ITEM = re.compile(r"^- ``([^`]+)``: ?(.*)$")
 Entries = dict[str, str]
 
 
 def read_returns(name: str) -> tuple[Entries, Entries]:
-    """Return the stages and the report keys that a docstring lists, with those of a function that it refers to."""
+    """Return the stages and report keys in a docstring, and in the docstring of a function that it refers to."""
     lines = (inspect.getdoc(find(f"texrs.{name}")) or "").splitlines()
     start = lines.index("Returns") + 2 if "Returns" in lines else lines.index("Yields") + 2
     end = next((i for i in range(start, len(lines) - 1) if lines[i + 1] and not lines[i + 1].strip("-")), len(lines))
@@ -55,7 +55,7 @@ def read_returns(name: str) -> tuple[Entries, Entries]:
 
 
 def make_results() -> str:
-    """Return the page."""
+    """Return the page of results."""
     text = f"{NOTICE}# The result\n\n"
     text += (
         "Every verb returns a {py:obj}`texrs.Synthesis`: the image, the source map, pictures of the stages, and a report\n"
@@ -75,6 +75,6 @@ def make_results() -> str:
 
 
 def tabulate(head: str, entries: Entries) -> str:
-    """Return a table of names and what they mean."""
+    """Return a table of names and their meanings."""
     rows = "".join(f"| `{name}` | {as_markdown(about)} |\n" for name, about in entries.items())
     return f"| {head} | contents |\n|---|---|\n{rows}"

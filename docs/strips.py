@@ -1,4 +1,4 @@
-"""What options do: for each guide three of them at several settings, as strips of pictures that are made when the pages are."""
+"""Strips of images for the guides. Each strip shows an option at several settings, computed together with the pages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ QUALITY = 82
 
 
 def several(values: list[Any], make: Callable[[Any], Picture]) -> list[tuple[str, Callable[[], Picture]]]:
-    """Return what is said below each picture, and what makes it."""
+    """Return the caption of each image and the function that computes it."""
     return [(str(value), lambda value=value: make(value)) for value in values]
 
 
@@ -42,15 +42,19 @@ def design() -> Iterator[Strip]:
 
     yield (
         "rotate",
-        "How far things that are moved may be turned, in degrees.",
+        "Largest rotation of moved elements, in degrees.",
         several([0, 15, 45, 90, 180], rotate),
     )
     yield (
         "weights",
-        "How much each example covers: here the share of pebbles.",
+        "Share of each example in the result. The numbers are the share of pebbles.",
         several([0.1, 0.3, 0.5, 0.7, 0.9], mix),
     )
-    yield ("density", "How much is covered by things of the others.", several([0.05, 0.1, 0.2, 0.3, 0.4], scatter))
+    yield (
+        "density",
+        "Share of the area that elements of the second example cover.",
+        several([0.05, 0.1, 0.2, 0.3, 0.4], scatter),
+    )
 
 
 def tile() -> Iterator[Strip]:
@@ -71,13 +75,17 @@ def tile() -> Iterator[Strip]:
 
     yield (
         "overlap",
-        "How far the borders are laid over each other, in pixels. Two by two.",
+        "Overlap of opposite borders, in pixels. The images show 2 x 2 copies.",
         several([8, 24, 48, 72, 96], cut),
     )
-    yield ("wrap", "Along which axes it is cyclic. Two by two.", several(["none", "x", "y", "xy"], wrap))
+    yield (
+        "wrap",
+        "Axes along which the result is periodic. The images show 2 x 2 copies.",
+        several(["none", "x", "y", "xy"], wrap),
+    )
     yield (
         "size",
-        "How large the tile is: more than the picture is laid as a quilt.",
+        "Side of the tile, in pixels. A tile that is larger than the image (192) is a quilt of patches.",
         several([96, 144, 192, 288, 384], size),
     )
 
@@ -92,17 +100,17 @@ def inpaint() -> Iterator[Strip]:
 
     yield (
         "boundary_width",
-        "How many known pixels around the hole may change, which hides the seam.",
+        "Width of the band around the hole that may change, in pixels. The band hides the seam.",
         several([0, 2, 4, 8, 16], lambda n: fill(boundary_width=n)),
     )
     yield (
         "patch_size",
-        "How large the patches are, in pixels; by default several sizes are tried.",
+        "Side of the patches, in pixels. By default several sizes are tried.",
         several([9, 17, 33, 49, 65], lambda n: fill(patch_size=n)),
     )
     yield (
         "method",
-        "Whether whole patches are laid, or windows corrected until each is like one of the picture.",
+        "`patch` copies patches. `optimise` corrects windows until each resembles a window of the image.",
         several(["patch", "optimise"], lambda name: fill(method=name)),
     )
 
@@ -123,13 +131,13 @@ def splice() -> Iterator[Strip]:
 
     yield (
         "strength",
-        "How far things go on their way, from their own layout to the other.",
+        "Share of the way that elements move, from their own layout (0) to the other layout (1).",
         several([0, 0.25, 0.5, 0.75, 1.0], part),
     )
-    yield ("layout_scale", "How large the layout is drawn.", several([0.7, 0.85, 1.0, 1.25, 1.5], scale))
+    yield ("layout_scale", "Scale of the layout.", several([0.7, 0.85, 1.0, 1.25, 1.5], scale))
     yield (
         "randomise",
-        "A step of `self_splice`: how far things are shaken, in distances.",
+        "A step of `self_splice`. The numbers are its `amount`: the random displacement, in spacings of the elements.",
         several([0, 0.1, 0.2, 0.3, 0.4], shake),
     )
 
@@ -150,13 +158,13 @@ def perspective() -> Iterator[Strip]:
 
     yield (
         "target",
-        "The plane that it is laid on: here its slant in degrees, of a wall seen from the front.",
+        "The plane that the texture lies on. The numbers are its slant, in degrees.",
         several([0, 20, 35, 50, 60], slant),
     )
-    yield ("direction", "How it is turned on the plane, in degrees.", several([0, 20, 45, 70, 90], turn))
+    yield ("direction", "Rotation of the texture, in degrees counter-clockwise.", several([0, 20, 45, 70, 90], turn))
     yield (
         "vary",
-        "A step of `scale_maps.edit`: how much sizes differ, where 1 is as in the example.",
+        "A step of `scale_maps.edit`. The numbers are its `gain`: 1 keeps the sizes of the example, and 0 makes them equal.",
         several([-1, 0, 0.5, 1, 1.2], vary),
     )
 
@@ -170,17 +178,17 @@ def rectify() -> Iterator[Strip]:
 
     yield (
         "slant",
-        "Told wrong, things are long or wide: it is 50 degrees here.",
+        "Slant of the plane, in degrees. Here it is 50. With other values, elements become too long or too wide.",
         several([30, 40, 50, 60, 70], lambda a: flatten(slant=a)),
     )
     yield (
         "tilt",
-        "Told wrong, things lean: it is 90 degrees here.",
+        "Tilt of the plane, in degrees. Here it is 90. With other values, elements are sheared.",
         several([50, 70, 90, 110, 130], lambda a: flatten(tilt=a)),
     )
     yield (
         "resolution",
-        "Pixels of the texture for one in the middle of the photograph.",
+        "Pixels of the texture for one pixel in the middle of the photograph.",
         several([0.35, 0.5, 0.7, 1.0, 1.4], lambda r: texrs.rectify(floor, resolution=r, seed=1).image),
     )
 
@@ -193,15 +201,15 @@ def solid() -> Iterator[Strip]:
 
     yield (
         "rotation:angle",
-        "How far the block is turned in a plane, in degrees.",
+        "Rotation in a plane, in degrees.",
         several([0, 15, 30, 45, 60], lambda a: grow(f"rotation:angle={a}")),
     )
     yield (
         "scale_ramp:stop",
-        "How large things are at the end, where they are as in the example at the beginning.",
+        "Scale at the end of the ramp. At its beginning, the scale is 1.",
         several([0.5, 0.75, 1.0, 1.5, 2.0], lambda s: grow(f"scale_ramp:axis=y,start=1,stop={s}")),
     )
-    yield ("shear", "How far it leans.", several([0, 0.25, 0.5, 0.75, 1.0], lambda s: grow(f"shear:amount={s}")))
+    yield ("shear", "Amount of shear.", several([0, 0.25, 0.5, 0.75, 1.0], lambda s: grow(f"shear:amount={s}")))
 
 
 def materials() -> Iterator[Strip]:
@@ -225,15 +233,19 @@ def materials() -> Iterator[Strip]:
 
     yield (
         "light: azimuth",
-        "Where the light of `preview` comes from: degrees from the right, counter-clockwise.",
+        "Direction of the light of `preview`, in degrees counter-clockwise from the right.",
         several([0, 72, 144, 216, 288], lambda a: light(a, 40)),
     )
     yield (
         "light: elevation",
-        "How high it stands, in degrees.",
+        "Elevation of the light above the surface, in degrees.",
         several([10, 25, 45, 65, 90], lambda e: light(135, e)),
     )
-    yield ("mipmaps", "Smaller copies: how often a map is halved.", several([0, 1, 2, 3, 4], shrink))
+    yield (
+        "mipmaps",
+        "Smaller copies of a map. The numbers count how often it is halved.",
+        several([0, 1, 2, 3, 4], shrink),
+    )
 
 
 def augment() -> Iterator[Strip]:
@@ -259,11 +271,11 @@ def augment() -> Iterator[Strip]:
     def label(seed: int) -> Picture:
         return volume.label_to_color(texrs.transforms.TextureAugment()(buttons.image, buttons.labels, seed=seed).mask)
 
-    yield ("seed", "Another picture each, and its boxes.", several([0, 1, 2, 3, 4], draw))
-    yield ("seed, with labels", "The labels of the same pictures.", several([0, 1, 2, 3, 4], label))
+    yield ("seed", "Each seed gives another image, with its boxes.", several([0, 1, 2, 3, 4], draw))
+    yield ("seed, with labels", "The labels of the same images.", several([0, 1, 2, 3, 4], label))
     yield (
         "min_visible",
-        "How much of a box a piece must show for it to have one.",
+        "Smallest share of a box that a piece must show to have a box of its own.",
         several([0.1, 0.3, 0.5, 0.7, 0.95], lambda share: draw(3, share)),
     )
 
@@ -291,17 +303,17 @@ def source_map() -> Iterator[Strip]:
 
     yield (
         "screening",
-        "How firmly values stay where seams are made to disappear: here of squares from an example that is darker above.",
+        "Weight of the values when seams are corrected. Here squares come from an example that is darker at the top.",
         several(["none", 1.0, 0.15, 0.05, 0.01], blend),
     )
     yield (
         "interpolation",
-        "Between samples of the example, here five times as large.",
+        "Interpolation between pixels of the example, which is enlarged 5x here.",
         several(["nearest", "linear", "cubic"], lambda how: grown["large"].render(weave, interpolation=how)),
     )
     yield (
         "antialias",
-        "Whether the example is smoothed where it is shrunk, here to a third.",
+        "If True, the example is smoothed where it is shrunk. Here it is shrunk to 0.3.",
         several([True, False], smooth),
     )
 
@@ -321,7 +333,11 @@ def batch() -> Iterator[Strip]:
 
     for preset, options in presets.items():
         said = ", ".join(f"{name} = {value}" for name, value in options.items())
-        yield (f"presets.{preset}", f"{said}; a seed each.", several([0, 1, 2, 3, 4], lambda s, p=preset: make(s, p)))
+        yield (
+            f"presets.{preset}",
+            f"{said}. The numbers are seeds.",
+            several([0, 1, 2, 3, 4], lambda s, p=preset: make(s, p)),
+        )
 
 
 GUIDES = (design, tile, inpaint, splice, perspective, rectify, solid, materials, augment, source_map, batch)
@@ -330,7 +346,7 @@ GUIDES = (design, tile, inpaint, splice, perspective, rectify, solid, materials,
 
 
 def write_strips(out: Path) -> None:
-    """Write a page a guide, to be included in it, and the pictures; nothing is made again while the package is as it was."""
+    """Write the strips of each guide as a page to include, and their images. Pages newer than the package are kept."""
     folder, pictures = out / "strips", out / "extra" / "strips"
     newest = max(f.stat().st_mtime for f in [Path(__file__), *Path(texrs.__file__).parent.rglob("*.py")])
     for guide in GUIDES:
@@ -346,7 +362,7 @@ def write_strips(out: Path) -> None:
                 file = pictures / f"{guide.__name__}-{number}-{place}.jpg"
                 image = make()
                 if image.ndim == 3 and image.shape[2] == 4:
-                    # Upon white.
+                    # JPEG has no alpha, so put the image on white.
                     image = 255 - (255 - image[..., :3].astype(int)) * image[..., 3:] // 255
                 iio.imwrite(file, image.astype(np.uint8), quality=QUALITY)
                 height, width = image.shape[:2]

@@ -50,7 +50,11 @@ def test_the_index_of_messages_has_all_raise_sites() -> None:
     [
         ("size: each side must be at least 16, got …", "The value or the size is out of its range.", "Give at least 16."),
         ("wrap: cannot be combined with size", "Two arguments contradict each other.", "Leave out one of them."),
-        ("x: … would be lost; write to another file", "A result would replace something.", "Write to another file."),
+        (
+            "x: … would be lost; write to another file",
+            "The result would replace an existing file.",
+            "Write to another file.",
+        ),
         ("kind: must be one of …, …; got …", "The value is not one of the allowed words.", "Give one of …, …."),
     ],
 )  # fmt: skip

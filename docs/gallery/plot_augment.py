@@ -1,9 +1,9 @@
 """
-Pictures to train on, with labels and boxes
-===========================================
+Images to train on, with labels and boxes
+=========================================
 
-One labelled picture becomes many: pieces of it are laid anew, and its labels and its boxes follow through the source map. What
-is cut off a box gets a smaller one, and what is copied twice gets two.
+One labelled image becomes many: pieces of it are arranged in a new way, and its labels and boxes follow through the
+source map. A box that is cut becomes smaller, and a piece that is copied twice has two boxes.
 """
 
 import matplotlib.pyplot as plt

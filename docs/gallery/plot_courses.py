@@ -2,8 +2,8 @@
 A wall in other courses
 =======================
 
-A layout may be drawn. Bricks take the places of stones in courses of three heights, each brick whole, with joints as
-wide as they were.
+A layout can be drawn. Here it has courses of three heights. Each of its cells contains one whole brick, and the joints
+keep their width.
 """
 
 import matplotlib.pyplot as plt
@@ -16,9 +16,9 @@ built = texrs.splice(wall, courses, (240, 320), layout_scale=1, seed=2).image
 
 figure, row = plt.subplots(1, 3, width_ratios=[192, 320, 320], figsize=(11, 3.4), layout="constrained")
 shown = {
-    "a wall": wall.image,
-    "courses": courses.image,
-    "built of its bricks": built,
+    "the example": wall.image,
+    "the drawn layout": courses.image,
+    "the result": built,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture, cmap="gray")

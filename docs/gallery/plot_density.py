@@ -1,9 +1,9 @@
 """
-Scattered over a ground
-=======================
+Scattered over a background
+===========================
 
-Things of one picture are scattered over another, each whole, as densely as a map says: buttons over a cloth, more of
-them to the right. What was asked and what was reached stands in the report.
+Elements of one image are scattered over another, each whole, as densely as a map specifies. Here they are buttons on a
+cloth, with more of them to the right. The report contains the requested and the reached density.
 """
 
 import matplotlib.pyplot as plt
@@ -17,8 +17,8 @@ result = texrs.design([cloth, buttons], (240, 360), density=density, seed=5)
 
 figure, row = plt.subplots(1, 3, width_ratios=[192, 192, 360], figsize=(11, 3.2), layout="constrained")
 shown = {
-    "the ground": cloth,
-    "what is scattered": buttons,
+    "the background": cloth,
+    "the elements": buttons,
     "more to the right": result.image,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):

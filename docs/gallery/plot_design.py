@@ -2,7 +2,7 @@
 More of the same stones
 =======================
 
-One picture becomes a larger one, without a seam along both axes: elements are found, moved, and stitched back along
+One image becomes a larger one, which is tileable along both axes. Elements are found, moved, and stitched back along
 minimum cuts.
 """
 
@@ -17,7 +17,7 @@ figure, (left, right) = plt.subplots(1, 2, width_ratios=[192, 480], figsize=(11,
 left.imshow(pebbles)
 left.set_title("the example")
 right.imshow(result.image)
-right.set_title("made from it")
+right.set_title("the result")
 for axes in (left, right):
     axes.set_axis_off()
 plt.show()

@@ -2,7 +2,8 @@
 Along a flow
 ============
 
-A field may be an array of vectors, as simulations and painters have it. Here the weave of a cloth goes around two eddies.
+A field can be an array of vectors, such as the result of a simulation or a painted flow. Here bark follows a flow with
+two eddies.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +22,7 @@ made = texrs.synthesize(bark, 320, field=flow, seed=1).image
 figure, row = plt.subplots(1, 3, width_ratios=[128, 320, 320], figsize=(11, 4.4), layout="constrained")
 row[1].quiver(columns[8::24, 8::24], rows[8::24, 8::24], flow[8::24, 8::24, 1], flow[8::24, 8::24, 0], angles="xy")
 row[1].set_aspect("equal")
-shown = {"the example": bark, "a flow": np.full((320, 320, 3), 255), "along it": made}
+shown = {"the example": bark, "the field": np.full((320, 320, 3), 255), "the result": made}
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)
     axes.set_title(title)

@@ -1,9 +1,10 @@
 """
-A layout, step by step
-======================
+Edit a layout step by step
+==========================
 
-A layout is edited by a list of steps that can be kept and done again: put in order, every other row moved, or laid on
-points of any figure. Each button keeps its pixels, and the ground closes behind it.
+A layout is edited by a list of steps, which can be kept and replayed. Here the elements are put in order, every other
+row is moved, or the elements are placed on a spiral. Each button keeps its pixels, and the background behind it is
+filled.
 """
 
 import matplotlib.pyplot as plt
@@ -19,8 +20,8 @@ made = [texrs.self_splice(buttons, edit, seed=1).image for edit in edits]
 
 figure, row = plt.subplots(1, 4, figsize=(11, 3), layout="constrained")
 shown = {
-    "as it lies": made[0],
-    "in order": made[1],
+    "the example": made[0],
+    "regular": made[1],
     "rows moved": made[2],
     "on a spiral": made[3],
 }

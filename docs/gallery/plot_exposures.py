@@ -2,8 +2,8 @@
 More than eight bits
 ====================
 
-Dtype and range come out as they went in: a night sky in floating point, whose stars are up to 30 times as bright as
-white. Seen at two exposures, the result has what the example has in both.
+A result keeps the dtype and the value range of its example. Here the example is a night sky in floating point, whose
+stars are up to 30 times as bright as white. The result is shown at two exposures: the bright stars keep their values.
 """
 
 import matplotlib.pyplot as plt
@@ -24,8 +24,8 @@ def expose(light, stops):
 figure, row = plt.subplots(1, 3, width_ratios=[420, 640, 640], figsize=(11, 3.1), layout="constrained")
 shown = {
     "the example": expose(sky, 1),
-    "designed": expose(result.image, 1),
-    "five stops darker": expose(result.image, -4),
+    "the result": expose(result.image, 1),
+    "the result, five stops darker": expose(result.image, -4),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

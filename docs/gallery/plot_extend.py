@@ -2,7 +2,7 @@
 More of the wall
 ================
 
-A photograph of a plane goes on to both sides, in its own perspective. Nothing that was there changes.
+An oblique image of a wall is continued on both sides, in the same perspective. Its own pixels do not change.
 """
 
 import matplotlib.pyplot as plt
@@ -17,8 +17,8 @@ frame[:, 48:304] = wall
 
 figure, row = plt.subplots(1, 2, figsize=(11, 3.5), layout="constrained")
 shown = {
-    "as it was seen": frame,
-    "and what lies around it": wider,
+    "the image": frame,
+    "the extended image": wider,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -2,8 +2,8 @@
 Bark turned by a field
 ======================
 
-A frame says where the axes of the example go. Drawn are its axes at some places, and the bark that was grown along
-them.
+A frame gives the directions of the example's axes at a point. The second panel shows frames of a spiral field, and the
+third one shows bark that follows the field.
 """
 
 import matplotlib.pyplot as plt
@@ -21,8 +21,8 @@ frames = field.frames(at)
 figure, row = plt.subplots(1, 3, width_ratios=[128, 300, 300], figsize=(11, 4.4), layout="constrained")
 shown = {
     "the example": bark,
-    "where its axes go": np.full((300, 300, 3), 255),
-    "grown": grown,
+    "the frames of the field": np.full((300, 300, 3), 255),
+    "the result": grown,
 }
 for axis, colour in enumerate(("tab:red", "tab:blue")):
     row[1].quiver(at[:, 1], at[:, 0], frames[:, 1, axis], frames[:, 0, axis], angles="xy", color=colour, scale=14)

@@ -1,9 +1,9 @@
 """
-A hole is filled
-================
+A filled hole
+=============
 
-A hole is filled with patches of what is known around it. Nothing known changes, but for a few pixels at the border of the hole,
-if that is allowed, which hides the seam better.
+A hole is filled with patches of the known pixels around it. Here ``boundary_width=4`` lets a narrow band of known
+pixels around the hole change, which hides the seam better. All other known pixels stay as they are.
 """
 
 import matplotlib.pyplot as plt
@@ -19,7 +19,7 @@ mended = texrs.inpaint(wall, hole, boundary_width=4, seed=1).image
 
 figure, row = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 for axes, title, picture in zip(
-    row, ("a wall with a hole", "mended"), (np.where(hole, 255, wall), mended), strict=True
+    row, ("a wall with a hole", "filled"), (np.where(hole, 255, wall), mended), strict=True
 ):
     axes.imshow(picture, cmap="gray", vmin=0, vmax=255)
     axes.set_title(title)

@@ -2,8 +2,9 @@
 A material under a light
 ========================
 
-A material is a set of maps in register. All of them are looked up through one source map, so what is made of a material
-is one again: here colours, heights and roughness, under a light from the left, and under one from below.
+A material is a set of aligned maps. All maps of a result are looked up through one source map, so the result is a
+material too. Here it has colours, heights and roughness. It is shown under a light from the left and under a light
+from below.
 """
 
 import matplotlib.pyplot as plt
@@ -22,8 +23,8 @@ stones = texrs.design(example, (256, 320), seed=3).material
 figure, row = plt.subplots(1, 3, width_ratios=[160, 320, 320], figsize=(11, 3.6), layout="constrained")
 shown = {
     "the example": example.preview(tiles=(1, 1)),
-    "designed, lit from the left": stones.preview(tiles=(1, 1), light=(180, 35)),
-    "lit from below": stones.preview(tiles=(1, 1), light=(270, 35)),
+    "the result, lit from the left": stones.preview(tiles=(1, 1), light=(180, 35)),
+    "the result, lit from below": stones.preview(tiles=(1, 1), light=(270, 35)),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -2,8 +2,8 @@
 A mesh painted with stone
 =========================
 
-A mesh is painted with a texture of space: every corner looks up where it lies, so the pattern goes through the body.
-The knot is drawn by its corners' colours.
+A mesh is painted with a solid texture: each vertex shows the texture at its place, so the texture continues through
+the body without seams. Each face of this knot is drawn in the mean colour of its vertices.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 Smaller and smaller copies
 ==========================
 
-Engines show what is far away by smaller copies of its maps. Colours are averaged as light, not as the numbers in the
-file, which would darken them: a pattern of black and white becomes the grey that it is seen as from afar.
+Game engines show distant surfaces with smaller copies of their maps (mipmaps). texrs averages colours as linear light.
+Averages of the numbers in the file would be too dark. Black and white lines therefore become the grey that they are
+seen as from a distance.
 """
 
 import tempfile
@@ -25,11 +26,11 @@ plain = cloth.reshape(32, 8, 32, 8, 3).mean(axis=(1, 3)).astype("uint8")
 
 figure, row = plt.subplots(1, 5, figsize=(11, 2.8), layout="constrained")
 shown = {
-    "all of it": halves[0],
+    "full size": halves[0],
     "half": halves[1],
     "a quarter": halves[2],
     "an eighth": halves[3],
-    "its numbers averaged": plain,
+    "numbers averaged": plain,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,9 +1,9 @@
 """
-Two textures by a map
-=====================
+Two textures mixed by a map
+===========================
 
-Two examples share a picture as a map says. Things of one lie whole on the other: the border between them follows
-outlines, not the map's edge.
+A map gives the share of two examples at each pixel. Elements of one example lie whole on the other one, so the border
+follows their outlines and not the edge of the map.
 """
 
 import matplotlib.pyplot as plt
@@ -20,7 +20,7 @@ figure, row = plt.subplots(1, 3, width_ratios=[192, 192, 400], figsize=(11, 3.2)
 shown = {
     "leaves": leaves,
     "pebbles": pebbles,
-    "a path": result.image,
+    "the result": result.image,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

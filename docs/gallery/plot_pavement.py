@@ -2,8 +2,8 @@
 Bricks in a crazy pavement
 ==========================
 
-Any tessellation is a layout. Here each cell of points that lie anyhow takes a brick, bent into it, and the joints
-follow.
+Any tessellation can be a layout. Here the cells belong to randomly moved points. Each cell contains one brick, which
+is deformed to fit, and the joints follow the cells.
 """
 
 import matplotlib.pyplot as plt
@@ -22,9 +22,9 @@ paved = texrs.splice(wall, texrs.layouts.cells(panes), (240, 320), layout_scale=
 
 figure, row = plt.subplots(1, 3, width_ratios=[192, 320, 320], figsize=(11, 3.4), layout="constrained")
 shown = {
-    "a wall": wall.image,
-    "cells": texrs.volume.label_to_color(panes),
-    "paved with its bricks": paved,
+    "the example": wall.image,
+    "the cells": texrs.volume.label_to_color(panes),
+    "the result": paved,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

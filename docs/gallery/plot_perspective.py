@@ -2,7 +2,8 @@
 A floor with a wave in it
 =========================
 
-In a picture taken at an angle things have every size. They are grown at the sizes of any map: here of a wave.
+In an oblique image, the apparent size of the elements varies. texrs grows textures with the sizes of any scale map,
+here of a wave.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +16,7 @@ wave = 2 ** (0.8 * np.sin(np.linspace(0, 4 * np.pi, 320)))[np.newaxis] * np.ones
 grown = texrs.perspective(floor, target=wave.astype(np.float32), seed=1).image
 
 figure, row = plt.subplots(1, 3, width_ratios=[192, 320, 320], figsize=(11, 3.2), layout="constrained")
-shown = {"the example": floor, "how large things are to be": wave, "grown": grown}
+shown = {"the example": floor, "the target sizes": wave, "the result": grown}
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)
     axes.set_title(title)

@@ -1,9 +1,9 @@
 """
-How a wall lies
-===============
+Find the plane of a wall
+========================
 
-A plane is found in a single picture by its patterns, which must be alike all over it. Drawn on the picture: a grid of
-the plane, and how large things are seen.
+texrs finds a plane in a single image if its elements are similar everywhere: on the right plane, all of them have one
+size. The second panel shows a grid on the plane that was found, and the third one shows the apparent sizes.
 """
 
 import matplotlib.pyplot as plt
@@ -25,9 +25,9 @@ for axis in range(2):
 
 figure, row = plt.subplots(1, 3, width_ratios=[320, 320, 390], figsize=(11, 3), layout="constrained")
 shown = {
-    "as it was seen": wall,
-    "a grid on the plane that was found": wall,
-    "how large things are": texrs.scale_maps.picture(plane.scale_map()),
+    "the image": wall,
+    "a grid on the plane": wall,
+    "its scale map": texrs.scale_maps.picture(plane.scale_map()),
 }
 for line in lines:
     inside = (line >= 0).all(axis=1) & (line < [256, 320]).all(axis=1)

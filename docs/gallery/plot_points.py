@@ -2,8 +2,8 @@
 Carved out of a texture
 =======================
 
-A texture of space is sampled at any points, as those where the rays of a camera meet a thing. Nothing is unwrapped, so
-no seam shows on it: three balls of one stone.
+A solid texture can be sampled at any points, such as those where the rays of a camera meet an object. Nothing is
+unwrapped, so no seam is visible. Here three balls consist of one stone.
 """
 
 import matplotlib.pyplot as plt
@@ -28,8 +28,8 @@ def turn(radius, middle):
 figure, row = plt.subplots(1, 3, figsize=(11, 3.9), layout="constrained")
 shown = {
     "a ball": turn(40, (0, 0, 0)),
-    "one from beside it": turn(40, (0, 100, 0)),
-    "a large one": turn(64, (0, 0, 60)),
+    "a ball next to it": turn(40, (0, 100, 0)),
+    "a larger ball": turn(64, (0, 0, 60)),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,8 +1,8 @@
 """
-A floor made flat
+A flattened floor
 =================
 
-How the plane lies is found in the picture, and what the camera saw sharply is grown to a texture of any size.
+texrs finds the plane in the image. The parts that are sharp in the image are grown into a flat texture of any size.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +13,7 @@ floor = texrs.samples.tilted_discs((256, 256)).image
 flat = texrs.rectify(floor, size=256, wrap=True, seed=1)
 
 figure, row = plt.subplots(1, 2, figsize=(9, 4.6), layout="constrained")
-shown = {"as it was seen": floor, "flat, and without a seam": flat.image}
+shown = {"the image": floor, "flat and tileable": flat.image}
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)
     axes.set_title(title)

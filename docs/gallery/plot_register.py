@@ -2,8 +2,8 @@
 All maps of a material
 ======================
 
-A result is a source map: it says for each pixel where in the example it comes from. Whatever is in register with the example,
-as a height or a mask of stones, comes out in register too, in its own dtype.
+A source map gives the position in the example for each pixel of the result. Any map that is aligned with the example,
+such as heights or labels of stones, therefore gives a map that is aligned with the result. It keeps its own dtype.
 """
 
 import matplotlib.pyplot as plt
@@ -17,8 +17,8 @@ stones = result.source_map.render(pebbles.labels, interpolation="nearest")
 figure, row = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
 shown = {
     "the result": result.image,
-    "where each pixel comes from": result.source_map.coordinates[..., 1],
-    "the stones known in the example": texrs.volume.label_to_color(stones),
+    "the column that each pixel is from": result.source_map.coordinates[..., 1],
+    "the labels of the stones": texrs.volume.label_to_color(stones),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,8 +1,9 @@
 """
-A layout is put in order
-========================
+A regular layout
+================
 
-A texture's own layout is edited: here stones that lie anyhow come to lie on a lattice. Each keeps its pixels.
+The layout of a texture can be edited. Here buttons at random positions are moved to a lattice, and each button keeps
+its pixels.
 """
 
 import matplotlib.pyplot as plt
@@ -14,7 +15,7 @@ elements = texrs.ElementAnalysis.of_sample(dots)
 ordered = texrs.self_splice(elements, "regularise", seed=1).image
 
 figure, row = plt.subplots(1, 2, figsize=(9, 4.6), layout="constrained")
-shown = {"as it lies": dots.image, "in order": ordered}
+shown = {"the example": dots.image, "on a lattice": ordered}
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)
     axes.set_title(title)

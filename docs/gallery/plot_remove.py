@@ -1,9 +1,9 @@
 """
-Taken off the wall
-==================
+Remove an object from a wall
+============================
 
-Something is taken out of a picture. How the plane behind it lies is found, and what is filled in is as large as things
-are there.
+texrs removes an object from an image. It finds the plane behind the object, and fills in elements of the size that
+belongs there.
 """
 
 import matplotlib.pyplot as plt
@@ -20,8 +20,8 @@ cleared = texrs.remove(seen, thing, seed=3).image
 
 figure, row = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
 shown = {
-    "something before a wall": seen,
-    "taken out": cleared,
+    "an object in front of a wall": seen,
+    "without the object": cleared,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

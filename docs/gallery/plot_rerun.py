@@ -1,8 +1,9 @@
 """
-The same again, years later
-===========================
+Repeat a result
+===============
 
-Every file says how it was made, and is made again from that: the same bytes, or which input changed.
+Every file records how it was made. ``texrs rerun`` repeats the command: it gives the same bytes, or names the input
+that changed.
 """
 
 import contextlib

@@ -1,8 +1,8 @@
 """
-Wood wound round an axis
-========================
+Wood around an axis
+===================
 
-A block is grown from a small one and follows a frame field: here layers go around an axis.
+A large block is grown from a small one and follows a frame field. Here its layers go around an axis.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,7 @@ rings = texrs.solid(wood, 72, field="circular:axis=z", seed=5).image
 figure, row = plt.subplots(1, 2, figsize=(9, 4.8), layout="constrained")
 shown = {
     "the example": texrs.volume.render_block(wood, 400),
-    "wound round an axis": texrs.volume.render_block(rings, 400),
+    "the result": texrs.volume.render_block(rings, 400),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,9 +1,9 @@
 """
-What a source map says
-======================
+What a source map contains
+==========================
 
-A result is not an image: for each pixel it says where in the example it comes from. Neighbours that come from
-neighbours belong to one patch; where that ends there is a seam.
+A source map gives the position in the example that each pixel of the result comes from. Neighbours that come from
+neighbouring positions belong to one patch. The borders between patches are seams.
 """
 
 import matplotlib.pyplot as plt
@@ -23,10 +23,10 @@ ramp[..., 2] = 0.7 - 0.25 * ramp[..., :2].sum(axis=-1)
 figure, row = plt.subplots(1, 5, width_ratios=[160, 160, 260, 260, 260], figsize=(11, 2.4), layout="constrained")
 shown = {
     "the example": pebbles,
-    "its places": ramp,
+    "its positions": ramp,
     "the result": result.image,
-    "where each pixel is from": np.clip(where, 0, 1),
-    "seams": drawn,
+    "the source map": np.clip(where, 0, 1),
+    "the seams": drawn,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,9 +1,9 @@
 """
-These stones in that order
+Elements in another layout
 ==========================
 
-The elements of one texture take the places of those of another: what is rigid is copied pixel by pixel, and the ground between
-is grown by example.
+The elements of one texture are moved to the places of the elements of another texture. Rigid elements are copied pixel
+by pixel, and the background between them is synthesised.
 """
 
 import matplotlib.pyplot as plt
@@ -16,7 +16,7 @@ layout = texrs.samples.net((192, 192))
 spliced = texrs.splice(elements, layout.image, seed=3).image
 
 figure, row = plt.subplots(1, 3, figsize=(11, 4), layout="constrained")
-shown = {"these elements": dots.image, "in this order": layout.image, "spliced": spliced}
+shown = {"the elements": dots.image, "the layout": layout.image, "the result": spliced}
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)
     axes.set_title(title)

@@ -1,9 +1,9 @@
 """
-How a design comes about
-========================
+Stages of a result
+==================
 
-Every verb keeps pictures of its stages: what was taken for elements, how they were moved, how what was left open was
-filled, and the tiles of it that were joined.
+Every verb keeps images of its stages. In a design, elements are found and moved, holes are filled, and such copies are
+stitched to a larger texture.
 """
 
 import matplotlib.pyplot as plt
@@ -19,8 +19,8 @@ shown = {
     "the example": pebbles,
     "elements": stages["segmentation"],
     "moved": stages["deformed"],
-    "completed": stages["completed"],
-    "larger": result.image,
+    "filled": stages["completed"],
+    "the result": result.image,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,9 +1,9 @@
 """
-Bricks around things
-====================
+Bricks around objects
+=====================
 
-A target may be a surface: a column and a ball by their normals, or circles by an angle for each pixel. Bricks are
-foreshortened as the surface is.
+A target can be a surface. Here the normals of a column and of a ball are given, and circles by an angle for each
+pixel. The bricks are foreshortened as the surface is.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,9 @@
 """
-A photograph without a seam
-===========================
+A tileable photograph
+=====================
 
-The borders of a photograph are joined along the cuts that show least; the rest of the photograph stays where it was. Two by two
-copies of the photograph show its borders as a cross, and copies of the tile show none.
+The borders of a photograph are joined along the least visible cuts. The rest of the photograph stays where it was. Two
+by two copies of the photograph show its borders as a cross, and copies of the tile show none.
 """
 
 import matplotlib.pyplot as plt

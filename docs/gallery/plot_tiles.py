@@ -2,8 +2,9 @@
 Corner tiles
 ============
 
-An endless design in the memory of one picture: square tiles whose corners have colours, laid so that colours meet. Each
-meets all others without a seam, and any window is a look-up.
+Corner tiles give an unbounded texture that needs the memory of one image. The corners of the square tiles have
+colours, and tiles are placed so that the colours match. Tiles that match have no seam between them, and any window is
+a look-up.
 """
 
 import matplotlib.pyplot as plt
@@ -15,8 +16,8 @@ window = tiles[10**9 : 10**9 + 288, 0:480]
 
 figure, row = plt.subplots(1, 2, width_ratios=[288, 480], figsize=(11, 4.2), layout="constrained")
 shown = {
-    "the atlas of tiles": tiles.atlas,
-    "a window, far out": window,
+    "all tiles": tiles.atlas,
+    "a window far away": window,
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,9 +1,9 @@
 """
-Inside of a block
+Look into a block
 =================
 
-A volume is seen through: by default all that differs from what is most frequent, or by a transfer function, which says for each
-lightness what colour is shown and how much of the light is kept back.
+A volume can be drawn transparent. By default, all voxels are visible that differ from the most frequent colour. A
+transfer function can instead give the colour and the opacity for each lightness.
 """
 
 import matplotlib.pyplot as plt
@@ -16,8 +16,8 @@ dark = [(0, None, 0.3), (0.35, None, 0.3), (0.36, None, 0), (1, None, 0)]
 figure, row = plt.subplots(1, 3, figsize=(11, 4), layout="constrained")
 shown = {
     "from outside": volume.render_block(block, 400),
-    "what stands out": volume.render_volume(block, 400),
-    "what is dark": volume.render_volume(block, 400, transfer=dark),
+    "less frequent colours": volume.render_volume(block, 400),
+    "dark voxels": volume.render_volume(block, 400, transfer=dark),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -1,9 +1,9 @@
 """
-Windows of a volume without an end
-==================================
+Windows of an unbounded volume
+==============================
 
-A texture of space has no borders: any window of it can be asked for, in any order, and shows the same. Two windows that
-were made far apart in time lie side by side, and no seam tells where they meet.
+A solid texture has no borders. Any window of it can be requested, in any order, and all windows agree. Here two
+neighbouring windows were computed one after the other, and no seam is visible where they meet.
 """
 
 import matplotlib.pyplot as plt
@@ -18,8 +18,8 @@ left = texture[1_000_000, -64:64, -96:0]
 
 figure, row = plt.subplots(1, 3, width_ratios=[96, 96, 192], figsize=(11, 3.8), layout="constrained")
 shown = {
-    "made later": left,
-    "made first": right,
+    "computed second": left,
+    "computed first": right,
     "side by side": np.concatenate([left, right], axis=1),
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):

@@ -2,8 +2,8 @@
 Along one axis, or along both
 =============================
 
-What a result wraps along is said for each axis. A frieze goes on to the right and ends above and below; a ground goes
-on both ways. The pictures are rolled by half of their size, so that what were the borders lie in the middle.
+``wrap`` gives the axes along which a result is periodic. A frieze continues to the right, and a background in both
+directions. The images are rolled by half of their size, so that their borders are in the middle.
 """
 
 import matplotlib.pyplot as plt
@@ -18,9 +18,9 @@ seen = {wrap: np.roll(picture, half, axis=(0, 1)) for wrap, picture in made.item
 
 figure, row = plt.subplots(1, 3, figsize=(11, 3.2), layout="constrained")
 shown = {
-    "along neither": seen[False],
-    "along rows only": seen[False, True],
-    "along both": seen[True],
+    "not periodic": seen[False],
+    "periodic from left to right": seen[False, True],
+    "periodic along both axes": seen[True],
 }
 for axes, (title, picture) in zip(row, shown.items(), strict=True):
     axes.imshow(picture)

@@ -96,7 +96,7 @@ def document(
     *,
     title: str = "texrs",
     lead: str = "New textures from one example.",
-    end: str = "All results were made when this page was written; the same version makes the same ones.",
+    end: str = "All results were computed when this page was written. The same version gives the same results.",
     command: str = "texrs demo",
     style: str = "",
 ) -> str:

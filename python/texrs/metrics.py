@@ -47,11 +47,11 @@ for a broken line.
 BAND = 3
 """Width in pixels on both sides of a seam for the measurement of blur."""
 CELL = 8
-"""Side of the cells that count use, in pixels."""
+"""Side of the cells for which use and repetition are counted, in pixels."""
 GROUND = 0.1
 """Weight of the background if there are elements."""
 ALIKE = 4
-"""Steps a unit for the comparison of frames. Frames with equal steps count as equal."""
+"""Steps per unit for the comparison of frames. Frames with equal steps count as equal."""
 TORN, BROKEN, BLUR, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.1, 0.1
 """Weights of the figures in the score."""
 
@@ -64,7 +64,7 @@ class Quality:
     ----------
     torn : float
         Length of seams that cross elements, divided by the expected total outline length: 0 or more. Invisible
-        seams count a quarter.
+        seams have a weight of 0.25.
     broken : float
         Length of lines that break off at seams, divided by the length of such lines, minus the usual share in the
         exemplar.
@@ -72,7 +72,7 @@ class Quality:
         Share of the detail that is missing next to seams, compared with the exemplar; 0 to 1.
     repetition : float
         Amount of exact repetition compared with random patches, weighted by how conspicuous the places are. It is 0 if
-        nothing repeats, 1 if patches are random, and a quarter if they are also mirrored.
+        nothing repeats, 1 if patches are random, and 0.25 if they are also mirrored.
     coverage : float
         Share of the exemplar that is shown, 0 to 1, relative to the available area.
 
@@ -123,7 +123,7 @@ def evaluate(
     elements: ElementOptions = ElementOptions(),
     wrap: bool | tuple[bool, bool] = False,
 ) -> Quality:
-    """Evaluate a texture that was made from one exemplar.
+    """Evaluate a texture that was synthesised from one exemplar.
 
     Parameters
     ----------
@@ -246,9 +246,8 @@ def _measure_traits(exemplar: Exemplar, elements: ElementOptions) -> _Traits:
 def _measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
     """Return how conspicuous each cell is.
 
-    This is the deviation of its mean and contrast from the usual ones, in standard deviations.
-
-    Background counts little if there are elements, because its repetition is not noticed.
+    The value is the deviation of its mean and contrast from the medians of all cells, in standard deviations. If there
+    are elements, the background counts little, because its repetition is not noticed.
     """
     rows, columns = (-(-n // CELL) for n in colours.shape[:2])
     fill = ((0, rows * CELL - colours.shape[0]), (0, columns * CELL - colours.shape[1]), (0, 0))

@@ -12,19 +12,22 @@ from texrs._typing import Array, Bools
 MEASURES: dict[str, tuple[str, str]] = {
     "colours": (
         "%",
-        "how far colours must be moved to be those of the example, of the range (the 1-Wasserstein distance)",
+        "distance of the colours from the colours of the example (1-Wasserstein), as a share of the value range",
     ),
     "detail": (
         "octaves",
-        "how many times too much or too little contrast there is, the mean over four sizes of detail",
+        "error of the contrast, as the mean over four sizes of detail; 1 is twice or half the contrast of the example",
     ),
     "repetition": (
         "",
-        "how alike the picture is to itself elsewhere, beyond the example: 0 not at all, 1 as copies are",
+        "similarity of the image to shifted copies of itself, beyond that of the example: 0 none, 1 exact copies",
     ),
-    "border": ("", "steps between opposite borders over those inside the example, less 1"),
-    "error": ("%", "how far the hole is from what was there, of the range; one of many good fillings was there"),
-    "rim": ("", "steps along the border of the hole over those of the example, less 1"),
+    "border": ("", "mean step between opposite borders, divided by the mean step inside the example, minus 1"),
+    "error": (
+        "%",
+        "difference from the original pixels of the hole, as a share of the range; other fillings can be as good",
+    ),
+    "rim": ("", "mean step across the border of the hole, divided by the mean step in the image, minus 1"),
 }
 """Unit and description of each measure."""
 OCTAVES = 4

@@ -83,7 +83,7 @@ def find_program(name: str, do: Callable[[str, Request], Array]) -> Callable[[Ma
 FREE = ("copies", "as it is")
 """Trivial methods, shown only for comparison."""
 
-# --- what costs nothing ----------------------------------------------------------------------------------------------
+# --- trivial methods -------------------------------------------------------------------------------------------------
 
 
 def put_side_by_side(asked: Request) -> Array:
@@ -93,7 +93,7 @@ def put_side_by_side(asked: Request) -> Array:
     return np.tile(asked.picture, copies)[: asked.size, : asked.size]
 
 
-# --- others ----------------------------------------------------------------------------------------------------------
+# --- other programs --------------------------------------------------------------------------------------------------
 
 
 def run(*words: object) -> None:
@@ -175,10 +175,10 @@ EMBARK = "cargo install texture-synthesis-cli, or --program embark=PATH"
 OPENCV = "pip install opencv-python-headless"
 XPHOTO = "pip install opencv-contrib-python-headless"
 RESYNTHESIZER = (
-    "no program of it is published: build one around its engine, as benches/fillers.py says, and name it by "
-    "--program resynthesizer=PATH"
+    "no ready program is published: build one around its engine, as described in benches/fillers.py, and give its path "
+    "with --program resynthesizer=PATH"
 )
-PATCH_MATCH = "build https://github.com/vacancy/PyPatchMatch, which gives the module patch_match"
+PATCH_MATCH = "build https://github.com/vacancy/PyPatchMatch, which installs the module patch_match"
 
 METHODS = (
     Method("copies", "more", always(put_side_by_side)),

@@ -16,12 +16,14 @@ from texrs.comparison._tasks import TASKS
 
 SECONDS = "seconds"
 INTRO = (
-    "All methods get the same 8-bit pictures and make theirs with their own defaults; no result was chosen. Of every figure "
-    "less is better, 0 is what the example has itself, and the best of each column is bold. Figures see some of what eyes "
-    "see: torn things and doubled ones they hardly see, so look at the pictures first. What costs nothing, copies and the "
-    "picture as it is, stands there for comparison alone."
+    "All methods get the same 8-bit images and run with their own defaults. Results were not selected. Lower values are "
+    "better, and 0 is the value of the example itself. The best value of each column is bold. Look at the images first, "
+    "because the measures hardly detect torn and repeated elements. Trivial methods, which return copies or the image "
+    "itself, are listed only for comparison."
 )
-MISS = "Methods that are not installed here, and how to get them. The page takes them in by itself once they are."
+MISS = (
+    "Methods that are not installed on this machine, and how to get them. Installed methods are compared automatically."
+)
 
 
 def make_page(
@@ -47,14 +49,14 @@ def make_page(
             for m in missing
         )
         head = "<tr><th scope=col>method</th><th scope=col>task</th><th scope=col>how to get it</th></tr>"
-        links.append(("missing", "Not here"))
-        parts.append(section("missing", "Not here", MISS, table(head + rows)))
-    end = f"{len(pictures)} pictures, {len({r.method for r in results})} methods."
+        links.append(("missing", "Not installed"))
+        parts.append(section("missing", "Not installed", MISS, table(head + rows)))
+    end = f"{len(pictures)} images, {len({r.method for r in results})} methods."
     return document(
         links,
         parts,
-        title="Compared",
-        lead="What several methods make of the same pictures.",
+        title="Comparison",
+        lead="Results of several methods for the same images.",
         end=end,
         command="texrs compare",
         style=STYLE,
@@ -65,7 +67,9 @@ def explain(timed: bool) -> str:
     """Return the list of measures and their descriptions."""
     rows = [(name, unit, text) for name, (unit, text) in MEASURES.items()]
     if timed:
-        rows.append((SECONDS, "s", "processor seconds, of all threads and programs; what is loaded first counts too"))
+        rows.append(
+            (SECONDS, "s", "processor seconds of all threads and programs, including the time to load a program")
+        )
     entries = "".join(
         f"<dt>{escape(name)}{f' <small>{escape(unit)}</small>' if unit else ''}</dt><dd>{escape(text)}</dd>"
         for name, unit, text in rows
@@ -85,7 +89,7 @@ def tabulate(results: Sequence[Result], timed: bool) -> str:
     best = {
         n: min((v for m in methods if m not in FREE and (v := means[m, n]) is not None), default=None) for n in names
     }
-    head = "<th scope=col>mean over the pictures</th>" + "".join(f"<th scope=col>{escape(n)}</th>" for n in names)
+    head = "<th scope=col>mean over the images</th>" + "".join(f"<th scope=col>{escape(n)}</th>" for n in names)
     rows = []
     for method in methods:
         cells = []

@@ -45,12 +45,12 @@ def judge_hole(asked: Request, made: Array) -> dict[str, float]:
 
 
 TASKS = {
-    "more": Task("More of a texture", "A larger texture from a small picture, cyclic along both axes.", judge_more),
+    "more": Task("A larger texture", "A larger texture from a small image, tileable along both axes.", judge_more),
     "tile": Task(
-        "No seam",
-        "The picture itself, so that copies have no edge between them: results are shown two by two.",
+        "A tileable image",
+        "The image itself, changed so that copies have no visible border. The results are shown as 2 x 2 copies.",
         judge_tile,
     ),
-    "hole": Task("A hole filled", "A square in the middle was taken out, and is filled.", judge_hole),
+    "hole": Task("A filled hole", "A square in the middle of the image was removed, and is filled.", judge_hole),
 }
 """Tasks by the names that options use."""

@@ -38,7 +38,7 @@ def _fail(workshop: Workshop) -> str:
                 [figure(covered, "A wide hole in a floor")],
                 figure(
                     filled,
-                    "Filled with elements that are cut off",
+                    "Filled, but some elements are cut off",
                     note="texrs remove, above, copies them from the flattened plane",
                 ),
             ),
@@ -49,6 +49,6 @@ def _fail(workshop: Workshop) -> str:
 LIMITS = Section(
     "limits",
     "What fails",
-    "All parts of a texture look alike. If an image is not a texture, the same commands give these results.",
+    "texrs requires that all parts of a texture look similar. If they do not, its commands can give results such as these.",
     _fail,
 )

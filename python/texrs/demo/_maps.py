@@ -56,9 +56,9 @@ def _maps(workshop: Workshop) -> str:
             + grid(show(result.material, "of the result"), least=MAP, columns=5)
         )
     return code(
-        "texrs design STONES -o NEW --size 2048x2048 --preview lit.png   # a folder of maps, and a folder of maps\n"
-        "texrs design albedo.png -o new.png --source-map map.npz                # or one by one\n"
-        "texrs apply map.npz normals.png -o new-normals.png --map-type normal # with the same options"
+        "texrs design STONES -o NEW --size 2048x2048 --preview lit.png         # a folder of maps to a folder of maps\n"
+        "texrs design albedo.png -o new.png --source-map map.npz               # or map by map\n"
+        "texrs apply map.npz normals.png -o new-normals.png --map-type normal  # with the same source map"
     ) + "".join(rows)
 
 
@@ -115,15 +115,15 @@ MATERIALS = (("leaves_and_flowers", "Flowers on leaves"),)
 OPENING = Section(
     "material",
     "A material, as large as you need",
-    "Synthesised from a small example with all its maps. Each stone keeps its height and its roughness, and the light comes "
-    "from the same side everywhere.",
+    "The material was synthesised from a small example with all its maps. Each stone keeps its height and its roughness, "
+    "and the light comes from the same side everywhere.",
     _open,
 )
 MAPS = Section(
     "maps",
     "All maps stay aligned",
-    "The result of a synthesis is a source map: the position in the example of each pixel, and its local frame. One source "
-    "map therefore gives all maps of a material. All maps contribute to its decisions. Each map is copied in its own dtype "
-    "and blended according to its role. Normals rotate with their elements, so that the light does not change.",
+    "A synthesis computes a source map: the position in the example of each pixel, and its local frame. One source map "
+    "gives all maps of a material, and all maps contribute to it. Each map is copied in its own dtype and blended "
+    "according to its role. Normals rotate with their elements, so that the light does not change.",
     _maps,
 )

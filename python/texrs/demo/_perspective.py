@@ -95,7 +95,7 @@ def _perspective(workshop: Workshop) -> str:
 PERSPECTIVE = Section(
     "perspective",
     "Elements of the right size",
-    "In an image in perspective, the size of elements varies. A scale map specifies these sizes. Textures are grown with "
-    "element sizes of the same map, of any other map, or of a surface. Planes are flattened, and objects are removed.",
+    "In an image in perspective, the apparent size of elements varies. A scale map contains these sizes. texrs grows "
+    "textures with the sizes of the same map, of another map, or of a surface. It also flattens planes and removes objects.",
     _perspective,
 )

@@ -29,7 +29,7 @@ def _tile(workshop: Workshop) -> str:
         note = " and ".join(str(n) for n in made.report["overlap"])
         rows.append(
             row(
-                figure(picture, "A picture", note=" × ".join(map(str, picture.shape[:2]))),
+                figure(picture, "The image", note=" × ".join(map(str, picture.shape[:2]))),
                 pair(made.image, caption, "The result, tiled 2 × 2", note=f"overlap chosen: {note} pixels"),
             )
         )

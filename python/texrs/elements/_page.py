@@ -74,13 +74,13 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
 <p>{len(entry.points)} elements in {height} x {width} pixels; foreground {entry.mask.mean():.0%};
 {escape(entry.arrangement.describe(entry.layout))}.</p>
 <table>{"".join(rows)}</table>{f"<ul>{doubts}</ul>" if doubts else ""}
-<p>Click an element to drop it, and any other place to add one. Elements: <label>layout <select id="layout">{options}</select>
-</label></p>
+<p>Click an element to drop it, or any other place to add an element. <label>Layout of the elements:
+<select id="layout">{options}</select></label></p>
 <svg id="view" viewBox="-0.5 -0.5 {width} {height}" role="img" aria-label="Elements, each with its number">
 <image href="{_to_uri(draw_plain(entry.image))}" x="-0.5" y="-0.5" width="{width}" height="{height}"/><g id="marks"></g></svg>
-<figure><img src="{_to_uri(drawn["mask"])}" alt="Mask" width="{width}"><figcaption>What is not foreground lies under blue.
+<figure><img src="{_to_uri(drawn["mask"])}" alt="Mask" width="{width}"><figcaption>The foreground; the background is blue.
 </figcaption></figure>
-<label for="list">Corrections, for <code>--corrections FILE.json</code>:</label>
+<label for="list">Corrections: save them to a file for <code>--corrections FILE.json</code>.</label>
 <textarea id="list" rows="6" readonly></textarea>
 <script>const known = {data};
 {SCRIPT}</script>
