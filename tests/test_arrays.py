@@ -182,7 +182,9 @@ def test_every_mode_of_pil_is_taken_as_it_looks(mode: str):
 
 @pytest.mark.parametrize("mode", ["CMYK", "LAB"])
 def test_inks_and_lab_are_refused_with_what_to_do(mode: str):
-    with pytest.raises(InvalidInput, match=f"image: the mode {mode} of this PIL image is not supported; convert it with "):
+    with pytest.raises(
+        InvalidInput, match=f"image: the mode {mode} of this PIL image is not supported; convert it with "
+    ):
         texrs.tile(make_picture(mode))
 
 
