@@ -95,7 +95,7 @@ def test_flat_exemplars_take_no_time():
         ({"n": 6}, "n: needs an odd number"),
         ({"n": 51}, "n: must be smaller, because an exemplar of .* does not have 3 samples 51 apart"),
         ({"k": 16, "n": 11}, "n: must be smaller, because an exemplar of .* does not have 16 samples 11 apart"),
-        ({"numbers": 9}, "numbers: 8 or 24"),
+        ({"numbers": 9}, "numbers: must be 8 or 24"),
     ],
 )
 def test_what_leaves_no_candidates(options, words):

@@ -79,7 +79,7 @@ def test_progress_is_reported_and_can_stop():
         ({"max_iterations": -1}, "max_iterations"),
         ({"wrap": "yes"}, "wrap"),
         ({"image": np.full((4, 4), np.inf)}, "image"),
-        ({"image": np.full((4, 4), 1e30)}, "image: values up to"),
+        ({"image": np.full((4, 4), 1e30)}, "image: must have values of at most"),
     ],
 )
 def test_refuses_with_a_reason(arguments, message):

@@ -117,7 +117,7 @@ def test_progress_can_stop():
         ({"least": -1}, "least"),
         ({"wrap": "yes"}, "wrap"),
         ({"image": np.full((4, 4), np.inf)}, "image"),
-        ({"image": np.full((4, 4), 1e30)}, "image: values up to"),
+        ({"image": np.full((4, 4), 1e30)}, "image: must have values of at most"),
     ],
 )
 def test_refuses_with_a_reason(arguments, message):

@@ -238,7 +238,7 @@ def jitter(
 
 def _check_numbers(numbers: int) -> int:
     if numbers not in (8, 24):
-        raise InvalidInput(f"numbers: 8 or 24 are allowed, got {numbers!r}")
+        raise InvalidInput(f"numbers: must be 8 or 24, got {numbers!r}")
     return int(numbers)
 
 

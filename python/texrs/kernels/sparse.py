@@ -159,6 +159,6 @@ def _list_entries(
         columns = columns.copy()
         columns.sum_duplicates()
     if max(columns.nnz, columns.shape[0]) >= 1 << 31:
-        raise InvalidInput(f"{name}: up to 2^31 rows and entries are allowed, got {columns.shape[0]} and {columns.nnz}")
+        raise InvalidInput(f"{name}: must have at most 2^31 rows and entries, got {columns.shape[0]} and {columns.nnz}")
     starts, rows = (np.ascontiguousarray(x, np.int32).view(np.uint32) for x in (columns.indptr, columns.indices))
     return starts, rows, as_array(columns.data, name, np.float64)

@@ -106,7 +106,7 @@ def mesh(
         raise InvalidInput(f"target: needs two or more rows and columns, got {shape}")
     layers = np.zeros(shape, np.uint8) if weight is None else as_array(weight, "weight", np.uint8, shape)
     if int(layers.max()) > 254:
-        raise InvalidInput("weight: up to 254 is allowed, got 255")
+        raise InvalidInput("weight: must be at most 254, got 255")
     if void is not None:
         layers = np.where(as_mask(void, "void", shape), np.uint8(255), layers)
     out = as_size(shape if size is None else size)

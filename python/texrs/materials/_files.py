@@ -75,7 +75,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
             f"{f' ({lines})' if lines else ''}"
         )
     if len(taken) > MOST:
-        raise FileError(f"{path}: has {len(taken)} maps, up to {MOST} are allowed")
+        raise FileError(f"{path}: must have at most {MOST} maps, got {len(taken)}")
     maps = {name: read_map(files[name], role, axes) for name, role in taken.items()}
     shape = next(iter(maps.values())).pixels.shape[:axes]
     # A file without a role in its name can still contain labels, by its values.

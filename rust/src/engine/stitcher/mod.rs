@@ -232,11 +232,14 @@ fn check<const D: usize>(
 ) -> Result<()> {
     let n = region.grid.len();
     frames.check(n)?;
-    // Given points are all absent or one for each point; only `loose` may be absent alone.
-    let loose = given.loose.len();
-    for got in [given.points.len(), given.places.len(), loose] {
-        let none = got == 0 && (given.points.is_empty() || got == loose);
-        if !(none || (got == n && got == given.points.len())) {
+    // Points and places are both absent, or one for each point. Only `loose` may be absent by itself.
+    let held = given.points.len();
+    for (got, right) in [
+        (held, held == 0 || held == n),
+        (given.places.len(), given.places.len() == held),
+        (given.loose.len(), [0, held].contains(&given.loose.len())),
+    ] {
+        if !right {
             return Err(Error::Shape {
                 argument: "held",
                 expected: region.grid.shape().to_vec(),

@@ -398,23 +398,26 @@ fn bad_arrays_and_options_are_refused() {
             .is_err()
         );
     }
-    let few = Given {
-        points: &[true],
-        places: &[[0; 2]],
-        loose: &[],
-    };
-    assert!(
-        stitch(
-            &source,
-            &region,
-            frames,
-            None,
-            few,
-            &OPTIONS,
-            &Monitor::default()
-        )
-        .is_err()
-    );
+    let every = vec![true; region.grid.len()];
+    for (points, places) in [(&[true][..], &[[0; 2]][..]), (&every, &[])] {
+        let given = Given {
+            points,
+            places,
+            loose: &[],
+        };
+        assert!(
+            stitch(
+                &source,
+                &region,
+                frames,
+                None,
+                given,
+                &OPTIONS,
+                &Monitor::default()
+            )
+            .is_err()
+        );
+    }
     let stopped = Monitor::default();
     stopped.cancel();
     assert!(
