@@ -119,7 +119,7 @@ def test_hostile_arguments(here: Path, capsys: Capture, name: str) -> None:
 NAMES = {
     "out.xyz": ".png",
     "out": ".png",
-    "no/out.png": "no folder",
+    "no/out.png": "the folder no does not exist",
     ".": "folder",
     "folder.png": "folder",
     "in.png/out.png": "in.png",
