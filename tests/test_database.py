@@ -279,7 +279,7 @@ def test_a_texture_is_removed_with_the_copy_of_its_pixels(textures: TextureDatab
         (lambda db: db.add(DOTS.image, "x", boxes=3), "boxes: is not an option"),
         (lambda db: db["nobody"], "name: texture 'nobody' is not in"),
         (lambda db: db.matrix(cell=3), "cell: must be an integer"),
-        (lambda db: db.matrix([], []), "rows: no textures"),
+        (lambda db: db.matrix([], []), "rows: must be at least one name"),
         (lambda db: db.matrix(["dots"], ["nobody"]), "name: texture 'nobody' is not in"),
         (lambda db: db.matrix("dots"), "rows: must be a sequence of names"),
         (lambda db: db.remove("nobody"), "name: texture 'nobody' is not in"),

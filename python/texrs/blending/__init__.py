@@ -80,8 +80,8 @@ def blend(
 
     Across a seam, g is the mean of the differences that the sources of p and q have: ``I(S(p) + J(p) e) - I(S(p))``
     and ``I(S(q)) - I(S(q) - J(q) e)``. Only differences inside the exemplars count; g is 0 if neither is inside. A
-    seam follows the outline of an element if one of the sources itself shows the step across it, and then g is the actual
-    step. Outlines are detected in all channels together.
+    seam follows the outline of an element if one of the sources itself shows the step across it, and then g is the
+    actual step. Outlines are detected in all channels together.
 
     Parameters
     ----------

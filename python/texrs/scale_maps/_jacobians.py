@@ -76,8 +76,8 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     ----------
     normals : (rows, columns, 3) array
         Normals: x to the right, y up, z towards the viewer. Integers mean 2 v - 1, as in a normal map. Floats that are
-        never negative and do not have length 1 are decoded in the same way. Zeros and NaN mark pixels without a surface,
-        which count as seen from the front.
+        never negative and do not have length 1 are decoded in the same way. Zeros and NaN mark pixels without a
+        surface, which count as seen from the front.
     green : {"up", "down"}
         Direction of y: "up" (OpenGL) or "down" (DirectX). Default: "up".
 
