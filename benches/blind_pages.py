@@ -1,4 +1,4 @@
-"""Blind pages: an exemplar, ours and the Resynthesizer's result, in an order that is drawn and hidden until all are judged.
+"""Write blind pages: an example, and results of texrs and the Resynthesizer in a hidden random order.
 
     python benches/blind_pages.py OUT PICTURE ... --resynthesizer PROGRAM [--seed 1]
     python benches/blind_pages.py OUT --votes votes.json

@@ -1,4 +1,4 @@
-"""How long a verb works without asking whether it is to stop: the longest gap between two calls of its progress, by stage.
+"""Measure how long a verb works before it can be stopped: the longest gap between two progress reports, by stage.
 
     python benches/cancel_table.py [VERB ...]
 

@@ -1,4 +1,4 @@
-"""DESIGN as a whole: how long each part of the work takes. Interleaved rounds, medians; a markdown table.
+"""Measure the time of each part of DESIGN: interleaved rounds, medians, a Markdown table.
 
 python benches/design_speed.py [--rounds 3] [--threads N] [--quick]
 

@@ -1,4 +1,4 @@
-"""DESIGN over many textures: the acceptance checks as a markdown table, and pictures to look at.
+"""Run the acceptance checks of DESIGN on many textures: a Markdown table and images.
 
     TEXRS_TEXTURES=<folder> python benches/design_table.py [--seeds 3] [--size 2x] [--out table.md] [--pictures DIR]
 

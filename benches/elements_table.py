@@ -1,4 +1,4 @@
-"""How well elements are found in annotated textures (check S1), from given boxes and by the automatic start.
+"""Measure how well elements are found in annotated textures (check S1), from given boxes and automatically.
 
 TEXRS_TEXTURES=FOLDER python benches/elements_table.py [PICTURES]
 

@@ -1,4 +1,4 @@
-"""Photographs of planes made twice as wide and high: is it still the same plane, as sharp, and what does it cost?
+"""Extend photographs of planes to twice the size: is it the same plane, as sharp, and how long does it take?
 
     python benches/extend_table.py OUT PICTURE ... [--seed 1]
 

@@ -1,4 +1,4 @@
-"""Pictures under fields: what seams cost and how the colours are shared, of quality "preserve" beside "fast".
+"""Compare images along fields: costs of seams and shares of colours, for quality "preserve" and "fast".
 
     [TEXRS_TEXTURES=<folder>] python benches/fields_table.py [--size 256] [--seed 1] [--only NAME] [--pictures DIR]
 

@@ -1,4 +1,4 @@
-"""Blind pages of mended holes: where was something taken out? Whose holes are not found?
+"""Write blind pages of filled holes: can a viewer find the filled place?
 
     python benches/holes_pages.py OUT PICTURE ... [--resynthesizer PROGRAM] [--holes 3]
     python benches/holes_pages.py OUT --votes votes.json

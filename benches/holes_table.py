@@ -1,4 +1,4 @@
-"""Holes in photographs taken at an angle: texture x method x check as a markdown table, and pictures to look at.
+"""Check filled holes in oblique images: a Markdown table of texture, method and check, and images.
 
     TEXRS_TEXTURES=<folder> python benches/holes_table.py [--only NAME] [--resynthesizer PROGRAM] [--pictures DIR]
 

@@ -1,4 +1,4 @@
-"""From nothing but Python to a first picture of one's own: texrs beside others, each in a clean place of its own.
+"""Measure installations from an empty environment to a first image: texrs and other packages.
 
     make wheel
     python benches/install_table.py [dist/texrs-*.whl] [--out docs/install.json]
@@ -50,7 +50,7 @@ def list_candidates(wheel: Path) -> dict[str, tuple[list[str], list[str], str]]:
         "scikit-image": (
             ["scikit-image"],
             ["python", "-c", SKIMAGE],
-            "a hole filled smoothly; it makes no textures",
+            "a smoothly filled hole; it does not synthesise textures",
         ),
         "G2S": (["G2S", "pillow"], ["python", "-c", G2S], "a simulation of 128 x 128; needs its server"),
     }

@@ -1,4 +1,4 @@
-"""Volumes of separate elements: whether these are whole, apart, of one colour, and as many as they were.
+"""Check volumes of separate elements: are they whole, separate, of one colour, and of the expected number?
 
     python benches/integrity_table.py [--size 96] [--seeds 3] [--only NAME] [--pictures DIR]
 

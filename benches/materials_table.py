@@ -1,4 +1,4 @@
-"""Materials through the verbs, one command each: register, shading, dtypes, time and memory.
+"""Run each verb on materials with one command: alignment, shading, dtypes, time and memory.
 
     python benches/materials_table.py OUT FOLDER ... [--size 2048] [--verb VERB ...] [--limit SECONDS]
 

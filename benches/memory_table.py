@@ -1,4 +1,4 @@
-"""What each verb takes, as `texrs.limits.estimate_memory` predicts it, beside the peak that is measured.
+"""Compare the memory of each verb: the estimate of `texrs.limits.estimate_memory` and the measured peak.
 
     python benches/memory_table.py [VERB ...]
 

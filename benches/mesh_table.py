@@ -1,4 +1,4 @@
-"""What is seen where an atlas is cut: painted meshes, as a viewer mixes their texels, beside the texture itself.
+"""Measure visible cuts of an atlas: painted meshes, as a viewer interpolates their texels, and the texture itself.
 
 Run ``python benches/mesh_table.py MESH... [--sample particles] [--atlas 1024]``. On edges along which the atlas is cut, and on
 all others, the table has the difference between the two sides, and that to the texture, in levels of 8 bit (the median, nine

@@ -1,4 +1,4 @@
-"""Time and memory of PERSPECTIVE: seconds and CPU seconds by size, growth with the output's pixels, bytes a pixel.
+"""Measure time and memory of PERSPECTIVE: seconds and CPU seconds by size, growth with the output, bytes a pixel.
 
 Memory is the highest resident size since the start, less what a small result left and what is given back: the picture, its
 source map and its stages. The exemplar's copies in several sizes, some 20 megabytes here, do not grow with the output.

@@ -1,4 +1,4 @@
-"""PERSPECTIVE over textures whose scale is known: texture x target x check as a markdown table, and pictures to look at.
+"""Check PERSPECTIVE on textures with known scale: a Markdown table of texture, target and check, and images.
 
     [TEXRS_TEXTURES=<folder>] python benches/perspective_table.py [--seeds 3] [--size 320x384] [--only NAME]
         [--variants default,alone,plain,paper] [--evaluator <texture_quality.py>] [--tears <deep_quality.py>]

@@ -1,4 +1,4 @@
-"""Planes found in pictures alone: generated floors whose planes are known, and photographs with theirs; reliability; speed.
+"""Find planes in single images: generated floors and photographs with known planes; accuracy, reliability and speed.
 
     [TEXRS_TEXTURES=FOLDER] python benches/planes_table.py [--rounds 4] [--pictures DIR]
 

@@ -1,4 +1,4 @@
-"""Flat textures of floors whose planes are known: how evenly large things are in them, and whether they can be tiled.
+"""Check flat textures of floors with known planes: how equal the sizes of elements are, and whether they can be tiled.
 
     [TEXRS_TEXTURES=FOLDER] python benches/rectify_table.py [--pictures DIR]
         [--evaluator <texture_quality.py>] [--tears <deep_quality.py>]

@@ -1,4 +1,4 @@
-"""Scale maps against ground truth: correlation and slope as markdown, speed, and pictures to look at.
+"""Compare scale maps with ground truth: correlation, slope and speed in a Markdown table, and images.
 
     TEXRS_TEXTURES=<folder> python benches/scale_maps_table.py [--out table.md] [--pictures DIR]
 

@@ -1,4 +1,4 @@
-"""SOLID as a whole: how long each part of the work takes, beside its floor. Interleaved rounds, medians; markdown tables.
+"""Measure the time of each part of SOLID and its lower bound: interleaved rounds, medians, Markdown tables.
 
     python benches/solid_speed.py [--rounds 3] [--threads N] [--quick] [--optimise]
 

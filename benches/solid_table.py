@@ -1,4 +1,4 @@
-"""SOLID over many volumes: texture x field x check as a markdown table, and pictures to look at.
+"""Check SOLID on many volumes: a Markdown table of texture, field and check, and images.
 
     [TEXRS_TEXTURES=<folder>] python benches/solid_table.py [--seeds 3] [--size 96] [--only NAME] [--quality preserve]
         [--evaluator <texture_quality.py>] [--out table.md] [--pictures DIR]

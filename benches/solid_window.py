@@ -1,4 +1,4 @@
-"""Windows of unbounded textures: time and memory.
+"""Measure time and memory of windows of unbounded textures.
 
 Run ``python benches/solid_window.py [--quality Q] [--volume N]``. Processor seconds are those of all threads together; a
 machine that does nothing else needs them divided by its cores. ``--volume`` also writes a volume of N voxels a side to

@@ -1,4 +1,4 @@
-"""How long a splice takes, and how time and memory grow.
+"""Measure the time of a splice, and the growth of time and memory with the size.
 
     python benches/splice_speed.py [SIDE ...]
     python benches/splice_speed.py growth [SIDE ...]

@@ -1,4 +1,4 @@
-"""A table of splices, each texture on the layout of each, and a contact sheet of them.
+"""Splice each texture on the layout of each other one: a table and a contact sheet.
 
     TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto] [--method paper] [--tears deep_quality.py]
 

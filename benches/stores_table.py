@@ -1,4 +1,4 @@
-"""How fast workers fill a store, what memory they take, and whether all is the same.
+"""Measure how fast workers fill a store, and their memory; check that the bytes are the same.
 
 Run ``python benches/stores_table.py volume|items|matrix|tiles|model [--side 512] [--workers 1,2]``. Processor seconds are said
 beside those of the wall, which count only where nothing else runs: their ratio is the efficiency that a quiet machine would

@@ -1,4 +1,4 @@
-"""Verbs over many pictures, beside plain quilting and the Resynthesizer, judged by evaluators.
+"""Judge verbs on many images, compared with plain quilting and the Resynthesizer, by evaluators.
 
     python benches/synthesize_table.py OUT --evaluator FILE.py ... [--verb synthesize] [--seeds 3] [--whole] [--size 768]
         [--shown 768] [--quality preserve] [--only NAME] [--resynthesizer PROGRAM] PICTURE ...

@@ -1,4 +1,4 @@
-"""Proof of windows: the bytes of random windows of unbounded textures, however they are asked for.
+"""Check the bytes of random windows of unbounded textures: they must not depend on the order of requests.
 
 Run ``python benches/window_proof.py [--windows 100] [--seed 1] [--axes N] [--only FIELD]``. For pictures and volumes, each
 without a field and under two, a whole is made at once. Then workers, forked and spawned, with 1, 2 and 7 threads, each ask

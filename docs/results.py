@@ -58,7 +58,7 @@ def make_results() -> str:
     """Return the page of results."""
     text = f"{NOTICE}# The result\n\n"
     text += (
-        "Every verb returns a {py:obj}`texrs.Synthesis`: the image, the source map, pictures of the stages, and a report\n"
+        "Every verb returns a {py:obj}`texrs.Synthesis`: the image, the source map, images of the stages, and a report\n"
         "of decisions and measurements. `result.report` contains JSON types only. On the command line, `--stages FOLDER`\n"
         "writes all stages and the report, and `texrs info FILE` prints how a file was made.\n\n"
     )

@@ -33,10 +33,13 @@ HERE = Path(__file__).resolve().parent
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 PIP = "make bench"
 PROGRAMS = {
-    "Resynthesizer": ("RESYNTHESIZER", "built by hand, as benches/peers/holes.py says"),
-    "MarH19's quilting in C": ("QUILTING", "built by hand, as benches/peers/synthesis.py says"),
-    "Nanored4498's C++ of Lefebvre and Hoppe 2005": ("LEFEBVRE", "built by hand, as benches/peers/synthesis.py says"),
-    "anikabahl76's Python of Lefebvre and Hoppe 2006": ("APPEARANCE", "found as benches/peers/synthesis.py says"),
+    "Resynthesizer": ("RESYNTHESIZER", "built by hand, see benches/peers/holes.py"),
+    "MarH19's quilting in C": ("QUILTING", "built by hand, see benches/peers/synthesis.py"),
+    "Nanored4498's C++ of Lefebvre and Hoppe 2005": ("LEFEBVRE", "built by hand, see benches/peers/synthesis.py"),
+    "anikabahl76's Python of Lefebvre and Hoppe 2006": (
+        "APPEARANCE",
+        "found as described in benches/peers/synthesis.py",
+    ),
 }
 NEEDS = {
     "PyMaxflow": "maxflow",

@@ -66,10 +66,10 @@ def call_once(given: Arrays) -> Work:
 
 ROWS = {
     **{f"threads-{name}": _threaded(module.ROWS[name]) for name, module in THREADS.items()},
-    "call": Row("calls", "a thousand calls that do nothing", "a pixel", make_pixel, {"texrs": call_often}, most_ms=20),
+    "call": Row("calls", "a thousand calls without work", "a pixel", make_pixel, {"texrs": call_often}, most_ms=20),
     "copy": Row(
         "calls",
-        "a pixel looked up in a contiguous picture of 128 MB",
+        "one pixel looked up in a contiguous image of 128 MB",
         "a pixel",
         make_large,
         {"texrs": call_once},

@@ -115,7 +115,7 @@ ROWS = {
     f"holes-{side}{suffix}": Row(
         "9",
         f"three holes of {side // 4}² filled in {side}² RGB{how}",
-        "the mean patch error over the holes, 1 - correlation; texrs is to have none larger",
+        "mean patch error over the holes, 1 - correlation; that of texrs must not be larger",
         lambda side=side: make_holes(side),
         {
             "texrs": _with(fill),
@@ -129,7 +129,7 @@ ROWS = {
     )
     for side, most in ((256, 69), (512, 420))
     for suffix, how, fill in (
-        ("", ", as it is by default", fill_by_texrs),
+        ("", ", by default", fill_by_texrs),
         ("-given", f", by patches of {GIVEN}", fill_by_one_size),
     )
 }

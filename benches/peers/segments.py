@@ -73,8 +73,8 @@ def merge_by_opencv(given: Arrays) -> Work:
 ROWS = {
     "merge-512": Row(
         "14",
-        "graph-based merge, 512² RGB, its smoothing included",
-        "numbers of regions within a fifth; texrs and scikit-image give the same ones, OpenCV smooths in another way",
+        "graph-based merge, 512² RGB, including its smoothing",
+        "numbers of regions within 20 %; texrs and scikit-image give the same regions, OpenCV smooths in another way",
         make_picture,
         {"texrs": merge_by_texrs, "scikit-image": merge_by_skimage, "OpenCV graph segmentation": merge_by_opencv},
         lambda result: [float(np.max(result)) + 1],
@@ -85,8 +85,8 @@ ROWS = {
     ),
     "segment-512": Row(
         "14",
-        "segmentation, 512² RGB: layers and elements, of which the merge is a part",
-        "of one size",
+        "segmentation into layers and elements, 512² RGB, including the merge",
+        "the right size",
         make_picture,
         {"texrs": segment_by_texrs},
         lambda result: [float(n) for n in np.shape(result)],

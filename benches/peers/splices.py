@@ -140,9 +140,9 @@ ROWS = {
     **{
         f"splice-{side}{'-again' * (not cold)}{f'-{method}' if method else ''}": Row(
             "1" if cold else "2",
-            f"a splice of {side}² {f'by method={method!r}' if method else 'as it is by default'}, "
-            f"{'nothing kept but similarity sets' if cold else 'factors kept'}",
-            "of the size",
+            f"a splice of {side}² {f'by method={method!r}' if method else 'by default'}, "
+            f"{'only similarity sets cached' if cold else 'factors cached'}",
+            "the right size",
             make_nothing,
             {"texrs": splice_by_texrs(side, cold, method)},
             lambda result: [float(n) for n in np.shape(result)],
@@ -155,7 +155,7 @@ ROWS = {
     **{
         f"warp-{side}{'-printed' * printed}": Row(
             "3",
-            f"a splice's warp field, {side}², {'as printed, of discs' if printed else 'as texrs has it'}: factor, solve twice",
+            f"a splice's warp field, {side}², {'as printed, for discs' if printed else 'as in texrs'}: factor, solve twice",
             "backward errors below 10⁻¹²",
             lambda side=side, printed=printed: make_system(side, printed),
             {"texrs": _with(solve_by_texrs), "CHOLMOD": _with(solve_by_cholmod), "SciPy": _with(solve_by_scipy)},

@@ -1,6 +1,6 @@
 """Rows 10, 11 and 13: textures from patches, from coordinates, and in three dimensions.
 
-Results are textures of their own, which nothing makes equal: compared is that each is of the size.
+The results are different textures, so only their size is checked.
 
 Three programs of others take part where a variable names them. Their sources have no licence, so they are neither part of texrs
 nor linked to it, and whoever builds them does that for themselves:
@@ -207,7 +207,7 @@ ROWS = {
     "quilt-512": Row(
         "10",
         f"quilting, 128² to 512², blocks of {BLOCK} that overlap by {OVERLAP}",
-        "of one size; texrs cuts whole overlaps and tries several blocks, the program cuts strips",
+        "the right size; texrs cuts whole overlaps and tries several blocks, the program cuts strips",
         make_bricks,
         PATCHES,
         _size,
@@ -217,7 +217,7 @@ ROWS = {
     "correct-256": Row(
         "11",
         'appearance-space synthesis, 128² to 256², k = 3, two passes (method="paper-compensated")',
-        "of one size; the program compares windows of colours and takes k = 1",
+        "the right size; the program compares windows of colours and takes k = 1",
         make_bricks,
         {"texrs": correct_by_texrs, CORRECTING: correct_by_program},
         _size,
@@ -227,7 +227,7 @@ ROWS = {
     "process-512": Row(
         "11",
         "appearance-space synthesis, 64² to 512², the whole process of a command",
-        "of one size",
+        "the right size",
         make_small_bricks,
         {"texrs": start_texrs, PROCESS: start_program},
         _size,
@@ -235,8 +235,8 @@ ROWS = {
     ),
     "perspective-256": Row(
         "12",
-        "a floor seen aslant, 128² to 256², as texrs.perspective makes it",
-        "of the size",
+        "an oblique floor, 128² to 256², by texrs.perspective",
+        "the right size",
         make_floor,
         {"texrs": slope_by_texrs},
         _size,
@@ -244,8 +244,8 @@ ROWS = {
     ),
     "sets-64": Row(
         "13",
-        "similarity sets of 64³, k = 3, of all samples more than three apart; all pairs take 1.7 s at least",
-        "of the size",
+        "similarity sets of 64³, k = 3, for samples more than three apart; all pairs would take at least 1.7 s",
+        "the right size",
         make_particles,
         {"texrs": compare_by_texrs},
         _size,
@@ -254,7 +254,7 @@ ROWS = {
     "solid-128": Row(
         "13",
         'solid synthesis, 64³ to 128³ under a field, k = 3, two passes (method="paper")',
-        "of the size",
+        "the right size",
         make_particles,
         {"texrs": grow_by_texrs},
         _size,

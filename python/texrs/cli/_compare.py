@@ -86,8 +86,8 @@ def compare_command(
     failed = sum(r.image is None for r in found.results)
     tail = f", {failed} failed" if failed else ""
     note(
-        f"wrote {out}: {len(given)} pictures, {len(found.results)} results{tail}, "
-        f"{len(found.missing)} methods not here, in {time.monotonic() - start:.1f} s",
+        f"wrote {out}: {len(given)} images, {len(found.results)} results{tail}, "
+        f"{len(found.missing)} methods not installed, in {time.monotonic() - start:.1f} s",
         quiet=quiet,
     )
 
