@@ -122,6 +122,7 @@ def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *
             stored[...] = values
             if final.exists():
                 settle(temporary)  # Settle now, so that the time without either store is short.
+                # Move the existing store away, and back if the new one cannot take its name.
                 os.replace(final, former := temporary.with_suffix(".former"))
                 try:
                     put(temporary, final)

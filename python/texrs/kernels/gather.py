@@ -101,6 +101,7 @@ def gather(
         # Check the result instead of the exemplar: a few pixels are read faster than the whole of a large exemplar.
         for image in images:
             check_finite(image, "exemplars")
+    # Return the dtype of the exemplars, which the kernel may not support.
     if dtype == np.bool_ or out.dtype == np.uint32:
         out = out.view(dtype)
     elif dtype != out.dtype:

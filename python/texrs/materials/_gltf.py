@@ -92,6 +92,7 @@ def write_shapes(
             image = {"bufferView": len(document["bufferViews"]), "mimeType": "image/png"}
             document["bufferViews"].append({"buffer": 0, "byteOffset": len(data), "byteLength": len(coded)})
             data += pad(coded, b"\0")
+        # A .gltf file names files of images. A .glb file contains them.
         document["images"].append({"name": name, **image})
         document["textures"].append({"sampler": 0, "source": number, "name": name})
     if not pictures:
@@ -150,7 +151,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
             rough |= {"metallicRoughnessTexture": texture, "metallicFactor": 1.0, "roughnessFactor": 1.0}
         if open_:
             material["occlusionTexture"] = texture
-    # Heights give normals if there are no normals.
+    # Heights replace missing normals.
     slopes = measure_slopes(maps, (True, True))
     if slopes is not None or find_map(maps, Role.NORMAL, Role.NORMAL_DX) is not None:
         normals = take_normals(maps, list_signed(maps), slopes, shape)

@@ -95,7 +95,7 @@ class TexturedMesh:
         file gets the same by its .mtl file. Names of objects and materials are kept, and so are normals. A mesh from
         an .obj file keeps all lines in their order in .obj, unless an atlas was computed for it. Colours of vertices
         are linear 16-bit values in .glb, and sRGB in .obj and .ply. Other maps become attributes of their
-        names (_HEIGHT) in .glb. Without an atlas, there is no relief.
+        names (_HEIGHT) in .glb. `relief` needs an atlas.
 
         Parameters
         ----------

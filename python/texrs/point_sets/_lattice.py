@@ -37,7 +37,7 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
     difference = voters[:, None] - voters[None]
     length = np.hypot(*difference.reshape(-1, 2).T)
     near = difference.reshape(-1, 2)[(length > 0) & (length < 2.2 * scale)]
-    # Votes within a sixth of a spacing, from one half of the plane.
+    # Differences occur with both signs, so use one half of the plane. Those within 1/6 of a spacing vote for each other.
     half = near[(near[:, 0] > 1e-9) | ((np.abs(near[:, 0]) <= 1e-9) & (near[:, 1] > 0))]
     basis = np.zeros((0, 2))
     if len(half):
@@ -45,6 +45,7 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
         count = votes.sum(axis=1)
         order = np.lexsort((half[:, 1], half[:, 0], -count + 0.3 * count.max() * np.hypot(*half.T) / scale))
         first = votes[order[0]] @ half / count[order[0]]
+        # The second vector is the best one in another direction, if enough points support it.
         for k in order[1:]:
             mean = votes[k] @ half / count[k]
             lean = abs(float(np.cross(np.append(first, 0), np.append(mean, 0))[2]))
@@ -56,6 +57,7 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
         area = float(np.prod(np.ptp(points, axis=0) + scale))
         basis = np.eye(2) * np.sqrt(area / len(points))
     origin = points[int(np.hypot(*(points - points.mean(axis=0)).T).argmin())]
+    # Fit the lattice to all points. Their sites may change with the fit.
     for _ in range(3):
         index = np.rint((points - origin) @ np.linalg.inv(basis))
         system = np.concatenate([index, np.ones((len(points), 1))], axis=1)

@@ -15,8 +15,8 @@ Departures, with their reasons:
   times the usual ones over 22 textures, and 0.8 % are beyond the 99th percentile. With plain differences in strips,
   the figures are 1.32 and 2 %. The stitcher's cost for rarely adjacent colours gives the lowest figure (0.94), but it
   fuses similar elements such as coins and olives.
-- On a lattice a patch also pays for pixels that do not fit, because a seam through plain background does not show that
-  it is out of step.
+- On a lattice, a patch also pays for pixels that do not fit. A seam through plain background does not show that the
+  patch is out of step.
 - A patch pays for repeating samples that other patches show, and for continuing exactly where a neighbour ends. A
   charge that multiplied the match would be zero for the exact continuation, which would always win.
 - A texture with courses is quilted along them only: its images are placed so that their joints coincide.

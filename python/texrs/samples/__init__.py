@@ -1,7 +1,7 @@
 """Generated images and volumes whose elements, masks, scale and deformation are known exactly.
 
-Each generator draws a texture as a small photograph would show it: a relief under a sun and a sky, with sensor noise
-and with colours that vary within and between elements. It returns the image with the positions and pixels of all
+Each generator draws a texture as a small photograph would show it: a relief under a sun and a sky, with sensor noise.
+Colours vary within and between elements. A generator returns the image with the positions and pixels of all
 elements, the scale map and the Jacobians. The tests and pages of texrs use these samples. They are CC0, so use them as
 you like.
 

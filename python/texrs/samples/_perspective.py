@@ -143,7 +143,7 @@ class _Plane:
         slope = along * tan(lean) / (1.5 * max(size))
         stretch = np.eye(2) + (1 / cos(lean) - 1) * np.outer(along, along)
         plane = cls((size[0], size[1]), slope, stretch, zoom, np.zeros(2), np.zeros(2))
-        # Round the mean, because its last bits depend on the order in which a processor sums.
+        # Round the mean, because its last bits depend on the processor's order of summation.
         mean = float(np.float32(np.exp(np.log(plane.scale()).mean())))
         plane = replace(plane, stretch=stretch * mean)
         ends = [(r, c) for r in (-1, size[0]) for c in (-1, size[1])]

@@ -115,7 +115,7 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
 def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Generate the overlapping scales of a fish, with their tips down.
 
-    There is no background: every pixel belongs to a scale.
+    Every pixel belongs to a scale, so the background is empty.
 
     Parameters
     ----------

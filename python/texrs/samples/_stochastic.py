@@ -28,7 +28,7 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Returns
     -------
     Sample
-        It has only an image, because there are no countable elements.
+        It has only an image, because its elements cannot be counted.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Returns
     -------
     Sample
-        It has only an image, because there are no countable elements.
+        It has only an image, because its elements cannot be counted.
 
     Raises
     ------

@@ -170,6 +170,7 @@ class Search:
                 together += some.T @ some
             together /= len(off) - 1
             ask()
+            # Keep the leading principal components.
             spread, axes = np.linalg.eigh(together)
             ask()
             total = np.cumsum(spread[::-1])

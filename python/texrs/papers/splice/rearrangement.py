@@ -115,7 +115,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     whole = cut_in(scene, bare, places, label, element, room=rest == 0) if label.any() else bare
     pasted, everywhere, light = label > 0, np.ones(known.shape, bool), scene.light
     nothing = np.zeros(known.shape, np.uint8)
-    # The draft before filling, for the image of the stage.
+    # A stage shows the draft before it is filled.
     before = np.where(pasted[..., np.newaxis], places, base)
     draft = Draft(before, known | pasted, everywhere, nothing, nothing, np.zeros((*known.shape, 2), bool))
     return Rearrangement(
