@@ -56,6 +56,7 @@ def source_map() -> Any:
     figure, panels = lay(4)
     show(panels[0], sample.image, "the example")
     show(panels[1], made.image, "the result, with three pixels")
+    # Connect three pixels of the result with their sources in the example.
     for row, column in ((26, 59), (57, 89), (84, 70)):
         there = source.coordinates[row, column][::-1]
         panels[0].plot(*there, "o", ms=6, mfc="none", mec=ACCENT, mew=2)
@@ -76,6 +77,7 @@ def source_map() -> Any:
     show(panels[2], colour_places(source.coordinates, sample.image.shape), "the source map, as colours")
     labels = source.render(sample.labels, interpolation="nearest")
     show(panels[3], volume.label_to_color(labels), "labels through the source map")
+    # Draw the colours of all positions in the example as a key.
     key = panels[2].inset_axes((0.02, 0.03, 0.22, 0.3))
     place = np.stack(np.meshgrid(range(112), range(112), indexing="ij"), axis=-1)
     show(key, colour_places(place, (112, 112)), "")
@@ -92,6 +94,7 @@ def element() -> Any:
         for label in np.unique(sample.labels[sample.labels > 0]):
             panel.contour(sample.labels == label, [0.5], colors=ACCENT, linewidths=1.2)
         panel.plot(*sample.centres.T[::-1], "+", color="white", ms=7, mew=1.6)
+    # Enlarge the element that is nearest to the middle, with its mask, its box and the box of its surroundings.
     dots = texrs.ElementAnalysis.of_sample(samples.dots((128, 128)))
     one = min(dots.instances, key=lambda i: np.hypot(i.centre[0] - 64, i.centre[1] - 64))
     row, column = one.centre
@@ -122,6 +125,7 @@ def scale_map() -> Any:
     floor = samples.tilted_discs((192, 192))
     scale = np.asarray(floor.scale_map, np.float32)
     figure, panels = lay(4)
+    # Draw rays from the eye to tiles on a floor, and where the rays meet the image plane.
     side = panels[0]
     side.set_title("tiles of one size, seen from the side", fontsize=10, color=INK)
     side.plot([0, 7], [0, 0], color=INK, lw=2)
@@ -144,6 +148,7 @@ def scale_map() -> Any:
         for column in (40, 96, 152):
             panels[1].add_patch(plt.Circle((column, row), 10 * scale[row, column], fill=False, ec="white", lw=2))
     show(panels[2], scale_maps.picture(scale), "its scale map")
+    # Grow the floor again for a map that is large in the middle, within the range of its own sizes.
     at = (np.arange(192) + 0.5) / 192
     far = np.hypot(at - 0.5, at[:, np.newaxis] - 0.5) / 0.7
     low, high = np.log(np.quantile(scale, [0.05, 0.95]))
@@ -193,6 +198,7 @@ def wrap() -> Any:
     tile, along = texrs.tile(gravel).image, texrs.tile(gravel, wrap=(False, True)).image
     show(panels[0], tile, "opposite borders are joined", cmap="gray")
     rows, columns = tile.shape[:2]
+    # Arrows across each border show that opposite borders continue each other.
     arrow = {"arrowstyle": "-|>", "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
     for at, colour in ((0.3, ACCENT), (0.7, ACCENT)):
         for x in (0.06, 0.94):

@@ -86,6 +86,7 @@ def rewrite(text: str, folder: Path, drawings: Path) -> str:
     def mend(found: re.Match[str]) -> str:
         nonlocal count
         tag = found.group(0)
+        # Images from other servers and data URIs stay as they are.
         source = re.search(r' src="([^":?]+)"', tag)
         if source is None:
             return tag
@@ -95,6 +96,7 @@ def rewrite(text: str, folder: Path, drawings: Path) -> str:
         added, before, after = "", "", ""
         near = source.group(1).rpartition("/")[0]
         width, height, copies = make_copies(file)
+        # Drawings have a version for phones, which the browser chooses by the width of the window.
         narrow = file.with_stem(f"{file.stem}-narrow")
         if (drawings / narrow.name).exists():
             shutil.copyfile(drawings / narrow.name, narrow)
@@ -104,11 +106,13 @@ def rewrite(text: str, folder: Path, drawings: Path) -> str:
                 f' width="{wide}" height="{high}">'
             )
             after = "</picture>"
+        # Known sizes avoid shifts of the layout while the page loads.
         if " width=" not in tag:
             added += f' width="{width}" height="{height}"'
         if copies and " srcset=" not in tag:
             sizes = THUMBNAIL if "thumb" in file.name or "strips" in file.parts else SIZES
             added += f' srcset="{list_copies(near, copies)}" sizes="{sizes}"'
+        # The first image is usually visible at once, so it must not be loaded lazily.
         count += 1
         if " loading=" not in tag and count > 1:
             added += ' loading="lazy"'

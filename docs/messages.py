@@ -36,7 +36,7 @@ def kind(pattern: str, cause: str, remedy: str) -> Kind:
 
 
 KINDS = (
-    kind(r"pip install", "An optional package is missing.", "Install it as the message says."),
+    kind(r"pip install", "An optional package is missing.", "Install it with the command in the message."),
     kind(
         r"limit|memory|would take|allows? ",
         "The work needs more than a limit allows.",

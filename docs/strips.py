@@ -61,6 +61,7 @@ def tile() -> Iterator[Strip]:
     gravel = samples.photograph("gravel").image[:192, :192]
     lawn = samples.photograph("grass").image[:192, :192]
 
+    # Show 2 x 2 copies, because the borders of a single tile are not visible.
     def four(picture: Picture) -> Picture:
         return np.tile(picture, (2, 2))
 
@@ -215,6 +216,7 @@ def solid() -> Iterator[Strip]:
 def materials() -> Iterator[Strip]:
     from scipy.ndimage import distance_transform_edt
 
+    # Estimate heights from the labels: each pebble is a dome.
     pebbles = samples.pebbles((144, 144))
     inside = distance_transform_edt(pebbles.labels > 0)
     height = (np.sqrt(np.minimum(inside, 12)) * 4).astype("float32")
@@ -229,6 +231,7 @@ def materials() -> Iterator[Strip]:
             texrs.Material({"albedo": pebbles.image}).save(folder, mipmaps=True)
             files = sorted(Path(folder).rglob("*.png"), key=lambda f: -texrs.io.read(f).shape[0])
             small = texrs.io.read(files[level])
+        # Enlarge the copy to the size of the map, so that all images of the strip have one size.
         return np.kron(small, np.ones((2**level, 2**level, 1), np.uint8))
 
     yield (
@@ -283,7 +286,7 @@ def augment() -> Iterator[Strip]:
 def source_map() -> Iterator[Strip]:
     grit, weave = samples.grit((144, 144)).image, samples.weave((96, 96)).image
     uneven = (grit * np.linspace(0.4, 1, 144)[:, np.newaxis, np.newaxis]).astype(np.uint8)
-    # Sixteen squares from anywhere, so that there is something to hide.
+    # Take sixteen squares from random places, so that their seams are visible without a correction.
     corner = np.random.default_rng(4).integers(0, 144 - 44, (4, 4, 2)).repeat(44, axis=0).repeat(44, axis=1)
     places = np.moveaxis(np.indices((176, 176)) % 44, 0, -1) + corner
     patches = (np.indices((176, 176)) // 44 * [[[4]], [[1]]]).sum(axis=0).astype(np.uint32)

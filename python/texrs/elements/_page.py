@@ -55,7 +55,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
         value = {"layout": str(entry.layout), "box": f"{entry.box[0]} x {entry.box[1]}"}.get(name, "")
         rows.append(f"<tr{' class=doubt' if advice else ''}><th>{name}<td>{escape(value)}<td>{said}{advice}")
     doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("warnings", []))
-    # Data for the script of the page, from which it makes the list of corrections.
+    # The script of the page computes the list of corrections from these data.
     known = {
         "points": entry.points.round(2).tolist(),
         "box": list(entry.box),
