@@ -42,7 +42,7 @@ def test_the_command_writes_one_whole_page(
     io.write("grit.png", GRIT)
     words = ["compare", "grit.png", "sample:coins", "--crop", "64", "--larger", "80", "--no-seconds", "-o"]
     assert main([*words, "one.html"]) == 0
-    assert "2 pictures" in capsys.readouterr().err
+    assert "2 images" in capsys.readouterr().err
     assert main([*words, "two.html", "--threads", "1", "-q"]) == 0
     text = Path("one.html").read_text(encoding="utf-8")
     assert text == Path("two.html").read_text(encoding="utf-8")
