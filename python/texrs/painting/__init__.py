@@ -170,7 +170,7 @@ def texture_mesh(
         Number of voxels in a unit of the mesh, or of units of the texture's spacing. Default: the longest side shows
         the exemplar four times, or fewer times if a voxel would be smaller than a texel of the atlas.
     atlas : int, optional
-        Side of the atlas, 16 to 16384. If None, the vertices get colours instead. Default: 1024.
+        Side of the atlas in texels, 16 to 16384. Without an atlas, vertices get colours instead. Default: 1024.
     padding : int
         Width of the border that is painted around each chart of the atlas, in texels, 0 to 64. It shows the texture
         in the plane of the nearest triangle, so that seams between charts are not visible. Default: 4.
