@@ -240,7 +240,7 @@ def check_finite(array: Array, name: str) -> None:
     bad = array.size - sum(int(np.count_nonzero(np.isfinite(part))) for part in parts)
     if bad:
         raise InvalidInput(
-            f"{name}: {bad} of {array.size} values are NaN or infinite as {array.dtype}; all must be finite"
+            f"{name}: must be finite, but {bad} of {array.size} values are NaN or infinite as {array.dtype}"
         )
 
 

@@ -166,7 +166,7 @@ def _analyse(material: object, guide: Array, name: str, progress: Progress | Non
     except LimitExceeded:
         raise
     except InvalidInput as error:
-        raise InvalidInput(f"{name}: {error}; texrs.elements.analyse takes a box, points and a mask") from None
+        raise InvalidInput(f"{name}: {error}; pass a box, points or a mask to texrs.elements.analyse") from None
 
 
 def _flattened(source: SourceMap) -> SourceMap:

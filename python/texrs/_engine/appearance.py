@@ -157,7 +157,7 @@ class Appearance:
         """
         missing = {*_PARTS, "shape", "wrap", "radius", "channels"} - set(arrays)
         if missing:
-            raise InvalidInput(f"analysis: lacks {', '.join(sorted(missing))}")
+            raise InvalidInput(f"analysis: must have all arrays, but lacks {', '.join(sorted(missing))}")
         made = cls.__new__(cls)
         try:
             colours, features, basis = (
@@ -176,7 +176,7 @@ class Appearance:
                 int(arrays["spacing"]),
             )
         except (TypeError, ValueError, OverflowError) as error:
-            raise InvalidInput(f"analysis: its arrays do not belong together ({error})") from None
+            raise InvalidInput(f"analysis: must have arrays that fit each other ({error})") from None
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -362,4 +362,4 @@ class Appearance:
     def check(self, region: Region) -> None:
         """Check that a region has the number of axes of the exemplar."""
         if len(region.shape) != len(self.shape):
-            raise InvalidInput(f"region: the exemplar has {len(self.shape)} axes, got {region.shape}")
+            raise InvalidInput(f"region: must have the {len(self.shape)} axes of the exemplar, got {region.shape}")

@@ -83,14 +83,14 @@ class Region:
         """Return the position of this region in a larger one, as slices."""
         starts = [o - p for o, p in zip(self.origin, outer.origin, strict=True)]
         if any(s < 0 or s + n > m for s, n, m in zip(starts, self.shape, outer.shape, strict=True)):
-            raise InvalidInput(f"region: {self} does not lie inside {outer}")
+            raise InvalidInput(f"region: must be inside {outer}, got {self}")
         return tuple(slice(s, s + n) for s, n in zip(starts, self.shape, strict=True))
 
     def check_places(self, places: NDArray[np.int32]) -> None:
         """Check that there are coordinates for each point."""
         count = self.points * len(self.shape)
         if places.dtype != np.int32 or places.shape != (count,):
-            raise InvalidInput(f"places: needs int32 of {count} numbers, got {places.dtype} {places.shape}")
+            raise InvalidInput(f"places: must be int32 of {count} numbers, got {places.dtype} {places.shape}")
 
 
 def flatten(mask: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
@@ -146,7 +146,7 @@ def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.
 def _round_frames(frames: Array) -> NDArray[np.int16]:
     largest = float(np.abs(frames).max())
     if largest >= 7.99:
-        raise InvalidInput(f"field: features may shrink to an eighth of their size, got 1/{largest:.3g}")
+        raise InvalidInput(f"field: must not shrink elements to less than 1/8 of their size, got 1/{largest:.3g}")
     return np.asarray(np.rint(frames * ONE), np.int16)
 
 

@@ -139,7 +139,7 @@ def batch_command(
     over["arguments"] = argument
     if what.lower().endswith(".toml"):
         if inputs:
-            raise InvalidInput(f"INPUT: a recipe says which, got {inputs[0]!r}")
+            raise InvalidInput(f"INPUT: cannot be combined with a recipe, which lists its inputs; got {inputs[0]!r}")
         base, said = os.path.dirname(what) or ".", read_recipe(what)
         # Paths on the command line are relative to the current folder.
         over |= {key: os.path.abspath(over[key]) for key in ("out", "sheet") if over[key] is not None}
@@ -190,7 +190,7 @@ def make_context(command: Any, verb: str, words: list[str]) -> Any:
             raise
         name = missing.metavar or missing.name.upper()
         raise InvalidInput(
-            f"--argument: texrs {verb} needs {name} for each input, as in --argument 'masks/{{name}}.png'"
+            f"--argument: must give {name} of texrs {verb} for each input, as in --argument 'masks/{{name}}.png'"
         ) from None
 
 

@@ -53,21 +53,21 @@ def compare_command(
     from texrs.comparison import compare
 
     if not out:
-        raise InvalidInput("--out: is needed")
+        raise InvalidInput("--out: must be given")
     _outputs.check_suffix("out", out, ".html")
     _outputs.check_output(out)
     named = {}
     for text in program or ():
         name, equals, path = text.partition("=")
         if not equals:
-            raise InvalidInput(f"--program: needs NAME=PATH, got {text!r}")
+            raise InvalidInput(f"--program: must be NAME=PATH, got {text!r}")
         named[name] = path
     texts = pictures or [SAMPLE + name for name in USUAL]
     given = {}
     for text in texts:
         name = text.removeprefix(SAMPLE) if text.startswith(SAMPLE) else Path(text).stem
         if name in given:
-            raise InvalidInput(f"{text}: another picture is called {name} too")
+            raise InvalidInput(f"{text}: must have another name, because another image is also called {name}")
         given[name] = read_picture(text)
     names = {"tasks": "--task", "side": "--crop", "size": "--larger", "programs": "--program", "seed": "--seed"}
     with name_arguments(**names, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:

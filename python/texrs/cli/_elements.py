@@ -82,7 +82,7 @@ def analyse_command(
         note(str(warning.message), quiet=quiet)
     material = isinstance(options["image",], Material) and not isinstance(options["image",], SingleMap)
     if role and not material:
-        raise InvalidInput("--role: is for materials, which are folders of maps or EXR files of layers")
+        raise InvalidInput("--role: only available for materials, which are folders of maps or EXR files of layers")
     names = {o.path[-1]: o.flag for o in PICTURED} | {"image": given["image"], "count": "--threads"}
     with name_arguments(**names), threads(count), show_progress(quiet=quiet) as progress:
         entry = analyse(**PICTURED.call(options), progress=progress)
@@ -126,7 +126,7 @@ def database_command(
     check_needed(given, ACTIONS, action)
     for flag, value, users in (("--out", out, ("splice", "matrix")), ("--each", each, ("matrix",))):
         if value is not None and action not in users:
-            raise InvalidInput(f"{flag}: needs {' or '.join(users)}, got {action}")
+            raise InvalidInput(f"{flag}: must be used with {' or '.join(users)}, got {action}")
     if action == "add":
         add(folder, names, given, count, quiet=quiet)
         return
@@ -140,7 +140,7 @@ def database_command(
                 say(f"{record.name}\t{record.layout}\t{record.elements} elements\tbox {box}\t{record.image}")
         case "remove":
             if not names:
-                raise InvalidInput("NAME: remove needs names")
+                raise InvalidInput("NAME: must be given for remove")
             for name in names:
                 textures.remove(name)
                 note(f"removed {name}", quiet=quiet)
@@ -161,9 +161,9 @@ def write_splices(
 ) -> None:
     """Splice two textures of a database, or all pairs. Results are written as soon as they are ready."""
     if out is None:
-        raise InvalidInput(f"--out: {action} needs the name of an image file")
+        raise InvalidInput(f"--out: must be the name of an image file for {action}")
     if action == "splice" and len(names) != 2:
-        raise InvalidInput(f"NAME: splice needs two names, of elements and of a layout; got {len(names)}")
+        raise InvalidInput(f"NAME: must be two names for splice, of elements and of a layout; got {len(names)}")
     records = {record.name: record for record in textures.list()}
     files = {name: os.path.join(textures.path, record.file) for name, record in records.items()}
     # Names refer to textures in the folder, even if files have the same names.
@@ -217,10 +217,10 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
     images = [i for i in items if not re.fullmatch(PLACE, i)]
     values = ANALYSED.read(given)
     if not images:
-        raise InvalidInput("IMAGE: add needs images")
+        raise InvalidInput("IMAGE: must be given for add")
     if len(images) > 1 and (given["name"] or {("box",), ("background",), ("mask",), ("points",)} & values.keys()):
         raise InvalidInput(
-            "IMAGE: --name, --box, --background, --mask and --points belong to one image; add one by one"
+            "IMAGE: must be one image with --name, --box, --background, --mask or --points; add images one by one"
         )
     for image in images:
         _outputs.check_apart([image], {"name": os.path.join(folder, f"{given['name'] or Path(image).stem}.npz")})

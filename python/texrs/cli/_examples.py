@@ -53,7 +53,7 @@ def samples_command(
     for name in names or ():
         if name not in known:
             near = suggest(name, known) or f"; it must be one of {', '.join(known)}"
-            raise InvalidInput(f"NAME: there is not a sample {name!r}{near}")
+            raise InvalidInput(f"NAME: must be a sample, got {name!r}{near}")
     chosen = names or list(known)
     if out is None:
         for name in chosen:

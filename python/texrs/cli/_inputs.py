@@ -73,11 +73,11 @@ def find_sources(
     found = _Found(READ_VOLUMES if verb in OF_VOLUMES else READ_IMAGES, os.path.realpath(out) if out else "")
     for text in texts:
         if not found.add(text):
-            raise InvalidInput(f"inputs: nothing is found for {text!r}")
+            raise InvalidInput(f"inputs: must be existing files, but none match {text!r}")
     found.drop_used(templates)
     several = list(found.make_sources(stacked=stacked))
     if not several:
-        raise InvalidInput(f"inputs: nothing is found for {' '.join(map(repr, texts))}")
+        raise InvalidInput(f"inputs: must be existing files, but none match {' '.join(map(repr, texts))}")
     return several
 
 
@@ -219,7 +219,9 @@ def join_braces(paths: Sequence[str]) -> str:
     end = rest[0][len(rest[0]) - _count_alike([r[::-1] for r in rest]) :]
     text = f"{start}{{{','.join(r[: len(r) - len(end)] for r in rest)}}}{end}"
     if sorted(expand_braces(text)) != sorted(paths):
-        raise InvalidInput(f"inputs: {paths[0]} and {len(paths) - 1} more are one material; put its maps in a folder")
+        raise InvalidInput(
+            f"inputs: {paths[0]} and {len(paths) - 1} more are maps of one material; put them in a folder"
+        )
     return text
 
 

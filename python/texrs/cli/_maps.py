@@ -59,7 +59,7 @@ def apply_command(
     values = APPLIED.read(given, which=lambda o: not o.file)
     places = SourceMap.load(source)
     if given["finish_screening"] and places.axes != 2:
-        raise InvalidInput("--screening: is for pictures; the source map is that of a volume")
+        raise InvalidInput("--screening: not available for volumes, and the source map is of a volume")
     groups = group(maps, len(places.shapes))
     targets = name_targets(groups, out, [source, *maps])
     finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
@@ -104,8 +104,8 @@ def store_map(
     """Write a map to a store, chunk by chunk, so that the whole result is never in memory."""
     if finish.screening is not None or finish.light is not None or finish.fade is not None:
         raise InvalidInput(
-            f"--out: {out} is made in parts, but blending its seams needs the whole result; "
-            "--screening 0 leaves them as they are, or write to a file"
+            f"--out: {out} is written in parts, but seams can only be blended in the whole result; pass --screening "
+            "0, or write to a file"
         )
     read = io.read if places.axes == 2 else io.read_volume
     images = [read(path) for path in paths]
@@ -170,7 +170,7 @@ def group(maps: Sequence[str], count: int) -> list[list[str]]:
     """Return maps in groups of one for each exemplar."""
     if len(maps) % count:
         raise InvalidInput(
-            f"IMAGE: the source map was made from {count} exemplars, so it needs {count} each; got {len(maps)}"
+            f"IMAGE: must be {count} images for each result, one for each exemplar of the source map; got {len(maps)}"
         )
     return [list(maps[i : i + count]) for i in range(0, len(maps), count)]
 
@@ -180,7 +180,7 @@ def name_targets(groups: Sequence[Sequence[str]], out: str, inputs: Sequence[str
     if len(groups) == 1 and not Path(out).is_dir():
         return [out]
     if not Path(out).is_dir():
-        raise InvalidInput(f"--out: needs a folder that exists for {len(groups)} results, got {out!r}")
+        raise InvalidInput(f"--out: must be an existing folder for {len(groups)} results, got {out!r}")
     targets = [os.path.join(out, Path(paths[0]).name) for paths in groups]
     for i, target in enumerate(targets):
         _outputs.check_apart(inputs, {"out": target})

@@ -170,7 +170,7 @@ class Options:
             for option in self:
                 if fields and option.path[0] == name and option.required and option.path not in values:
                     given = next(o.flag for o in self if o.path == (name, next(iter(fields))))
-                    raise InvalidInput(f"{given}: needs {option.flag} too")
+                    raise InvalidInput(f"{given}: must be combined with {option.flag}")
             if fields:
                 # The command determines the number of axes.
                 known = {"axes": self.axes} if "axes" in inspect.signature(group).parameters else {}
@@ -301,7 +301,7 @@ def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]
     for option in (o for each in owners.values() for o in each if o.name not in free):
         if given[option.name] not in (None, option.default):
             wanted = " or ".join(flag for flag, each in owners.items() if option.name in {o.name for o in each})
-            raise InvalidInput(f"{option.flag}: needs {wanted}{f', got {used}' if used else ''}")
+            raise InvalidInput(f"{option.flag}: must be used with {wanted}{f', got {used}' if used else ''}")
 
 
 # --- types -----------------------------------------------------------------------------------------------------------

@@ -156,7 +156,8 @@ def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> No
     for name, value in outputs.items():
         if isinstance(value, str) and os.path.realpath(value) in read:
             raise InvalidInput(
-                f"{as_flag(name)}: {value} is read, and would then contain other maps; write to another folder"
+                f"{as_flag(name)}: {value} is an input, and would contain other maps afterwards; write to another "
+                "folder"
             )
 
 
@@ -202,7 +203,7 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
 def check_suffix(option: str, path: str, suffix: str = ".npz") -> None:
     """Check that the suffix of a file name states a format, by default a format of arrays."""
     if Path(path).suffix.lower() != suffix:
-        raise InvalidInput(f"{as_flag(option)}: needs a name that ends in {suffix}, got {path!r}")
+        raise InvalidInput(f"{as_flag(option)}: must be a name that ends in {suffix}, got {path!r}")
 
 
 def check_folder(path: str) -> None:
@@ -246,7 +247,7 @@ def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> Non
                 if old is not None and os.path.samestat(old, status):
                     known = "" if name == file else f" as {name}"
                     raise InvalidInput(
-                        f"{as_flag(option)}: {file} is read{known}, and would be lost; write to another file"
+                        f"{as_flag(option)}: {file} is an input{known}, and would be lost; write to another file"
                     )
 
 
@@ -304,7 +305,7 @@ def write_output(
     folder. ``like`` describes the colours of the source image.
     """
     if find_suffix(Path(path)).lower() == STORE:
-        raise FileError(f"{path}: stores of Zarr are written by texrs solid, synthesize, tiles and apply")
+        raise FileError(f"{path}: only texrs solid, synthesize, tiles and apply write Zarr stores")
     with io.atomic(path) as temporary:
         check_free(path, option)
         try:
@@ -446,7 +447,7 @@ def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str |
     """Return the output names of one of several results. Each ends with its seed."""
     for option, path in paths.items():
         if path is not None and not Path(path).name:
-            raise InvalidInput(f"{as_flag(option)}: needs a name that the seed of a variant can follow, got {path!r}")
+            raise InvalidInput(f"{as_flag(option)}: must be a name that a seed can be added to, got {path!r}")
     named: dict[str, str | None] = {}
     for option, path in paths.items():
         suffix = "" if path is None else find_suffix(Path(path))

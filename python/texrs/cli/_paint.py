@@ -79,9 +79,9 @@ def paint_command(
     _outputs.check_output(out)
     values = {**PAINTED.read(given), **FOLLOWED.read(given), **TEXTURE.read(given, which=lambda o: not o.file)}
     if ("directions",) in values and given["field"] is not None:
-        raise InvalidInput("--directions, --field: one of them can be asked for")
+        raise InvalidInput("--directions: cannot be combined with --field")
     if ("along",) in values and ("directions",) not in values:
-        raise InvalidInput("--along: needs --directions")
+        raise InvalidInput("--along: must be combined with --directions")
     # The volume of a folder of maps has no spacing.
     whole = given["exemplar"] if not os.path.isdir(given["exemplar"]) else None
     spacing = values.get(("spacing",)) or read_stated_spacing(whole)
@@ -91,7 +91,7 @@ def paint_command(
         o.call({p: v for p, v in values.items() if p in {i.path for i in o}}) for o in (TEXTURE, PAINTED, FOLLOWED)
     )
     if role and not isinstance(call["exemplar"], Material):
-        raise InvalidInput("--role: is for materials, which are folders of maps")
+        raise InvalidInput("--role: only available for materials, which are folders of maps")
     painted.pop("mesh")
     surface = read_mesh(mesh)
     names = {n: v for o in (FOLLOWED, PAINTED, TEXTURE) for n, v in o.name_values(given).items()}

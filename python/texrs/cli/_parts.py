@@ -82,11 +82,13 @@ class InParts(Verb):
         paths = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         for name, path in paths.items():
             if path is not None and name != "out":
-                raise InvalidInput(f"{as_flag(name)}: is for results that are made at once, without {_list(said)}")
+                raise InvalidInput(
+                    f"{as_flag(name)}: cannot be combined with {_list(said)}, because the result is written in parts"
+                )
         stack = Stack.take(given)
         for flag, value in stack.list_writing().items():
             if value is not None:
-                raise InvalidInput(f"{flag}: is for results that are made at once")
+                raise InvalidInput(f"{flag}: only available for results that are not written in parts")
         text = given["size"]
         size = None if text is None else parse_size(text, axes=axes, limit=1 << 50)
         asked = Asked.read(said, axes)
@@ -97,7 +99,7 @@ class InParts(Verb):
         usual = {p.name: p.default for p in inspect.signature(options.function).parameters.values()}
         for name, value in call.items():
             if name not in (*TAKEN, "size", "progress") and value is not usual[name] and value != usual[name]:
-                raise InvalidInput(f"{as_flag(name)}: is for results that are made at once")
+                raise InvalidInput(f"{as_flag(name)}: only available for results that are not written in parts")
         kind = SolidTexture if axes == 3 else PlaneTexture
         with name_arguments(**options.name_values(given), shape="--size", origin="--origin", chunks="--chunks"):
             texture = kind(**{name: call[name] for name in TAKEN if name in call})
@@ -127,7 +129,7 @@ class Asked:
 def read_scheduler(workers: int | None, scheduler: str | None) -> int | str | None:
     """Return the scheduler: a number of processes, the workers of a cluster, or None for this process."""
     if workers is not None and scheduler is not None:
-        raise InvalidInput("--workers, --scheduler: one of them can be asked for")
+        raise InvalidInput("--workers: cannot be combined with --scheduler")
     return scheduler if workers is None else as_int(workers, "--workers", 1, 1024)
 
 
@@ -226,5 +228,5 @@ def _parse_origin(text: str | None, axes: int) -> tuple[int, ...]:
     wanted = ("X,Y, as in -40,1000", "X,Y,Z, as in 0,-40,1000")[axes - 2]
     numbers = parse_numbers(text, "--origin", wanted, counts=(axes,), between=",")
     if any(n != int(n) for n in numbers):
-        raise InvalidInput(f"--origin: needs {wanted}; got {text!r}")
+        raise InvalidInput(f"--origin: must be {wanted}; got {text!r}")
     return tuple(int(n) for n in reversed(numbers))

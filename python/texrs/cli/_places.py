@@ -94,14 +94,16 @@ def parse_corners(text: str, about: About) -> list[list[float]]:
     """Return four points (row, column)."""
     points = parse_places([text], about)
     if len(points) != 4:
-        raise InvalidInput(f"{about.option}: needs four places X,Y, as in '20,20 104,24 110,100 14,112', got {text!r}")
+        raise InvalidInput(
+            f"{about.option}: must be four places X,Y, as in '20,20 104,24 110,100 14,112', got {text!r}"
+        )
     return points
 
 
 def _parse_finite(text: str, count: int, option: str, wanted: str) -> list[float]:
     numbers = parse_numbers(text, option, wanted, counts=(count,), between=",")
     if not all(math.isfinite(n) for n in numbers):
-        raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
+        raise InvalidInput(f"{option}: must be {wanted}; got {text!r}")
     return numbers
 
 
@@ -127,10 +129,10 @@ def read_points(path: str, about: About) -> list[list[float]]:
                 continue
             values = []
         if len(values) != 2:
-            raise InvalidInput(f"{path}: line {number} needs x,y, got {line.strip()[:60]!r}")
+            raise InvalidInput(f"{path}: line {number} must be x,y, got {line.strip()[:60]!r}")
         found.append(values)
     if not found:
-        raise InvalidInput(f"{path}: holds no points")
+        raise InvalidInput(f"{path}: contains no points")
     if has_rows_first():
         return found
     if order is None:
@@ -177,9 +179,7 @@ def check_corners(corners: Sequence[Sequence[float]], size: Sequence[int]) -> No
         other = (
             "" if _find_fault(points[:, ::-1], size) else "; they fit as row,column, but x comes first: exchange them"
         )
-        raise InvalidInput(
-            f"corners: {reason}; understood as the x,y {said} in a picture of {size[1]} x {size[0]}{other}"
-        )
+        raise InvalidInput(f"corners: {reason}; read as the x,y {said} in an image of {size[1]} x {size[0]}{other}")
 
 
 def _find_fault(points: np.ndarray, size: Sequence[int]) -> str:

@@ -291,7 +291,9 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
     if status is not None and status.st_size > 0:
         reason = _find_other(running, path)
         if reason:
-            raise InvalidInput(f"{as_flag(option)}: {path} {reason}; --force replaces it, or write to another file")
+            raise InvalidInput(
+                f"{as_flag(option)}: {path} {reason}; pass --force to replace it, or write to another file"
+            )
     beside = str(name_sidecar(Path(real)))
     if (
         needs_sidecar(Path(real))
@@ -300,7 +302,8 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
         and io.read_metadata(beside).made is None
     ):
         raise InvalidInput(
-            f"{as_flag(option)}: {beside}, which is to say how {path} was made, is there already; --force replaces it"
+            f"{as_flag(option)}: {beside} exists, but the record of {path} must be written there; pass --force to "
+            "replace it"
         )
     running.checked.add(real)
 

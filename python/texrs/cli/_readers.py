@@ -84,7 +84,7 @@ def read_volume(text: str, *, finite: bool = True) -> Array:
         volume: Array = samples.load(text.removeprefix(SAMPLE)).image
         if volume.ndim != 4:
             known = ", ".join(n for n in samples.names() if is_solid(n))
-            raise InvalidInput(f"{text}: is an image; volumes are {known}")
+            raise InvalidInput(f"{text}: must be a volume, got an image; volumes are {known}")
     else:
         try:
             volume = io.read_volume(text)
@@ -92,7 +92,7 @@ def read_volume(text: str, *, finite: bool = True) -> Array:
             if (shape := find_image(text)) is None:
                 raise
             message = f"{text}: is an image of {shape[1]} x {shape[0]}, but a volume is needed: {VOLUMES}"
-            raise FileError(f"{message}. texrs synthesize grows images") from None
+            raise FileError(f"{message}. Use texrs synthesize for images") from None
     if finite:
         as_image(volume, text, axes=3)
     return volume

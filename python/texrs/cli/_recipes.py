@@ -99,14 +99,14 @@ def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
         ("presets", dict, "tables of options, by name"),
     ):
         if key in said and not (isinstance(said[key], kind) and said[key]) and said[key] != {}:
-            raise InvalidInput(f"{where}: {key} needs to be {wanted}, got {said[key]!r}")
+            raise InvalidInput(f"{where}: {key} must be {wanted}, got {said[key]!r}")
     for key in ("verb", "inputs", "out"):
         if key not in said or not said[key]:
             option = {"out": "--out", "inputs": "INPUT"}.get(key, key) if not where.endswith(".toml") else key
-            raise InvalidInput(f"{where}: needs {option}")
+            raise InvalidInput(f"{where}: must contain {option}")
     presets = said.get("presets", {})
     if not all(isinstance(value, dict) for value in presets.values()):
-        raise InvalidInput(f"{where}: presets needs to be tables of options, by name, got {presets!r}")
+        raise InvalidInput(f"{where}: presets must be tables of options, by name, got {presets!r}")
     return Recipe(
         said["verb"],
         as_texts(said["inputs"], f"{where}: inputs"),
@@ -128,13 +128,13 @@ def as_texts(value: Any, where: str) -> list[str]:
     """Return one text or several as a list."""
     several = [value] if isinstance(value, str) else value
     if not isinstance(several, list) or not all(isinstance(v, str) for v in several):
-        raise InvalidInput(f"{where}: needs a text or a list of texts, got {value!r}")
+        raise InvalidInput(f"{where}: must be a text or a list of texts, got {value!r}")
     return several
 
 
 def parse_seeds(value: Any, where: str) -> list[int]:
     """Return the numbers of ``0:32``, of ``1,5,9``, of a number or of a list of numbers."""
-    wanted = f"{where}: needs A:B as in 0:32, numbers as in 1,5,9, or a list of them; got {value!r}"
+    wanted = f"{where}: must be A:B as in 0:32, numbers as in 1,5,9, or a list of them; got {value!r}"
     if isinstance(value, str):
         found = re.fullmatch(r"\s*(\d{1,20})\s*:\s*(\d{1,20})\s*", value)
         if found:
@@ -187,12 +187,12 @@ def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
             other = taken.setdefault(os.path.realpath(job.out), source)
             if other != source or len({os.path.realpath(j.out) for j in jobs}) < len(jobs):
                 raise InvalidInput(
-                    f"out: several results have the name {job.out}; "
-                    "it may hold {folder}, {name}, {suffix}, {parent}, {preset}, {seed}"
+                    f"out: must differ for each result, but several have the name {job.out}; use {{folder}}, "
+                    f"{{name}}, {{suffix}}, {{parent}}, {{preset}} or {{seed}}"
                 )
             total += 1
             if total > MOST:
-                raise InvalidInput(f"inputs, seeds: are more than {MOST} results")
+                raise InvalidInput(f"inputs, seeds: must give at most {MOST} results")
             yield job
 
 
@@ -279,7 +279,7 @@ def check_results(jobs: Sequence[Job]) -> None:
     for job in jobs:
         status = read_status(job.out)
         if status is not None and (source := read.get((status.st_dev, status.st_ino))) is not None:
-            raise InvalidInput(f"out: {job.out} is read as {source}, and would be lost; write to another folder")
+            raise InvalidInput(f"out: {job.out} is the input {source}, and would be lost; write to another folder")
 
 
 def write_option(key: str, value: Any, known: Mapping[str, str]) -> list[str]:
@@ -289,5 +289,5 @@ def write_option(key: str, value: Any, known: Mapping[str, str]) -> list[str]:
         return [f"--{'' if value else 'no-'}{flag}"]
     several = value if isinstance(value, list) else [value]
     if not all(isinstance(v, str | int | float) for v in several):
-        raise InvalidInput(f"options: {key} needs a text, a number, true or false, got {value!r}")
+        raise InvalidInput(f"options: {key} must be a text, a number, true or false, got {value!r}")
     return [word for v in several for word in (f"--{flag}", fill(str(v), known))]

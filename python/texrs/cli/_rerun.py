@@ -161,13 +161,13 @@ def rerun_command(
     recipes = read_recipes(output)
     recipe = recipes[0]
     if out is not None and os.path.isdir(output):
-        raise InvalidInput(f"--out: is for one file; {output} is a folder, whose files are only compared")
+        raise InvalidInput(f"--out: only available for one file; {output} is a folder, whose files are only compared")
     running = RUNNING.get()
     if out is not None and not (running and running.force):
         check_same(out, recipe)
     command = context.find_root().command.get_command(context, recipe.verb)  # type: ignore[attr-defined]
     if command is None:
-        raise InvalidInput(f"{output}: was made by texrs {recipe.verb}, which this version does not know")
+        raise InvalidInput(f"{output}: was made by texrs {recipe.verb}, which this version does not have")
     names = recipe.find_inputs()
     beside = os.path.dirname(os.path.dirname(os.path.realpath(recipe.path))) if None in recipe.arguments else None
     folder = tempfile.mkdtemp(prefix=name_prefix(), dir=beside)
@@ -197,16 +197,16 @@ def read_recipes(output: str) -> list[Recipe]:
         recipe = Recipe.read(output)
         if recipe is None:
             there = os.path.exists(output)
-            raise InvalidInput(f"{output}: does not say how it was made" if there else f"{output}: is not there")
+            raise InvalidInput(f"{output}: has no record of how it was made" if there else f"{output}: does not exist")
         return [recipe]
     inside = {entry.path for entry in os.scandir(output) if entry.is_file()}
     # The record of another file is not a file of its own.
     files = sorted(file for file in inside if not (file.endswith(".json") and file.removesuffix(".json") in inside))
     known = [recipe for file in files if (recipe := Recipe.read(file)) is not None and recipe.file is not None]
     if not known:
-        raise InvalidInput(f"{output}: no file in it says how it was made")
+        raise InvalidInput(f"{output}: none of its files has a record of how it was made")
     if len({(each.show(), each.output, tuple(each.inputs.items())) for each in known}) > 1:
-        raise InvalidInput(f"{output}: holds what several commands made; name one of its files")
+        raise InvalidInput(f"{output}: contains results of several commands; name one of its files")
     return known
 
 
@@ -215,7 +215,7 @@ def check_same(path: str, recipe: Recipe) -> None:
     if os.path.lexists(path) and not (os.path.isfile(path) and os.path.getsize(path) == 0):
         made = io.read_metadata(path).made if os.path.isfile(path) else None
         if made is None or json.loads(made) != json.loads(recipe.text) or not is_unchanged(path, made):
-            raise InvalidInput(f"--out: {path} is there already, and is something else; --force replaces it")
+            raise InvalidInput(f"--out: {path} exists and has other contents; pass --force to replace it")
 
 
 def compare(recipe: Recipe, made: str) -> None:
@@ -229,7 +229,7 @@ def compare(recipe: Recipe, made: str) -> None:
         say(f"{recipe.path}: was changed since it was made; its inputs still make what it was, SHA-256 {now}")
         return
     why = f"; it was made by texrs {recipe.version}, this is {__version__}" if recipe.version != __version__ else ""
-    raise InvalidInput(f"{recipe.path}: its inputs make other bytes now (SHA-256 {now}, it has {then}){why}")
+    raise InvalidInput(f"{recipe.path}: its inputs now give other bytes (SHA-256 {now}, the file has {then}){why}")
 
 
 # --- what a file holds -----------------------------------------------------------------------------------------------
@@ -398,7 +398,7 @@ def describe_arrays(file: str) -> list[str]:
     """Return a line for each array. A single one with two or three axes is described as an image."""
     arrays = io.read_headers(file)
     if len(arrays) == 1 or "image" in arrays:
-        raise FileError(f"{file}: holds one array")
+        raise FileError(f"{file}: contains only one array")
     return [f"{name}: {' x '.join(map(str, array.shape or (1,)))}, {array.dtype}" for name, array in arrays.items()]
 
 

@@ -63,10 +63,10 @@ def scale_map_command(
     chosen = [option for option, value in origins.items() if value is not None]
     if len(chosen) != 1:
         found = " and ".join(chosen) or "none of them"
-        raise InvalidInput(f"scale-map: needs one of {', '.join(list(origins)[:-1])} and --scale-map, got {found}")
+        raise InvalidInput(f"scale-map: must have one of {', '.join(list(origins)[:-1])} and --scale-map, got {found}")
     check_needed(given, {"--slant": ANGLES, "--mask": MASKS, "--auto": (*MASKS, *FOUND)}, chosen[0])
     if hole is not None and chosen[0] not in ("--mask", "--auto"):
-        raise InvalidInput(f"--hole: needs --mask or --auto, got {chosen[0]}")
+        raise InvalidInput(f"--hole: must be used with --mask or --auto, got {chosen[0]}")
     asked = {
         key: value
         for each in (ANGLES, MASKS, FOUND, EDITED, RESIZED, ENCODED)
@@ -134,7 +134,7 @@ def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
     """Return the mask if it has the size of the image."""
     if mask.shape[:2] != pixels.shape[:2]:
         sizes = (_outputs.show_sides(a.shape[:2]) for a in (pixels, mask))
-        raise InvalidInput("{}: needs the size of the image, {}; got {}".format(option, *sizes))
+        raise InvalidInput("{}: must have the size of the image, {}; got {}".format(option, *sizes))
     return mask
 
 

@@ -44,7 +44,9 @@ def parse_at(text: str, about: About) -> tuple[int, int] | list[float]:
             return turn([int(p) for p in text.split(",")])
     except ValueError:
         pass
-    raise InvalidInput(f"{about.option}: needs x=, y= or z= and a number, or three such as 10,20,30; got {text!r}")
+    raise InvalidInput(
+        f"{about.option}: must be x=, y= or z= and a number, or three numbers such as 10,20,30; got {text!r}"
+    )
 
 
 def parse_oblique(text: str, about: About) -> tuple[list[float] | None, list[float]]:
@@ -52,13 +54,13 @@ def parse_oblique(text: str, about: About) -> tuple[list[float] | None, list[flo
     point, slash, normal = text.partition("/")
     wanted = "X,Y,Z/X,Y,Z, a point and a normal such as 10,20,30/0,1,1, or /0,1,1"
     if not slash:
-        raise InvalidInput(f"{about.option}: needs {wanted}; got {text!r}")
+        raise InvalidInput(f"{about.option}: must be {wanted}; got {text!r}")
     sides = [
         turn(parse_numbers(p, about.option, wanted, counts=(3,), between=",")) if p.strip() else None
         for p in (point, normal)
     ]
     if sides[1] is None:
-        raise InvalidInput(f"{about.option}: needs {wanted}; got {text!r}")
+        raise InvalidInput(f"{about.option}: must be {wanted}; got {text!r}")
     return sides[0], sides[1]
 
 
@@ -118,21 +120,23 @@ def slice_command(
     }
     chosen = [option for option, there in asked.items() if there]
     if len(chosen) > 1:
-        raise InvalidInput(f"{' and '.join(chosen)}: one of them can be asked for")
+        raise InvalidInput(f"{' and '.join(chosen)}: cannot be combined")
     owners = {"--at": ACROSS, "--oblique": CUT, "--cube": BLOCK, "--transparent": CLEAR, "--turntable": TURNED}
     used = owners[(chosen or ["--at"])[0]]
     options = used.call(used.read(given))
     check_needed(given, owners, (chosen or ["--at"])[0])
     paged = Path(out).suffix.lower() in (".html", ".htm")
     if paged and chosen:
-        raise InvalidInput(f"--out: a page shows slices along all axes, without {chosen[0]}; got {out!r}")
+        raise InvalidInput(f"--out: must be an image with {chosen[0]}, got {out!r}; a page shows slices along all axes")
     with name_arguments(point="--oblique", normal="--oblique", count="--threads"), threads(count):
         check_view(used, options)
     with name_arguments():
         spacing = as_distances(said, 3) if (said := APART.call(APART.read(given)).get("spacing")) else None
     moving = Path(out).suffix.lower() == ".gif"
     if moving != as_turntable:
-        raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
+        raise InvalidInput(
+            f"--out: must {'not end in .gif without' if moving else 'end in .gif with'} --turntable, got {out!r}"
+        )
     _outputs.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube or as_clear else None)
     voxels = read_volume(volume)
     length = voxels.shape[:3]

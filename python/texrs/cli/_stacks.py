@@ -121,7 +121,9 @@ class Stack:
         given |= {f"--{name}": paths.get(name) for name in SHOWN}
         for flag, value in given.items():
             if value:
-                raise InvalidInput(f"{flag}: is for materials, which are folders of maps or EXR files of layers")
+                raise InvalidInput(
+                    f"{flag}: only available for materials, which are folders of maps or EXR files of layers"
+                )
 
     def check_outputs(self, material: Material, paths: Mapping[str, str | None], read: Sequence[str]) -> None:
         """Check before the work that all files can be written, and replace neither inputs nor other files."""
@@ -129,8 +131,8 @@ class Stack:
         if Path(out).suffix.lower() == LAYERED:
             if self.suffix or self.depth or self.pack or self.convention:
                 raise InvalidInput(
-                    "--out: a file of layers keeps each map as it is; "
-                    "give a folder for --depth, --format, --pack and --convention"
+                    "--out: must be a folder with --depth, --format, --pack or --convention; a file of layers keeps "
+                    "each map as it is"
                 )
             _outputs.check_output(out)
             return
@@ -208,7 +210,7 @@ def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
     for text in texts or ():
         name, equals, role = text.partition("=")
         if not (name and equals and role):
-            raise InvalidInput(f"--role: needs MAP=ROLE, as in rock.png=height; got {text!r}")
+            raise InvalidInput(f"--role: must be MAP=ROLE, as in rock.png=height; got {text!r}")
         said[name] = role
     return said
 

@@ -46,7 +46,7 @@ def parse_size(text: str, option: str = "--size", *, axes: int = 2, limit: int |
     parts = re.split(r"[x×]", text.strip().lower())
     if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
         wanted = ("WIDTHxHEIGHT, as in 1024x512", "WIDTHxHEIGHTxDEPTH, as in 128x96x64")[axes - 2]
-        raise InvalidInput(f"{option}: needs {wanted}, or one number; got {text!r}")
+        raise InvalidInput(f"{option}: must be {wanted}, or one number; got {text!r}")
     sides = [int(p) for p in reversed(parts)]
     return as_size(sides if len(sides) > 1 else sides[0], option, axes=axes, limit=limit)
 
@@ -59,7 +59,7 @@ def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[boo
         wanted = (
             "must be one of default, xy, x, y, none"
             if axes == 2
-            else "needs axes among x, y and z, each once, or none, or default"
+            else "must be letters of x, y and z, each once, or none, or default"
         )
         raise InvalidInput(f"{option}: {wanted}; got {text!r}")
     return tuple(letters != "none" and letter in letters for letter in known)
@@ -81,7 +81,7 @@ def parse_numbers(
     except ValueError:
         numbers = []
     if not numbers or (counts and len(numbers) not in counts):
-        raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
+        raise InvalidInput(f"{option}: must be {wanted}; got {text!r}")
     return numbers
 
 
@@ -110,7 +110,7 @@ def parse_bytes(text: str, option: str = "--memory-limit") -> int:
     """Return the number of bytes of ``900M`` or ``16G``, in powers of 1024."""
     found = re.fullmatch(r"([0-9]{1,18})([kmgt]?)(i?b)?", text.strip().lower())
     if not found or int(found[1]) == 0:
-        raise InvalidInput(f"{option}: needs a number of bytes, as in 900M or 16G; got {text!r}")
+        raise InvalidInput(f"{option}: must be a number of bytes, as in 900M or 16G; got {text!r}")
     return int(found[1]) << 10 * " kmgt".index(found[2] or " ")
 
 
@@ -152,5 +152,5 @@ def read_json(text: str, option: str) -> Any:
 def read_corrections(text: str, about: About) -> Any:
     """Return a list of corrections: JSON, or a JSON file."""
     if not (text.lower().endswith(".json") or text.lstrip().startswith("[")):
-        raise InvalidInput(f"{about.option}: needs a file of JSON, or a list of steps as JSON; got {text!r}")
+        raise InvalidInput(f"{about.option}: must be a file of JSON, or a list of steps as JSON; got {text!r}")
     return read_steps(text, about)

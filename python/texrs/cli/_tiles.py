@@ -80,9 +80,9 @@ def tiles_command(
     asked, windowed = Asked.read(said, 2), size is not None
     for name, value in said.items():
         if value is not None and not windowed:
-            raise InvalidInput(f"--{name}: is of a window, and needs --size")
+            raise InvalidInput(f"--{name}: must be combined with --size, because it is of a window")
     if windowed and index is not None:
-        raise InvalidInput("--index: is of the index texture, which a window (--size) has none of")
+        raise InvalidInput("--index: cannot be combined with --size (a window has no index texture)")
     sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(index or str(CELLS), "--index")
     parts = is_stored(out) or chunks is not None or asked.scheduler is not None
     if windowed and not parts:

@@ -239,8 +239,8 @@ def make_views(
     several |= {"fov": several["fov"] * count} if len(several.get("fov", [])) == 1 else {}
     for name, values in several.items():
         if len(values) != count:
-            many = f"one for each of {count} grounds, in their order, or 'found'" if count > 1 else "to be given once"
-            raise InvalidInput(f"{name}: needs {many}; it was given {len(values)} times")
+            many = f"one for each of {count} grounds, in their order, or 'found'" if count > 1 else "given once"
+            raise InvalidInput(f"{name}: must be {many}, got {len(values)} values")
     fields: list[dict[str, Any]] = [{name: values[k] for name, values in several.items()} for k in range(count)]
     views = [PlaneView(**each) for each in fields]
     return views if count > 1 else views[0]
@@ -277,7 +277,7 @@ def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:
             return Exemplar(image, **said)
         for name in said.keys() - {"axes"}:
             raise InvalidInput(
-                f"--{name.replace('_', '-')}: is for a picture; of a material the roles of its maps say it"
+                f"--{name.replace('_', '-')}: not available for materials, which use the roles of their maps"
             )
         return image
 

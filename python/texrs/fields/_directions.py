@@ -87,7 +87,9 @@ def from_directions(
     check_memory(8 * given.size, "directions")
     vectors = np.asarray(given, np.float64)
     if not np.isfinite(vectors).all():
-        raise InvalidInput(f"directions: {int((~np.isfinite(vectors)).sum())} of {vectors.size} values are not finite")
+        raise InvalidInput(
+            f"directions: must be finite, but {int((~np.isfinite(vectors)).sum())} of {vectors.size} values are not"
+        )
     if order is not None:
         as_choice(order, "order", (letters, letters[::-1]))
         vectors = vectors if order == letters else vectors[..., ::-1]
@@ -132,7 +134,7 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
     slopes = _slopes(_as_map(volume), sigma)
     if as_bool(across, "across"):
         if slopes.shape[-1] != 2:
-            raise InvalidInput("across: is for pictures; a volume has no one direction along its contours")
+            raise InvalidInput("across: only available for images; a volume has no single direction along its contours")
         slopes = np.stack([-slopes[..., 1], slopes[..., 0]], axis=-1)
     return from_directions(slopes, along=along)
 
@@ -171,7 +173,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
     sigma = as_float(sigma, "sigma", 0, 100)
     slopes = _slopes(_as_map(volume), sigma / 2)
     if not np.abs(slopes).max():
-        raise InvalidInput("volume: is constant, so it has no grain")
+        raise InvalidInput("volume: must not be constant, because it would have no grain")
     axes = slopes.shape[-1]
     tensor = np.empty((*slopes.shape, axes))
     for i in range(axes):
@@ -208,7 +210,7 @@ def _fill(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     length = np.sqrt((vectors**2).sum(axis=-1))
     none = length <= SMALLEST * length.max()
     if none.all():
-        raise InvalidInput("directions: all have length 0, so they have no direction")
+        raise InvalidInput("directions: must not all have length 0")
     unit = vectors / np.where(none, 1, length)[..., np.newaxis]
     if none.any():
         nearest = distance_transform_edt(none, return_distances=False, return_indices=True)
@@ -246,7 +248,7 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
         upwards = np.asarray(up, np.float64)
         if upwards.shape not in ((3,), unit.shape) or not np.isfinite(upwards).all() or not upwards.any(axis=-1).all():
             raise InvalidInput(
-                f"up: needs 3 numbers that are not all 0, or such for each of {unit.shape[:-1]}, got {up!r}"
+                f"up: must be 3 numbers that are not all 0, or such numbers for each of {unit.shape[:-1]}, got {up!r}"
             )
         upwards = upwards.reshape(-1, 3) / np.sqrt((upwards.reshape(-1, 3) ** 2).sum(axis=1, keepdims=True))
     # If a direction is parallel to up, use the axis least parallel to it instead.

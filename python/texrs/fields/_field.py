@@ -217,9 +217,11 @@ class Field(ABC):
         first = try_array(origin)
         first = np.broadcast_to(first, (self.axes,)) if first.ndim == 0 else first
         if first.dtype.kind not in "ui" or first.shape != (self.axes,):
-            raise InvalidInput(f"origin: needs an integer, or {self.axes} of them; got {first.dtype} of {first.shape}")
+            raise InvalidInput(
+                f"origin: must be an integer, or {self.axes} of them; got {first.dtype} of {first.shape}"
+            )
         if max(map(abs, first.tolist())) > FAR:
-            raise InvalidInput(f"origin: needs integers within {FAR} of 0, got {first.tolist()}")
+            raise InvalidInput(f"origin: must be integers within {FAR} of 0, got {first.tolist()}")
         spread, given = as_float(step, "step", 2.0**-20, 2.0**20), as_bool(jacobians, "jacobians")
         out = np.empty((prod(sides), self.axes, self.axes), np.float32)
         for start in range(0, len(out), _BLOCK):
@@ -327,7 +329,9 @@ def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.
         )
     at = np.ascontiguousarray(given, np.float64)
     if not np.isfinite(at).all():
-        raise InvalidInput(f"{name}: {int((~np.isfinite(at)).sum())} of {at.size} values are NaN or infinite")
+        raise InvalidInput(
+            f"{name}: must be finite, but {int((~np.isfinite(at)).sum())} of {at.size} values are NaN or infinite"
+        )
     return at
 
 
@@ -342,7 +346,7 @@ def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float6
         return np.zeros(axes)
     at = as_points(place, axes, name)
     if at.ndim > 1 or np.abs(at).max() > FAR:
-        raise InvalidInput(f"{name}: needs {axes} numbers within {FAR:g}, got shape {at.shape}, or larger ones")
+        raise InvalidInput(f"{name}: must be {axes} numbers within {FAR:g}, got shape {at.shape}, or larger numbers")
     return at
 
 
@@ -414,9 +418,9 @@ def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = N
 
     """
     if not isinstance(field, Field):
-        raise InvalidInput(f"field: needs a field, made by texrs.fields, got {type(field).__name__}")
+        raise InvalidInput(f"field: must be a field of texrs.fields, got {type(field).__name__}")
     if isinstance(shape, Sequence) and len(shape) != field.axes:
-        raise InvalidInput(f"field: has {field.axes} axes, a size of {len(shape)} is asked for")
+        raise InvalidInput(f"field: must have {len(shape)} axes, as the requested size, got {field.axes}")
     sides = as_size(shape, "shape", axes=field.axes)
     most = 32 if field.axes == 3 else 181
     start = as_place(origin, field.axes, "origin")

@@ -94,7 +94,7 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
     given = try_array(array)
     count = given.shape[-1] if given.ndim else 0
     if extent is not None and not isinstance(extent, Sequence):
-        raise InvalidInput(f"extent: needs the sides of the output, got {extent!r}")
+        raise InvalidInput(f"extent: must be the sides of the output, got {extent!r}")
     if count in (2, 3) and given.ndim == count + 1:
         field = from_directions(given, extent if extent is None or len(extent) == count else None, **options)
     elif count in (2, 3) and given.ndim == count + 2:
@@ -105,7 +105,7 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
             f"got {given.dtype} of shape {given.shape}"
         )
     if axes is not None and field.axes != as_axes(axes):
-        raise InvalidInput(f"holds {given.shape}, a field of {field.axes} axes; {axes} are needed")
+        raise InvalidInput(f"must have {axes} axes, got shape {given.shape}, a field of {field.axes} axes")
     return field
 
 
@@ -169,14 +169,14 @@ def _make_field(value: object, axes: int, extent: Sequence[int] | None) -> Field
     """Return a value as a field in units of voxels."""
     if isinstance(value, Field):
         if value.axes != axes:
-            raise InvalidInput(f"field: needs a field of {axes} axes, got {value}")
+            raise InvalidInput(f"field: must be a field of {axes} axes, got {value}")
         return value
     if isinstance(value, str | os.PathLike):
         name, words = _split(value) if isinstance(value, str) else (os.fspath(value), "")
         return read(FilePath(name), extent, axes=axes, **_parse_options(words))
     given = try_array(value)
     if given.dtype.kind not in "buif" or given.ndim < 3:
-        raise InvalidInput(f"field: needs a field of {axes} axes, got {type(value).__name__}")
+        raise InvalidInput(f"field: must be a field of {axes} axes, got {type(value).__name__}")
     try:
         return make(given, extent, axes=axes)
     except InvalidInput as error:
@@ -195,15 +195,17 @@ def _parse_options(words: str) -> dict[str, Any]:
     for part in words.split(",") if words else []:
         key, _, value = (p.strip() for p in part.partition("="))
         if key not in _OPTIONS:
-            raise InvalidInput(f"field: knows {', '.join(f'{o}=' for o in _OPTIONS)} after a file, got {part!r}")
+            raise InvalidInput(
+                f"field: a file must be followed only by {', '.join(f'{o}=' for o in _OPTIONS)}; got {part!r}"
+            )
         if key == "up":
             try:
                 options[key] = [float(n) for n in value.split("x")]
             except ValueError:
-                raise InvalidInput(f"field: up= needs three numbers such as 1x0x0, got {value!r}") from None
+                raise InvalidInput(f"field: up= must be three numbers such as 1x0x0, got {value!r}") from None
         elif key == "signed":
             if value not in ("yes", "no"):
-                raise InvalidInput(f"field: signed= needs yes or no, got {value!r}")
+                raise InvalidInput(f"field: signed= must be yes or no, got {value!r}")
             options[key] = value == "yes"
         else:
             options[key] = value

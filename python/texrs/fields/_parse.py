@@ -89,7 +89,7 @@ def parse(
 
     """
     if not isinstance(text, str):
-        raise InvalidInput(f"field: needs words such as zigzag:period=64, got {type(text).__name__}")
+        raise InvalidInput(f"field: must be words such as zigzag:period=64, got {type(text).__name__}")
     name, _, rest = text.strip().partition(":")
     if name not in _KNOWN:
         near = get_close_matches(name, _KNOWN, 1)
@@ -108,7 +108,7 @@ def parse(
     if "axes" in inspect.signature(make).parameters:
         options["axes"] = axes
     elif axes != 3:
-        raise InvalidInput(f"field: {name} is for volumes, not for pictures")
+        raise InvalidInput(f"field: {name} is only available for volumes")
     if spacing is not None:
         # Default lengths are in voxels.
         unit, usual = min(as_distances(spacing, axes)), {"period": 32.0} | ({} if size else {"length": 128.0})
@@ -133,4 +133,4 @@ def _parse_value(key: str, text: str) -> object:
         return float(text)
     except ValueError:
         wanted = "numbers such as 16x24x32" if key == "centre" else "a number"
-        raise InvalidInput(f"field: {key} needs {wanted}, got {text!r}") from None
+        raise InvalidInput(f"field: {key} must be {wanted}, got {text!r}") from None

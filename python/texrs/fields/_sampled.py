@@ -85,7 +85,7 @@ def make_grid(
         raise InvalidInput(f"frames: must have shape (R, C, 2, 2) or (P, R, C, 3, 3), got {given.shape}")
     sides = given.shape[:axes]
     if prod(sides) > MAX_FRAMES:
-        raise InvalidInput(f"frames: up to {MAX_FRAMES} frames are taken, got {prod(sides)}; fewer are interpolated")
+        raise InvalidInput(f"frames: must be at most {MAX_FRAMES}, got {prod(sides)}; fewer frames are interpolated")
     box = sides if extent is None else as_size(extent, "extent", axes=axes, limit=2**62)
     start = as_place(origin, axes, "origin").tolist()
     step = [n / s for n, s in zip(box, sides, strict=True)]
@@ -139,7 +139,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
     if at.shape != (len(given), axes):
         raise InvalidInput(f"points: must have shape {(len(given), axes)} for {len(given)} frames, got {at.shape}")
     if len(np.unique(at, axis=0)) < len(at):
-        raise InvalidInput("points: two frames are set at one point")
+        raise InvalidInput("points: must differ, but two frames are at one point")
     turns, stretches = _split(given, lambda index: at[index])
     return _Scattered(axes, at, turns, stretches)
 
@@ -180,7 +180,7 @@ def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: in
 
     """
     if not callable(function):
-        raise InvalidInput(f"function: needs a function of points, got {type(function).__name__}")
+        raise InvalidInput(f"function: must be a function of points, got {type(function).__name__}")
     return _Function(check_axes(axes), function)
 
 
@@ -284,8 +284,8 @@ class _Function(Field):
         wanted = (len(points), self.axes, self.axes)
         if frames.dtype.kind not in "buif" or frames.shape != wanted:
             raise InvalidInput(
-                f"field: the function {name} gave {frames.dtype} of shape {frames.shape} for {len(points)} points; "
-                f"numbers of shape {wanted} are needed"
+                f"field: the function {name} must return numbers of shape {wanted} for {len(points)} points, got "
+                f"{frames.dtype} of shape {frames.shape}"
             )
         return _to_matrices(frames)
 
@@ -319,7 +319,8 @@ def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float6
         logs[..., index] = _to_matrices((vectors * log[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
     if mirrored not in (0, count):
         raise InvalidInput(
-            f"frames: {mirrored} of {count} frames mirror and the others do not; between them one would be flat"
+            f"frames: must all mirror or none, got {mirrored} of {count} that mirror; a frame between them would be "
+            "flat"
         )
     if uneven > 1e-5:
         return turns, logs
@@ -332,7 +333,9 @@ def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[n
     flat = np.abs(determinants(turn)) < _FLATTEST
     if flat.any():
         place = ", ".join(f"{v:g}" for v in points[int(np.flatnonzero(flat)[0])].tolist())
-        raise InvalidInput(f"field: the frames around ({place}) point in opposite ways, so that there is none between")
+        raise InvalidInput(
+            f"field: the frames around ({place}) point in opposite directions, and have no frame between them"
+        )
     turn = rotations(turn)
     if stretch is None:
         return turn
@@ -348,5 +351,5 @@ def _to_matrices(frames: Array) -> Matrices:
 def _as_numbers(value: ArrayLike, name: str) -> Array:
     given = try_array(value)
     if given.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: needs an array of real numbers, got {given.dtype}")
+        raise InvalidInput(f"{name}: must be an array of real numbers, got {given.dtype}")
     return given

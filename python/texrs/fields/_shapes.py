@@ -361,12 +361,12 @@ def _wind(axis: str, radial: str | None, centre: Sequence[float] | None, axes: i
     check_axes(axes)
     letter = _as_letter(axis, "zyx", "axis")
     if axes == 2 and letter != "z":
-        raise InvalidInput(f"axis: a picture is wound round 'z' alone, got {axis!r}")
+        raise InvalidInput(f"axis: must be 'z' for an image, got {axis!r}")
     following = "xyz"["xyz".index(letter) - 2]
     others = sorted(set("xyz") - {letter})
     out = following if radial is None else _as_letter(radial, "zyx", "radial")
     if out not in others:
-        raise InvalidInput(f"radial: round {letter} it is {' or '.join(others)}, got {radial!r}")
+        raise InvalidInput(f"radial: must be {' or '.join(others)} for the axis {letter}, got {radial!r}")
     along = (set(others) - {out}).pop()
     about = None if centre is None else as_place(centre, axes, "centre")
     letters = LETTERS[axes - 2]
@@ -405,6 +405,6 @@ def _as_matrix(value: ArrayLike) -> NDArray[np.float64]:
         raise InvalidInput(f"matrix: must be numbers of shape (2, 2) or (3, 3), got {given.dtype} of {given.shape}")
     matrix = np.ascontiguousarray(given, np.float64)
     if not all(isfinite(v) for v in matrix.ravel().tolist()):
-        raise InvalidInput("matrix: all its numbers must be finite")
+        raise InvalidInput("matrix: must be finite")
     refuse_flat(matrix[:, :, np.newaxis], np.zeros((1, len(matrix))), "matrix")
     return matrix

@@ -77,7 +77,7 @@ class Constraints:
     def __post_init__(self) -> None:
         """Refuse constraints without exactly one of values and coordinates."""
         if (self.values is None) == (self.coordinates is None):
-            raise InvalidInput("constraints: needs either values or coordinates of the points that mask marks")
+            raise InvalidInput("constraints: must have either values or coordinates of the points that mask marks")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -128,7 +128,7 @@ class Guide:
             check_memory(values.size, "guide")
             if values.dtype.kind not in "biuf" or not np.isfinite(values).all():
                 raise InvalidInput(
-                    f"guide: the map of the {name} needs finite numbers, got {values.dtype} {values.shape}"
+                    f"guide: the map of the {name} must be finite numbers, got {values.dtype} {values.shape}"
                 )
 
 
@@ -264,7 +264,7 @@ class Conditions:
         """
         for given, kind, name in ((constraints, Constraints, "constraints"), (guide, Guide, "guide")):
             if given is not None and not isinstance(given, kind):
-                raise InvalidInput(f"{name}: needs a texrs.{kind.__name__}, got {type(given).__name__}")
+                raise InvalidInput(f"{name}: must be a texrs.{kind.__name__}, got {type(given).__name__}")
         mask = values = pins = maps = None
         if constraints is not None:
             mask = as_mask(constraints.mask, "mask", shape)
@@ -278,7 +278,7 @@ class Conditions:
         if guide is not None:
             if values is not None and pins is None:
                 raise InvalidInput(
-                    "guide: cannot be followed where values are given; give coordinates, or leave one out"
+                    "guide: cannot be combined with values of constraints; give coordinates, or omit one of them"
                 )
             maps = _check_maps(guide, image.shape[: len(shape)], shape)
         return cls(image, mask, values, pins, maps, 0 if guide is None else round(FOLLOW * guide.weight))
@@ -341,7 +341,7 @@ def _check_coordinates(given: Array, mask: Bools, image: Array) -> Floats:
         raise InvalidInput(f"coordinates: must be numbers of shape {wanted}, got {places.dtype} {places.shape}")
     inside = (places >= 0) & (places <= np.array(image.shape[:axes]) - 1)
     if not inside[mask].all():
-        raise InvalidInput("coordinates: those of given points must lie inside the exemplar and be finite")
+        raise InvalidInput("coordinates: must be finite and inside the exemplar at the given points")
     return np.where(mask[..., np.newaxis], places, 0).astype(np.float32)
 
 
@@ -349,11 +349,11 @@ def _check_values(given: object, mask: Bools, image: Array) -> Array:
     values, wanted = np.asarray(given), (*mask.shape, image.shape[-1])
     if values.dtype != image.dtype or values.shape not in (wanted, wanted[:-1] if wanted[-1] == 1 else wanted):
         raise InvalidInput(
-            f"values: needs {image.dtype} of shape {wanted}, as the exemplar has, got {values.dtype} {values.shape}"
+            f"values: must be {image.dtype} of shape {wanted}, like the exemplar, got {values.dtype} {values.shape}"
         )
     values = values.reshape(wanted)
     if values.dtype.kind == "f" and not np.isfinite(values[mask]).all():
-        raise InvalidInput("values: those of given points must be finite")
+        raise InvalidInput("values: must be finite at the given points")
     return np.where(mask[..., np.newaxis], values, np.zeros((), values.dtype))
 
 
@@ -364,7 +364,7 @@ def _check_maps(guide: Guide, mine: tuple[int, ...], theirs: tuple[int, ...]) ->
             maps.append(np.broadcast_to(np.asarray(given), shape).astype(np.float64))
         except ValueError:
             raise InvalidInput(
-                f"guide: the map of the {name} needs finite numbers that broadcast to {shape}, got {np.shape(given)}"
+                f"guide: the map of the {name} must be finite numbers that broadcast to {shape}, got {np.shape(given)}"
             ) from None
     low, span = maps[0].min(), float(np.ptp(maps[0])) or 1.0
     first, second = (np.asarray(np.clip((m - low) / span, 0, 1)[..., np.newaxis], np.float32) for m in maps)

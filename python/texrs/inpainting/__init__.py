@@ -204,7 +204,7 @@ def inpaint(
             "wrap": wrap is not None,
         }
         for name in (name for name, given in flat.items() if given):
-            raise InvalidInput(f"{name}: is for pictures; leave it out for a volume")
+            raise InvalidInput(f"{name}: only available for images; omit it for a volume")
         volume: Any = image
         return inpaint_volume(
             volume,
@@ -216,9 +216,11 @@ def inpaint(
             progress=progress,
         )
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
-        raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
+        raise InvalidInput(
+            "exemplar_scale_map: must be combined with an exemplar, and with a scale_map in the same units"
+        )
     if scale_kind is not None and scale_map is None:
-        raise InvalidInput("scale_kind: says what a scale map holds, and there is none; give one, or leave it out")
+        raise InvalidInput("scale_kind: has no effect without scale_map; give scale_map or omit scale_kind")
     said = None if scale_kind is None else as_kind(scale_kind)
     if allow_mirror is not None or scale_map is not None:
         allow_mirror = False if allow_mirror is None else as_bool(allow_mirror, "allow_mirror")
@@ -231,7 +233,10 @@ def inpaint(
     usable = _check_allowed(allowed, open_, exemplar is None and method == "patch")
     width = as_int(boundary_width, "boundary_width", 0, 1024)
     if patch_size is not None and method == "optimise":
-        raise InvalidInput("patch_size: method 'optimise' has no patches; leave it out, or take method='patch'")
+        raise InvalidInput(
+            "patch_size: cannot be combined with method='optimise', which has no patches; omit it, or use "
+            "method='patch'"
+        )
     chosen = (
         None
         if patch_size is None
@@ -316,10 +321,10 @@ def _check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
     if allowed is None:
         return ~open_
     if not fits:
-        raise InvalidInput("allowed: is not for use with an exemplar, or method 'optimise'")
+        raise InvalidInput("allowed: cannot be combined with an exemplar or method 'optimise'")
     usable: Bools = as_mask(allowed, "allowed", open_.shape) & ~open_
     if not usable.any():
-        raise InvalidInput("allowed: marks nothing that is known, so there is nothing to copy from")
+        raise InvalidInput("allowed: must mark known pixels, because there is nothing else to copy from")
     return usable
 
 
@@ -350,8 +355,8 @@ def _check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | 
     other = known.pixels
     if other.dtype != pixels.dtype or other.shape[-1] != pixels.shape[-1]:
         raise InvalidInput(
-            f"exemplar: needs the dtype and channels of the image, {pixels.dtype} and {pixels.shape[-1]}; "
-            f"got {other.dtype} and {other.shape[-1]}"
+            f"exemplar: must have the dtype and channels of the image, {pixels.dtype} and {pixels.shape[-1]}; got "
+            f"{other.dtype} and {other.shape[-1]}"
         )
     if open_.all():
         pixels[...] = other[0, 0]

@@ -79,7 +79,7 @@ def optimise(
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     for name, shape in zip(("image", "exemplar"), shapes, strict=False):
         if min(shape) < LEAST:
-            raise InvalidInput(f"{name}: method 'optimise' needs at least {LEAST} pixels a side, got {shape}")
+            raise InvalidInput(f"{name}: must have at least {LEAST} pixels a side for method 'optimise', got {shape}")
     levels = min(count_levels(shape, SETTINGS.coarsest) for shape in shapes)
     # Windows may not leave a copy, but those of known pixels at the border do.
     margin = RADIUS << (levels - 1)

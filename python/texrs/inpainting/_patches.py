@@ -219,8 +219,8 @@ def check_places(free: Bools, side: int) -> None:
     """Refuse patches of a size that has no place."""
     if not mark_corners(free, side).any():
         fits = next((s for s in range(side - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
-        hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
-        raise InvalidInput(f"patch_size: {side} has no place in the image that is free of holes; {hint}")
+        hint = f"the largest that does is {fits}" if fits else "no other size does; give an exemplar"
+        raise InvalidInput(f"patch_size: {side} does not fit anywhere in the image without holes; {hint}")
 
 
 def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:
@@ -237,5 +237,5 @@ def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:
         if np.count_nonzero(mark_corners(free, side)) >= PLACES:
             return [side]
     if not mark_corners(free, LEAST).any():
-        raise InvalidInput(f"mask: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give an exemplar")
+        raise InvalidInput(f"mask: must leave {LEAST} x {LEAST} connected pixels to copy from; give an exemplar")
     return [LEAST]

@@ -104,7 +104,7 @@ def inpaint_volume(
         wide = widen(hole_, width)
         weight = (0.0 if labelled else BLEND) if weight is None else weight
         if weight and labelled:
-            raise InvalidInput("screening: labels cannot be mixed; leave it out, or pass 0")
+            raise InvalidInput("screening: must be omitted or 0 for labels, which cannot be mixed")
         best: Filled | None = None
         # Try smaller patches only while the border of the hole is visible.
         for each in [side] if side else list_sides(choose_side(wide, known.shape), labels=labelled):
@@ -151,7 +151,7 @@ def check_volume(image: object, hole: object) -> tuple[Array, Bools]:
     """Return the volume with a known value in its hole, and the hole."""
     asked = as_marks(hole)
     if asked.feather:
-        raise InvalidInput("feather: is for pictures; leave it out for a volume")
+        raise InvalidInput("feather: only available for images; omit it for a volume")
     pixels, mask = find_hole(image, asked, (False,) * 3, axes=3)
     volume = pixels.copy()
     if mask.all():

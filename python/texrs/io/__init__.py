@@ -170,7 +170,7 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     if kind == "zarr":
         return _zarr.read_store(name, limit, 2)
     if kind in VOLUMES:
-        raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
+        raise FileError(f"{name}: is a {kind} file, which contains a volume; read it with texrs.io.read_volume")
     if kind == "exr":
         return _origins.mark(_exr_layers.read_image(name, limit), name, False)
     file = _files.load(name, limit)
@@ -301,8 +301,8 @@ def read_volume(
         return _origins.mark(slices, name, False)
     if kind not in READERS:
         raise FileError(
-            f"{name}: is a {kind} file, which holds one image; "
-            "volumes are .npy, .npz, .vti, NRRD, NIfTI, Zarr, .raw, TIFF or folders of numbered slices"
+            f"{name}: is a {kind} file, which contains one image; volumes are .npy, .npz, .vti, NRRD, NIfTI, Zarr, "
+            ".raw, TIFF or folders of numbered slices"
         )
     return _origins.mark(READERS[kind](name, limit), name, False)
 
@@ -350,7 +350,7 @@ def write(
 
     """
     if description is not None and not (isinstance(description, str) and description.isascii()):
-        raise InvalidInput(f"description: needs letters of ASCII, got {description!r}")
+        raise InvalidInput(f"description: must be ASCII, got {description!r}")
     said = Metadata(multiplied=None) if notes is None else as_instance(notes, "notes", Metadata)
     array = _alpha.adapt(array, _files.as_path(path), said.multiplied)
     _write(path, array, 2, overwrite, None, description, said.georeference)
@@ -438,7 +438,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
     target = _files.as_path(path)
     suffix = target.suffix.lower()
     if suffix not in (".npy", ".tif", ".tiff"):
-        raise FileError(f"{target}: the suffix {suffix!r} is not one that slabs are written to: .npy, .tif, .tiff")
+        raise FileError(f"{target}: the suffix must be one of .npy, .tif, .tiff for slabs; got {suffix!r}")
     sides = _slabs.as_shape(shape)
     with atomic(target, overwrite=overwrite) as temporary:
         # Errors of the function that makes the slabs are raised as they are.
@@ -485,16 +485,16 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
     """
     target = _files.as_path(path)
     if target.suffix.lower() != ".stl":
-        raise FileError(f"{target}: the suffix {target.suffix!r} is not one that surfaces are written to: .stl")
+        raise FileError(f"{target}: the suffix must be .stl for surfaces, got {target.suffix!r}")
     corners, triangles = try_array(vertices), try_array(faces)
     if corners.ndim != 2 or corners.shape[-1] != 3 or corners.dtype.kind not in "uif":
         raise InvalidInput(f"vertices: must be numbers of shape (N, 3), got {corners.dtype} of {corners.shape}")
     if triangles.ndim != 2 or triangles.shape[-1] != 3 or triangles.dtype.kind not in "ui":
-        raise InvalidInput(f"faces: needs integers of shape (M, 3), got {triangles.dtype} of {triangles.shape}")
+        raise InvalidInput(f"faces: must be integers of shape (M, 3), got {triangles.dtype} of {triangles.shape}")
     if not np.isfinite(corners).all() or not 0 < len(triangles) < 2**32:
         raise InvalidInput("vertices, faces: must be finite corners and at least one triangle")
     if int(triangles.min()) < 0 or int(triangles.max()) >= len(corners):
-        raise InvalidInput(f"faces: name corners from 0 to {len(corners) - 1}")
+        raise InvalidInput(f"faces: must be numbers of corners from 0 to {len(corners) - 1}")
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 
@@ -512,7 +512,7 @@ def _write(
     target = _files.as_path(path)
     suffix = find_suffix(target).lower()
     if suffix not in FORMATS and suffix != STORE:
-        raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}, {STORE}")
+        raise FileError(f"{target}: the suffix must be one of {', '.join(FORMATS)}, {STORE}; got {suffix!r}")
     array = check(value, suffix, axes)
     if spacing is None and like is not None and holds_spacing(array, suffix):
         spacing = read_spacing(like)
@@ -541,8 +541,8 @@ def _write(
                     _tiff.write_imagej(temporary, planes, steps, read_unit(like))
                 else:
                     raise InvalidInput(
-                        "spacing: .tif keeps it for uint8, uint16 and float32, and for uint8 with 3 channels; "
-                        f"got {array.dtype} with {channels} channels"
+                        "spacing: must be omitted in .tif, except for uint8, uint16 and float32, and for uint8 with "
+                        f"3 channels; got {array.dtype} with {channels} channels"
                     )
             case ".nrrd":
                 _volumes.write_nrrd(temporary, flat, steps, _find_header(like, "nrrd"))

@@ -50,13 +50,13 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
     """Return the name of each part, its channels in the display window, and its header."""
     heads = _read_headers(path)
     if not heads:
-        raise FileError(f"{path}: holds no pictures")
+        raise FileError(f"{path}: contains no images")
     sizes = {_measure(head["displayWindow"])[1] for head in heads}
     if len(sizes) > 1:
         raise FileError(f"{path}: its parts have several sizes, {' and '.join(map(str, sorted(sizes)))}")
     for head in heads:
         if "deep" in str(head["type"]):
-            raise FileError(f"{path}: deep pictures are not read")
+            raise FileError(f"{path}: contains deep images, which are not supported")
         for window in ("displayWindow", "dataWindow"):
             check_size(path, _measure(head[window])[1], 1, 4, limit)
     # A material has many maps: each counts as an image of one channel.
@@ -98,9 +98,9 @@ def read_image(path: Path, limit: int) -> Array:
     if channels.keys() & {"RY", "BY"}:
         raise FileError(f"{path}: {SUBSAMPLED}")
     if names not in PICTURES and len(names) != 1:
-        raise FileError(f"{path}: has the channels {' '.join(names)}; R G B, R G B A, Y, Y A or a single one are read")
+        raise FileError(f"{path}: must have R G B, R G B A, Y, Y A or one channel, got {' '.join(names)}")
     if any(channels[name].dtype == np.uint32 for name in names):
-        raise FileError(f"{path}: channels of 32-bit integers are not read")
+        raise FileError(f"{path}: has channels of 32-bit integers, which are not supported")
     image = channels[names[0]] if len(names) == 1 else np.stack([channels[name] for name in names], axis=-1)
     rest = [*(channels.keys() - set(names)), *(f"{part}.{key}" for part, found, _ in parts[1:] for key in found)]
     if rest:

@@ -27,13 +27,11 @@ _LONGEST = 255
 def as_path(path: PathLike) -> Path:
     """Check that a path was given."""
     if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
-        raise InvalidInput(f"path: needs a str or a pathlib.Path, got {type(path).__name__}")
+        raise InvalidInput(f"path: must be a str or a pathlib.Path, got {type(path).__name__}")
     if "\0" in os.fspath(path):
-        raise FileError(f"{os.fspath(path)!r}: a path cannot contain the null character")
+        raise FileError(f"{os.fspath(path)!r}: must not contain the null character")
     if any(len(os.fsencode(part)) > _LONGEST for part in Path(path).parts):
-        raise FileError(
-            f"{os.fspath(path)[:40]}...: cannot be read and cannot be written; a name has up to {_LONGEST} bytes"
-        )
+        raise FileError(f"{os.fspath(path)[:40]}...: must be a name of at most {_LONGEST} bytes")
     return Path(path)
 
 
@@ -71,7 +69,7 @@ def check_file(path: Path) -> int:
     except OSError as error:
         raise FileError(f"{path}: cannot be opened ({describe_error(error)})") from None
     if stat.S_ISDIR(status.st_mode):
-        raise FileError(f"{path}: is a folder, a file is needed")
+        raise FileError(f"{path}: must be a file, got a folder")
     if not stat.S_ISREG(status.st_mode):
         raise FileError(f"{path}: is not a regular file")
     if status.st_size == 0:
@@ -98,7 +96,7 @@ def check_size(path: Path, sides: tuple[int, ...], channels: int, itemsize: int,
     pixels = prod(sides)
     named = " x ".join(map(str, sides))
     if pixels <= 0 or channels <= 0:
-        raise FileError(f"{path}: holds no pixels ({named}, {channels} channels)")
+        raise FileError(f"{path}: contains no pixels ({named}, {channels} channels)")
     if pixels > limit:
         raise LimitExceeded(f"{path}: {named} has {pixels} pixels, more than the limit of {limit}")
     size, most = pixels * channels * itemsize, limit * BYTES_PER_PIXEL
@@ -159,12 +157,12 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
         final = Path(os.path.realpath(target))
         # Check the target first, so that nothing is computed for a file that cannot be written.
         if final.is_dir():
-            raise FileError(f"{target}: is a folder, the name of a file is needed")
+            raise FileError(f"{target}: must be the name of a file, got a folder")
         exists = os.path.lexists(final)
         if exists and not final.is_file():
             raise FileError(f"{target}: is not a regular file and is not replaced")
         if not as_bool(overwrite, "overwrite") and exists:
-            raise FileError(f"{target}: exists already; overwrite=True replaces it")
+            raise FileError(f"{target}: exists already; pass overwrite=True to replace it")
         if exists and not os.access(final, os.W_OK):
             raise FileError(f"{target}: is write-protected")
         if not final.parent.is_dir():
@@ -180,7 +178,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
         if exists:
             shutil.copymode(final, temporary)
         elif not overwrite and os.path.lexists(final):
-            raise FileError(f"{target}: exists already; overwrite=True replaces it")
+            raise FileError(f"{target}: exists already; pass overwrite=True to replace it")
         put(temporary, final)
     except OSError as error:
         if isinstance(error, TexrsError):

@@ -128,7 +128,7 @@ def detect_kind(path: Path) -> str:
         return "tga"
     if path.suffix.lower() == RAW:
         raise FileError(_raw.explain_raw(path))
-    raise FileError(f"{path}: its content is none of {', '.join(NAMES)}")
+    raise FileError(f"{path}: must contain one of {', '.join(NAMES)}")
 
 
 def keeps_spacing(suffix: str) -> bool:
@@ -146,7 +146,7 @@ def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...
     if spacing is None:
         return UNIT
     if not keeps_spacing(suffix):
-        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz, .vti, .tif and .zarr can")
+        raise InvalidInput(f"spacing: {suffix} cannot store it; use .nrrd, .nii, .nii.gz, .vti, .tif or .zarr")
     return check_spacing(spacing)
 
 
@@ -173,7 +173,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, MemoryError) as error:
-        raise InvalidInput(f"array: not an array of numbers ({_files.describe_error(error)})") from None
+        raise InvalidInput(f"array: must be an array of numbers ({_files.describe_error(error)})") from None
     if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
         raise InvalidInput(f"array: must be bool, integers or floats, got dtype {array.dtype}")
     if array.ndim not in (axes, axes + 1) or array.size == 0:
@@ -190,17 +190,19 @@ def check(value: object, suffix: str, axes: int) -> Array:
         common = sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))
         able = [s for s in common if FORMATS[s].holds(array.dtype, channels, volume)]
         what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
-        can = f"{', '.join(able)} can" if able else f"no format can, of more than {_MOST_CHANNELS}"
-        raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")
+        can = f"use one of {', '.join(able)}" if able else f"no format stores more than {_MOST_CHANNELS} channels"
+        raise InvalidInput(f"array: {suffix} cannot store {what}; {can}")
     if max(array.shape[:axes]) > form.longest:
-        raise InvalidInput(f"array: a side of {suffix} may have {form.longest} pixels, got shape {array.shape}")
+        raise InvalidInput(
+            f"array: must have sides of at most {form.longest} pixels for {suffix}, got shape {array.shape}"
+        )
     # These formats also limit the values.
     if suffix == ".gif":
         colours = np.unique(array.reshape(-1, channels), axis=0)
         if len(colours) > 256:
-            raise InvalidInput(f"array: .gif cannot hold {len(colours)} colours, only 256; .png and .webp can")
+            raise InvalidInput(f"array: .gif cannot store {len(colours)} colours, only 256; use .png or .webp")
         if channels == 4 and ((colours[:, 3] % 255).any() or (colours[:, 3] == 0).sum() > 1):
-            raise InvalidInput("array: .gif cannot hold more than one transparent colour; .png and .webp can")
+            raise InvalidInput("array: .gif cannot store more than one transparent colour; use .png or .webp")
     if suffix == ".hdr" and not (np.isfinite(array).all() and (array >= 0).all()):
-        raise InvalidInput("array: .hdr cannot hold negative, infinite or NaN values; .exr, .npy and .tif can")
+        raise InvalidInput("array: .hdr cannot store negative, infinite or NaN values; use .exr, .npy or .tif")
     return array

@@ -35,10 +35,10 @@ def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
         if len(shape) not in (axes, axes + 1):
             what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
             hint = "; texrs.io.read_volume reads volumes" if axes == 2 and len(shape) == 4 else ""
-            raise FileError(f"{name}: holds an array of shape {shape}; {what}{hint}")
+            raise FileError(f"{name}: contains an array of shape {shape}; {what}{hint}")
         channels = shape[axes] if len(shape) > axes else 1
         if channels > _MOST_CHANNELS:
-            raise FileError(f"{name}: shape {shape} has {channels} channels, up to {_MOST_CHANNELS} are read")
+            raise FileError(f"{name}: must have at most {_MOST_CHANNELS} channels, got shape {shape} with {channels}")
         _files.check_size(name, shape[:axes], channels, header.dtype.itemsize, limit)
 
     return (_npy.read_npy if kind == "npy" else _npy.read_npz)(name, limit, check)

@@ -88,7 +88,9 @@ def read_npz(path: Path, limit: int, check: Callable[[Header], object] | None = 
         chosen = [m for m in members if m.filename == f"{_KEY}.npy"] or members
         if len(chosen) != 1:
             keys = ", ".join(m.filename.removesuffix(".npy") for m in members[:8])
-            raise FileError(f"{path}: needs a single array, or one with the key {_KEY!r}; has {keys or 'no arrays'}")
+            raise FileError(
+                f"{path}: must contain a single array, or one with the key {_KEY!r}; got {keys or 'no arrays'}"
+            )
         with _open_member(path, archive, chosen[0]) as file:
             array = _read_array(path, file, chosen[0].file_size, limit, check)
     if rest := [m.filename.removesuffix(".npy") for m in members if m is not chosen[0]]:
@@ -197,7 +199,7 @@ def _open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
 @contextmanager
 def _open_member(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Iterator[BinaryIO]:
     if member.compress_type not in _PACKINGS:
-        raise FileError(f"{path}: {member.filename} is not packed as NumPy packs arrays, by deflate or not at all")
+        raise FileError(f"{path}: {member.filename} must be stored or compressed by deflate, as by NumPy")
     with archive.open(member) as stream:
         yield cast(BinaryIO, stream)
 
@@ -240,7 +242,7 @@ def _read_array(
     header = _read_header(path, file)
     shape, dtype, size, start = header.shape, header.dtype, header.size, header.start
     if size == 0:
-        raise FileError(f"{path}: holds an empty array of shape {shape}")
+        raise FileError(f"{path}: contains an empty array of shape {shape}")
     if check is not None:
         check(header)
     # The axis of channels is not known here, so compare only bytes.
@@ -248,7 +250,9 @@ def _read_array(
     if size > most:
         raise LimitExceeded(f"{path}: shape {shape} of {dtype} needs {size} bytes, more than the limit of {most}")
     if size > length - start:
-        raise FileError(f"{path}: is cut off; shape {shape} of {dtype} needs {size} bytes, {length - start} are there")
+        raise FileError(
+            f"{path}: is cut off; shape {shape} of {dtype} needs {size} bytes, but only {length - start} follow"
+        )
     check_memory(size, str(path))
     flat = np.empty(prod(shape), dtype)
     room, filled = flat.view(np.uint8).data, 0
@@ -259,7 +263,7 @@ def _read_array(
         filled += part
     array = flat.reshape(shape, order="F" if header.fortran else "C")
     if dtype == np.bool_ and (flat.view(np.uint8) > 1).any():
-        raise FileError(f"{path}: is corrupt; booleans other than 0 and 1")
+        raise FileError(f"{path}: is corrupt; it contains booleans other than 0 and 1")
     return np.ascontiguousarray(array, dtype=dtype.newbyteorder("="))
 
 
@@ -277,9 +281,9 @@ def _read_header(path: Path, file: BinaryIO) -> Header:
         what = f"corrupt, cut off or longer than {_LONGEST_HEADER} bytes ({describe_error(error)})"
         raise FileError(f"{path}: its NumPy header cannot be read, because it is {what}") from None
     if dtype.hasobject:
-        raise FileError(f"{path}: holds Python objects; reading them could run code, so only numbers are read")
+        raise FileError(f"{path}: contains Python objects; reading them could run code, so only numbers are read")
     if dtype.kind not in "buif" or dtype.itemsize > 8:
-        raise FileError(f"{path}: holds {dtype.str!r}; bool, integers and floats up to 64 bit are read")
+        raise FileError(f"{path}: must contain bool, integers or floats up to 64 bit, got {dtype.str!r}")
     if len(shape) > 8 or not all(type(side) is int and 0 <= side < 2**48 for side in shape):
-        raise FileError(f"{path}: its NumPy header announces the shape {shape!r}")
+        raise FileError(f"{path}: must have a valid shape in its NumPy header, got {shape!r}")
     return Header(shape, dtype, fortran, file.tell() - start)

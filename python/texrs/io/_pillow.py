@@ -344,12 +344,12 @@ def _open(path: Path, kind: str, file: bytes | None = None) -> Iterator[Any]:
         ) from None
     except UnidentifiedImageError:
         raise FileError(
-            f"{path}: is cut off, corrupt, or a kind of {name} that Pillow does not read; "
-            "save it with 8 bits a channel, or as PNG or TIFF"
+            f"{path}: is cut off, corrupt, or an unsupported kind of {name}; save it with 8 bits a channel, or as "
+            "PNG or TIFF"
         ) from None
     except NotImplementedError as error:
         raise FileError(
-            f"{path}: is a kind of {name} that Pillow does not read ({describe_error(error)}); save it as PNG or TIFF"
+            f"{path}: is an unsupported kind of {name} ({describe_error(error)}); save it as PNG or TIFF"
         ) from None
     with image:
         yield image
@@ -371,7 +371,9 @@ def _check_whole(path: Path, kind: str, image: Any, file: bytes) -> None:
         if getattr(image, "pixel_format", "").startswith("BC6H"):
             assume(f"{path}: {image.pixel_format} holds floats; read as 8 bits, values above 1 as 1")
     if kind == "psd" and any(number == 1057 and data[4:5] == b"\0" for number, _, data in image.resources):
-        raise FileError(f"{path}: holds no flattened picture; save it with 'maximize compatibility', or as TIFF or PNG")
+        raise FileError(
+            f"{path}: contains no flattened image; save it with 'maximize compatibility', or as TIFF or PNG"
+        )
 
 
 def _take_pixels(path: Path, image: Any) -> Array:
@@ -384,10 +386,10 @@ def _take_pixels(path: Path, image: Any) -> Array:
     elif mode in ("1", "YCbCr", "RGBX"):
         image = image.convert("L" if mode == "1" else "RGB")
     elif mode not in _DTYPES:
-        raise FileError(f"{path}: holds colours of the mode {mode}; save it as RGB or grey")
+        raise FileError(f"{path}: must have RGB or grey colours, got the mode {mode}; save it as RGB or grey")
     array = np.array(image)
     if array.ndim not in (2, 3) or array.dtype.kind not in "uif":
-        raise FileError(f"{path}: decoded to {array.dtype} of shape {array.shape}, not to an image")
+        raise FileError(f"{path}: must contain an image, got {array.dtype} of shape {array.shape}")
     return array.astype(array.dtype.newbyteorder("="), copy=False)
 
 

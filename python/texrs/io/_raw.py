@@ -71,7 +71,7 @@ def make_raw(path: Path, shape: Sequence[int] | None, dtype: object) -> Raw:
     """Return a description of samples by the arguments of a call."""
     if shape is None or dtype is None:
         missing, other = ("shape", "dtype") if shape is None else ("dtype", "shape")
-        raise InvalidInput(f"{missing}: is needed with {other}, to read samples without a header")
+        raise InvalidInput(f"{missing}: must be given with {other}, to read samples without a header")
     count = 4 if isinstance(shape, Sequence) and len(shape) == 4 else 3
     given = as_tuple(shape, "shape", count, "planes, rows, columns, and channels if there are several")
     sides = [as_int(n, "shape", 1, 2**31 - 1) for n in given]

@@ -18,7 +18,7 @@ def as_shape(shape: object) -> tuple[int, ...]:
     if isinstance(shape, list | tuple) or (isinstance(shape, np.ndarray) and shape.ndim == 1):
         sides = tuple(shape[:5])
     if len(sides) not in (3, 4) or not all(isinstance(n, Integral) and 1 <= int(n) < 2**40 for n in sides):
-        raise InvalidInput(f"shape: needs (D, H, W) or (D, H, W, C) as integers of at least 1, got {shape!r}")
+        raise InvalidInput(f"shape: must be (D, H, W) or (D, H, W, C) as integers of at least 1, got {shape!r}")
     return tuple(int(n) for n in sides)
 
 
@@ -29,15 +29,15 @@ def check(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
         dtype = dtype or slab.dtype
         if slab.dtype != dtype or slab.shape[1:] != shape[1:]:
             raise InvalidInput(
-                f"slabs: the one from plane {done} on is {slab.dtype} of shape {slab.shape}; "
-                f"{dtype} of shape {('d', *shape[1:])} is needed".replace("'", "")
+                f"slabs: must be {dtype} of shape {('d', *shape[1:])}, "
+                f"got {slab.dtype} of shape {slab.shape} at plane {done}".replace("'", "")
             )
         done += len(slab)
         if done > shape[0]:
-            raise InvalidInput(f"slabs: go on after {shape[0]} planes")
+            raise InvalidInput(f"slabs: must end after {shape[0]} planes, got more")
         yield slab
     if done < shape[0]:
-        raise InvalidInput(f"slabs: end after {done} of {shape[0]} planes")
+        raise InvalidInput(f"slabs: must have {shape[0]} planes, got {done}")
 
 
 def split_planes(slabs: Iterable[Array]) -> Iterator[Array]:

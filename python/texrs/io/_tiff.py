@@ -62,12 +62,12 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
 
     with _open(path, "decoding") as (tif, length):
         if not tif.series or not tif.pages:
-            raise FileError(f"{path}: holds no image")
+            raise FileError(f"{path}: contains no image")
         series, first = tif.series[0], tif.pages.first
         _check_tags(path, tif, first)
         dtype = series.dtype
         if dtype is None or dtype.kind not in "buif" or dtype.itemsize > 8:
-            raise FileError(f"{path}: holds samples of {dtype}; integers and floats are read")
+            raise FileError(f"{path}: must contain integers or floats, got {dtype}")
         sides, channels = _read_sides(path, series.axes, series.shape)
         palette = first.photometric == _PALETTE
         check_size(path, sides, channels * (3 if palette else 1), dtype.itemsize, limit)
@@ -125,8 +125,8 @@ def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channe
     scheme = getattr(first.compression, "name", first.compression)
     colours = getattr(first.photometric, "name", first.photometric)
     raise FileError(
-        f"{path}: is corrupt, or needs the package imagecodecs (pip install texrs[tiff]); "
-        f"it holds {colours} colours of {series.dtype}, compressed by {scheme}"
+        f"{path}: is corrupt, or needs the package imagecodecs (pip install texrs[tiff]); it contains {colours} "
+        f"colours of {series.dtype}, compressed by {scheme}"
     )
 
 
@@ -186,8 +186,7 @@ def take_image(path: Path, planes: Array, orientation: int) -> Array:
     """Return the only plane of a file."""
     if planes.shape[0] != 1:
         raise FileError(
-            f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume; "
-            "for a picture, save one page alone"
+            f"{path}: contains {planes.shape[0]} planes; read them with texrs.io.read_volume, or save one page only"
         )
     return turn_upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
 
@@ -434,7 +433,7 @@ def _apply_colours(path: Path, array: Array, page: Any) -> Array:
     if photometric in (_BLACK_IS_ZERO, _RGB) or (photometric, page.compression) == (_YCBCR, _JPEG):
         return array
     name = getattr(photometric, "name", str(photometric))
-    raise FileError(f"{path}: holds {name} colours of {array.dtype}; grey, RGB and palettes are read")
+    raise FileError(f"{path}: must have grey, RGB or palette colours, got {name} of {array.dtype}")
 
 
 def _part_alpha(path: Path, array: Array, page: Any, *, divided: bool = False) -> Array:

@@ -55,5 +55,5 @@ def read_vectors(path: PathLike, *, limit: int | None = None) -> tuple[Array, bo
     name, most = _files.as_path(path), as_limit(limit, axes=3)
     kind = detect_kind(name)
     if kind not in VECTORS:
-        raise FileError(f"{name}: is a {kind} file; vectors are read from .npy, .npz, Zarr, NRRD, NIfTI, .vti and TIFF")
+        raise FileError(f"{name}: is a {kind} file; vectors must be in .npy, .npz, Zarr, NRRD, NIfTI, .vti or TIFF")
     return VECTORS[kind](name, most), kind in SPATIAL

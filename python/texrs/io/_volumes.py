@@ -66,15 +66,15 @@ def read_nrrd(path: Path, limit: int) -> Array:
         if beside is not None and (
             not isinstance(beside, str) or beside in ("", ".", "..") or re.search(r"[/\\%\s]|^LIST$", beside)
         ):
-            raise FileError(f"{path}: keeps its samples in other files; only one file in the same folder is read")
+            raise FileError(f"{path}: has its samples in other files; only one file in the same folder is supported")
         encoding = str(header.get("encoding", "")).lower()
         if encoding not in _NRRD_ENCODINGS:
-            raise FileError(f"{path}: its encoding is {encoding!r}; raw and gzip are read")
+            raise FileError(f"{path}: must have the encoding raw or gzip, got {encoding!r}")
         if any(header.get(key, 0) not in (0, None) for key in ("line skip", "lineskip", "byte skip", "byteskip")):
-            raise FileError(f"{path}: skips lines or bytes before its samples, which is not read")
+            raise FileError(f"{path}: skips lines or bytes before its samples, which is not supported")
         kind = " ".join(str(header.get("type", "")).lower().split())
         if kind not in _NRRD_TYPES:
-            raise FileError(f"{path}: holds samples of type {kind!r}; integers and floats are read")
+            raise FileError(f"{path}: must contain integers or floats, got type {kind!r}")
         dtype = np.dtype(_NRRD_TYPES[kind])
         if header.get("endian", "little") == "big":
             dtype = dtype.newbyteorder(">")
@@ -183,12 +183,12 @@ def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
     if len(sizes) == 3:
         return None
     if len(sizes) != 4:
-        raise FileError(f"{path}: has {len(sizes)} axes; a volume has three, and channels")
+        raise FileError(f"{path}: must have three axes, and channels, got {len(sizes)} axes")
     space = ("domain", "space", "???", "none", "")
     others = [a for a, kind in enumerate(kinds) if kind not in space]
     channel = others[0] if len(kinds) == 4 and len(others) == 1 else 0
     if sizes[channel] > _MOST_CHANNELS:
-        raise FileError(f"{path}: has {sizes[channel]} channels, up to {_MOST_CHANNELS} are read")
+        raise FileError(f"{path}: must have at most {_MOST_CHANNELS} channels, got {sizes[channel]}")
     return channel
 
 
@@ -202,14 +202,16 @@ def read_nifti(path: Path, limit: int) -> Array:
         fields = dtype.names or ()
         colours = len(fields) if fields and all(dtype[n] == np.uint8 for n in fields) else 0
         if not colours and (dtype.kind not in "uif" or dtype.itemsize > 8):
-            raise FileError(f"{path}: holds samples of {dtype}; integers, floats and RGB are read")
+            raise FileError(f"{path}: must contain integers, floats or RGB, got {dtype}")
         # Missing axes have length 1. Axes after the third one are channels.
         count = int(header["dim"][0])
         sizes = [int(n) for n in header["dim"][1 : 1 + max(0, min(count, 7))]]
         sizes += [1] * (3 - len(sizes))
         several = [n for n in sizes[3:] if n != 1]
         if not 1 <= count <= 7 or len(several) > 1 or (several and (colours or several[0] > _MOST_CHANNELS)):
-            raise FileError(f"{path}: has the sides {sizes}; three axes and up to {_MOST_CHANNELS} channels are read")
+            raise FileError(
+                f"{path}: must have three axes and at most {_MOST_CHANNELS} channels, got the sides {sizes}"
+            )
         _check_sides(path, sizes)
         channels = several[0] if several else 1
         offset = float(header["vox_offset"])
@@ -248,7 +250,7 @@ def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], 
     if len(start) < need:
         raise FileError(f"{path}: is cut off; its NIfTI header does not end")
     if (start[4:7] if second else start[344:347]) != (b"n+2" if second else b"n+1"):
-        raise FileError(f"{path}: is not a NIfTI file that holds its own samples")
+        raise FileError(f"{path}: must be a NIfTI file that contains its own samples")
     kind = nibabel.Nifti2Header if second else nibabel.Nifti1Header
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -337,7 +339,7 @@ def _read_samples(
     """Read ``count`` samples, and no byte more than they need, in native byte order."""
     size = count * dtype.itemsize
     if left and not compressed and left < size:
-        raise FileError(f"{path}: is cut off; its samples need {size} bytes, {left} are there")
+        raise FileError(f"{path}: is cut off; its samples need {size} bytes, but only {left} follow")
     inflate = zlib.decompressobj(31) if compressed else None
     out, filled, rest = bytearray(), 0, b""
     # A compressed file may contain less than its header states, so let memory grow with the content.
@@ -352,7 +354,7 @@ def _read_samples(
                 continue
             part = data
         if not part:
-            raise FileError(f"{path}: is cut off; {filled} of {size} bytes of samples are there")
+            raise FileError(f"{path}: is cut off; it contains only {filled} of {size} bytes of samples")
         out += part
         filled += len(part)
     flat = np.frombuffer(out, dtype)
@@ -362,7 +364,7 @@ def _read_samples(
 def _check_sides(path: Path, sizes: list[int]) -> None:
     """Refuse sizes below 1, because the product of two negative sides is positive."""
     if min(sizes) < 1:
-        raise FileError(f"{path}: holds no voxels ({' x '.join(map(str, sizes))})")
+        raise FileError(f"{path}: contains no voxels ({' x '.join(map(str, sizes))})")
 
 
 def _tidy(volume: Array) -> Array:

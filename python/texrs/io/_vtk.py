@@ -48,23 +48,23 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         root = ElementTree.fromstring(content[:] if start < 0 else content[:start] + b"</VTKFile>")
         pieces = root.findall("ImageData/Piece")
         if root.tag != "VTKFile" or len(pieces) != 1:
-            raise FileError(f"{path}: is not image data of one piece")
+            raise FileError(f"{path}: must be image data of one piece")
         # The extent counts points. Cells are one fewer along each axis.
         low, high = (np.array(pieces[0].get("Extent", "").split(), int)[a::2] for a in (0, 1))
         groups = {kind: pieces[0].find(kind) for kind in ("PointData", "CellData")}
         kind, group = next(((k, g) for k, g in groups.items() if g is not None and len(g)), ("", None))
         if group is None or len(low) != 3:
-            raise FileError(f"{path}: holds no samples")
+            raise FileError(f"{path}: contains no samples")
         arrays = {each.get("Name", str(i)): each for i, each in enumerate(group.findall("DataArray"))}
         order = ("Vectors", "Scalars") if vectors else ("Scalars", "Vectors")
         chosen = arrays[_choose(path, arrays, [group.get(role) for role in order])]
         if chosen.get("type") not in _TYPES:
-            raise FileError(f"{path}: holds samples of type {chosen.get('type')!r}; integers and floats are read")
+            raise FileError(f"{path}: must contain integers or floats, got type {chosen.get('type')!r}")
         end = ">" if root.get("byte_order") == "BigEndian" else "<"
         dtype, channels = np.dtype(end + _TYPES[chosen.get("type", "")]), int(chosen.get("NumberOfComponents") or 1)
         sides = [int(n) + 1 if kind == "PointData" else max(int(n), 1) for n in (high - low)[::-1]]
         if min(sides) < 1 or not 1 <= channels <= _MOST_CHANNELS:
-            raise FileError(f"{path}: holds no voxels, or more than {_MOST_CHANNELS} channels")
+            raise FileError(f"{path}: must have voxels and at most {_MOST_CHANNELS} channels")
         size = dtype.itemsize * channels * check_size(path, tuple(sides), channels, dtype.itemsize, limit)
         header = np.dtype(end + ("u8" if root.get("header_type") == "UInt64" else "u4"))
         data = memoryview((chosen.text or "").strip().encode())
@@ -80,9 +80,9 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         else:
             samples = _unpack(path, data, header, encoded, root.get("compressor"), size)
         if len(samples) < size:
-            raise FileError(f"{path}: is cut off; its samples need {size} bytes, {len(samples)} are there")
+            raise FileError(f"{path}: is cut off; its samples need {size} bytes, but only {len(samples)} follow")
         if root[0].get("WholeExtent", "").split() != pieces[0].get("Extent", "").split():
-            raise FileError(f"{path}: its piece is of another length than its whole extent")
+            raise FileError(f"{path}: must have a piece of the length of its whole extent")
         shape = sides if channels == 1 else (*sides, channels)
         return np.frombuffer(samples, dtype, size // dtype.itemsize).reshape(shape).astype(dtype.newbyteorder("="))
 
@@ -93,7 +93,7 @@ def _choose(path: Path, names: Mapping[str, object], active: list[str | None]) -
         if name is not None and name in names:
             return name
     if len(names) != 1:
-        raise FileError(f"{path}: needs a single array, has {', '.join(list(names)[:8]) or 'none'}")
+        raise FileError(f"{path}: must contain a single array, got {', '.join(list(names)[:8]) or 'none'}")
     return next(iter(names))
 
 
@@ -130,7 +130,7 @@ def _unpack(
         elif packer == "vtkLZMADataCompressor":
             out += lzma.LZMADecompressor().decompress(part, left) if left else b""
         else:
-            raise FileError(f"{path}: is compressed by {packer}; zlib and LZMA are read")
+            raise FileError(f"{path}: must be compressed by zlib or LZMA, got {packer}")
         place += length
     return bytes(out)
 

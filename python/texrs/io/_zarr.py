@@ -58,7 +58,7 @@ def read_store(path: Path, limit: int, axes: int | None) -> Array:
         array, names = _find(path)
         _check_complete(path, array)
         if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
-            raise FileError(f"{path}: holds {array.dtype}; bool, integers and floats are read")
+            raise FileError(f"{path}: must contain bool, integers or floats, got {array.dtype}")
         if axes is None:
             check_size(path, (array.size,), 1, array.dtype.itemsize, limit * BYTES_PER_PIXEL)
             return _tidy(array[...])
@@ -104,7 +104,11 @@ def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *
     """Write an image or a volume as OME-Zarr of one level, whole or not at all; only a store is replaced."""
     zarr, final = _import_zarr(path), Path(os.path.realpath(path))
     if final.exists() and not (overwrite and is_store(final)):
-        raise FileError(f"{path}: exists already" if is_store(final) else f"{path}: exists and is not a Zarr store")
+        raise FileError(
+            f"{path}: exists already; pass overwrite=True to replace it"
+            if is_store(final)
+            else f"{path}: exists and is not a Zarr store"
+        )
     if not final.parent.is_dir():
         raise FileError(f"{path}: the folder {path.parent} does not exist")
     channels = array.shape[axes] if array.ndim > axes else None
@@ -164,7 +168,7 @@ def _find(path: Path) -> tuple[Any, tuple[str, ...] | None]:
         raise FileError(f"{path}: is an empty group of Zarr")
     shown = ", ".join(names[:8])
     raise FileError(
-        f"{path}: holds several arrays ({shown}); name one, as in {os.path.join(os.fspath(path), names[0])}"
+        f"{path}: contains several arrays ({shown}); name one, as in {os.path.join(os.fspath(path), names[0])}"
     )
 
 
@@ -210,10 +214,10 @@ def _arrange(
         order, others = list(range(min(axes, len(shape)))), list(range(axes, len(shape)))
     if len(order) < axes or len(others) > 1:
         called = f" ({', '.join(names)})" if names else ""
-        raise FileError(f"{path}: holds an array of {' x '.join(map(str, shape))}{called}, which is not {what}")
+        raise FileError(f"{path}: contains an array of {' x '.join(map(str, shape))}{called}, which is not {what}")
     channels = others[0] if others else None
     if channels is not None and shape[channels] > _MOST_CHANNELS:
-        raise FileError(f"{path}: has {shape[channels]} channels, up to {_MOST_CHANNELS} are read")
+        raise FileError(f"{path}: must have at most {_MOST_CHANNELS} channels, got {shape[channels]}")
     return tuple(keep), order + others, channels
 
 

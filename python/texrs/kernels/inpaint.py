@@ -143,14 +143,14 @@ def inpaint(
 
     """
     if not isinstance(index, PatchIndex):
-        raise InvalidInput(f"index: needs a PatchIndex, got {type(index).__name__}")
+        raise InvalidInput(f"index: must be a PatchIndex, got {type(index).__name__}")
     picture = as_array(colours, "colours", np.float32, ("rows", "columns", "channels"))
     mask = as_mask(known, "known", picture.shape[:2])
     # This takes a quarter of the time of `np.where`, which spreads the mask over the channels.
     picture = picture.copy()
     picture[~mask] = 0
     if not np.isfinite(picture).all():
-        raise InvalidInput("colours: known pixels must be finite")
+        raise InvalidInput("colours: must be finite at known pixels")
     sides = as_size(patch_size, "patch_size")
     rows, columns = (as_int(s, "patch_size", 1, n) for s, n in zip(sides, picture.shape[:2], strict=True))
     pick = (

@@ -86,7 +86,7 @@ class Correlation:
         """
         planes = _as_planes(template, "template")
         if planes.shape[0] != self.shape[2]:
-            raise InvalidInput(f"template: needs {self.shape[2]} channels as the image, got {planes.shape[0]}")
+            raise InvalidInput(f"template: must have {self.shape[2]} channels like the image, got {planes.shape[0]}")
         found: Floats = np.moveaxis(self._inner.maps(planes), 0, -1)
         return found
 

@@ -119,7 +119,7 @@ class PatchIndex:
         given = as_list(images)
         masks = _as_masks(allowed, len(given), single)
         if not given:
-            raise InvalidInput("images: needs at least one image, got none")
+            raise InvalidInput("images: must contain at least one image, got none")
         name = "images" if single else "images[{}]"
         arrays = [_as_floats(v, name.format(i)) for i, v in enumerate(given)]
         channels = [a.shape[2] for a in arrays]
@@ -332,7 +332,7 @@ def _as_masks(allowed: object, images: int, single: bool) -> list[object]:
     if single:
         return [allowed]
     if not isinstance(allowed, list | tuple) or len(allowed) != images:
-        raise InvalidInput(f"allowed: needs a list of {images} masks (or None), one an image")
+        raise InvalidInput(f"allowed: must be a list of {images} masks (or None), one for each image")
     return list(allowed)
 
 

@@ -152,7 +152,7 @@ def spread(
 
     """
     if as_array(flow, "flow", np.float32, ("rows", "columns", "channels")) is not flow or not flow.flags.writeable:
-        raise InvalidInput("flow: needs a float32 array, contiguous, writeable and in native byte order")
+        raise InvalidInput("flow: must be a float32 array, contiguous, writeable and in native byte order")
     _rust.poisson_spread(
         flow,
         _as_weight(screening),
@@ -220,7 +220,7 @@ def blend(
     onto, taken, both = as_image(target, "target"), as_image(source, "source"), as_bool(mixed, "mixed")
     shape = target.shape
     if source.shape != shape:
-        raise InvalidInput(f"source: needs the target's shape {shape}, got {source.shape}")
+        raise InvalidInput(f"source: must have the target's shape {shape}, got {source.shape}")
     inside, weight = as_mask(mask, "mask", onto.shape[:2]), _as_weight(screening)
     values, other = (_as_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
     # With v = source + c the requested differences of c are 0, except where the target shows through.
@@ -290,7 +290,7 @@ def _as_numbers(array: Array, name: str) -> Array:
 def _as_gradient(value: object, name: str, image: Floats) -> Floats:
     gradient = as_image(value, name)
     if gradient.shape != image.shape:
-        raise InvalidInput(f"{name}: needs the image's shape {image.shape}, got {gradient.shape}")
+        raise InvalidInput(f"{name}: must have the image's shape {image.shape}, got {gradient.shape}")
     return _as_floats(gradient, name)
 
 
@@ -307,7 +307,7 @@ def _as_weight(screening: object) -> float:
 
 def _check_finite(solved: Floats) -> Floats:
     if not np.isfinite(solved).all():
-        raise InvalidInput("image: values or differences too large to be squared in float32")
+        raise InvalidInput("image: must have values and differences whose squares fit into float32")
     return solved
 
 
@@ -318,5 +318,5 @@ def _as_boundary(boundary: object) -> tuple[str, str]:
         or len(both) != 2
         or any(not isinstance(b, str) or b not in _BOUNDARIES for b in both)
     ):
-        raise InvalidInput(f"boundary: needs one of {', '.join(_BOUNDARIES)}, or two of them; got {boundary!r}")
+        raise InvalidInput(f"boundary: must be one of {', '.join(_BOUNDARIES)}, or two of them; got {boundary!r}")
     return both[0], both[1]

@@ -344,7 +344,7 @@ def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "g
     given = []
     for strip in as_items(strips, "strips"):
         if not isinstance(strip, Strip):
-            raise InvalidInput(f"strips: needs a Strip each, got {type(strip).__name__}")
+            raise InvalidInput(f"strips: must each be a Strip, got {type(strip).__name__}")
         first = as_array(strip.a, "strips: a", np.float32, ("rows", "columns", "channels"))
         second = as_array(strip.b, "strips: b", np.float32, first.shape)
         dear = None if strip.penalty is None else _as_floats(strip.penalty, "strips: penalty", first.shape[:2])
@@ -420,7 +420,7 @@ def binary_labels(
     entries = (pairwise,) * axes if isinstance(pairwise, Real) else as_tuple(pairwise, "pairwise", axes, what)
     both = [entry if isinstance(entry, tuple) else (entry, entry) for entry in entries]
     if any(len(entry) != 2 for entry in both):
-        raise InvalidInput("pairwise: a tuple needs two entries, False before True and True before False")
+        raise InvalidInput("pairwise: must have two entries in a tuple, False before True and True before False")
     forward, backward = ([_as_floats(entry[i], "pairwise", shape) for entry in both] for i in (0, 1))
     mask, energy = _rust.seam_labels(costs, forward, backward, as_wrap(wrap, axes=axes))
     return Labels(mask.reshape(shape), energy)
@@ -430,7 +430,7 @@ def _as_pair(a: object, b: object, axes: int) -> tuple[Floats, Floats]:
     """Return two images of one shape, scaled to [0, 1] together."""
     first, second = as_image(a, "a", axes=axes), as_image(b, "b", axes=axes)
     if first.shape != second.shape:
-        raise InvalidInput(f"b: needs the shape of a, {first.shape}, got {second.shape}")
+        raise InvalidInput(f"b: must have the shape of a, {first.shape}, got {second.shape}")
     if first.dtype.kind == second.dtype.kind == "f" and not (_is_unit(first) and _is_unit(second)):
         both = to_unit(np.stack([first, second]))
         return both[0], both[1]
@@ -455,7 +455,7 @@ def _as_floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
 
 def _as_seams(old: object, shape: tuple[int, ...]) -> list[list[Floats]]:
     if not isinstance(old, OldSeams):
-        raise InvalidInput(f"old: needs OldSeams, got {type(old).__name__}")
+        raise InvalidInput(f"old: must be OldSeams, got {type(old).__name__}")
     fields = []
     for name in ("old.kept", "old.ab", "old.ba"):
         arrays = as_tuple(getattr(old, name[4:]), name, len(shape), f"{len(shape)} arrays, one per axis")

@@ -103,7 +103,7 @@ def mesh(
     check_finite(places, "target")
     shape = (places.shape[0], places.shape[1])
     if min(shape) < 2:
-        raise InvalidInput(f"target: needs two or more rows and columns, got {shape}")
+        raise InvalidInput(f"target: must have at least two rows and columns, got {shape}")
     layers = np.zeros(shape, np.uint8) if weight is None else as_array(weight, "weight", np.uint8, shape)
     if int(layers.max()) > 254:
         raise InvalidInput("weight: must be at most 254, got 255")

@@ -308,4 +308,4 @@ class Exports(Mapping[str, Map]):
 
     def _check_flat(self) -> None:
         if self.axes != 2:
-            raise InvalidInput("material: is a volume; this is for pictures, such as slices of it")
+            raise InvalidInput("material: must not be a volume; use slices of it")

@@ -61,7 +61,7 @@ def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: M
     """Write each map as a layer. The header stores the other properties."""
     target = as_path(path)
     if target.suffix.lower() != ".exr":
-        raise FileError(f"{path}: layers are written to .exr, not to {target.suffix!r}")
+        raise FileError(f"{path}: the suffix must be .exr for layers, got {target.suffix!r}")
     channels: dict[str, Array] = {}
     said: dict[str, dict[str, object]] = {}
     for name, each in maps.items():
@@ -99,7 +99,9 @@ def store(name: str, pixels: Array, each: Map, depth: int | None) -> Array:
     if kind != "f" and (each.role is Role.LABELS or (each.role is Role.MASK and size == 4)):
         return pixels.astype(np.int32 if kind == "i" else np.uint32).view(np.uint32)
     if depth is None and (size == 8 or (kind in "ui" and size == 4)):
-        raise InvalidInput(f"{name}: {pixels.dtype} does not go into EXR whole; depth=32 rounds it to 32-bit floats")
+        raise InvalidInput(
+            f"{name}: {pixels.dtype} cannot be stored in EXR without loss; pass depth=32 to round it to 32-bit floats"
+        )
     usual = np.float16 if kind == "b" or size == 1 or (kind == "f" and size == 2) else np.float32
     wanted = usual if depth is None else (np.float16 if depth == 16 else np.float32)
     if (each.role.normal or each.role is Role.VECTOR) and kind in "ui":
@@ -244,7 +246,7 @@ def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
     parts = sort_channels(letters)
     if len({p.dtype for p in parts}) > 1:
         if any(p.dtype.kind == "u" for p in parts):
-            raise FileError(f"{path}: the layer {name} mixes whole numbers with others")
+            raise FileError(f"{path}: the layer {name} must not mix integers with other types")
         parts = [p.astype(np.float32) for p in parts]
     return np.stack(parts, axis=-1)
 

@@ -90,7 +90,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
     short = shorten([stems[name] for name in maps])
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)
-        raise FileError(f"{path}: two files are the map {twice}; a material has one of each")
+        raise FileError(f"{path}: must have one file for the map {twice}, got two")
     report_guesses(why, guessed, {stems[name] for name in said})
     named = {key: replace(each, file=stems[name]) for key, (name, each) in zip(short, maps.items(), strict=True)}
     return named, {key for key, name in zip(short, maps, strict=True) if name in said}
@@ -209,11 +209,11 @@ def list_places(path: Path | Sequence[Path]) -> tuple[Path, list[FilePath]]:
     if not isinstance(path, list | tuple):
         folder = as_path(cast(Path, path))
         if not folder.is_dir():
-            raise FileError(f"{path}: is not a folder of maps")
+            raise FileError(f"{path}: must be a folder of maps")
         return cast(Path, path), list(folder.iterdir())
     several = [as_path(each) for each in path]
     if not several or len({each.parent for each in several}) > 1:
-        raise InvalidInput(f"path: needs files of one folder, got {', '.join(map(str, several)) or 'an empty list'}")
+        raise InvalidInput(f"path: must be files of one folder, got {', '.join(map(str, several)) or 'an empty list'}")
     for each in several:
         if not each.is_file():
             raise FileError(f"{each}: does not exist")
@@ -252,7 +252,7 @@ def write_maps(
     smaller = place / SMALLER
     for needed in (place, smaller) if mipmaps else (place,):
         if needed.exists() and not needed.is_dir():
-            raise FileError(f"{needed}: is not a folder")
+            raise FileError(f"{needed}: must be a folder")
     if suffix is not None:
         as_instance(suffix, "suffix", str)
     endings = {name: suffix or choose_suffix(each, depth, axes) for name, each in maps.items()}

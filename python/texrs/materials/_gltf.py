@@ -59,10 +59,10 @@ def write_gltf(maps: Mapping[str, Map], path: Path, shapes: Sequence[str], repea
     target = as_path(path)
     suffix = target.suffix.lower()
     if suffix not in (".gltf", ".glb"):
-        raise FileError(f"{path}: the suffix {target.suffix!r} is not one of glTF: .gltf, .glb")
+        raise FileError(f"{path}: the suffix must be .gltf or .glb, got {target.suffix!r}")
     wanted = [as_choice(s, "shapes", ("plane", "sphere")) for s in as_items(shapes, "shapes")]
     if not wanted or len(set(wanted)) < len(wanted):
-        raise InvalidInput(f"shapes: needs plane, sphere or both, got {shapes!r}")
+        raise InvalidInput(f"shapes: must be plane, sphere or both, got {shapes!r}")
     times = as_int(repeat, "repeat", 1, 64)
     size = next(iter(maps.values())).pixels.shape[:2]
     makers = {"plane": make_plane, "sphere": make_sphere}

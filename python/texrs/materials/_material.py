@@ -95,11 +95,11 @@ class Material(Exports):
         axes: int = 2,
     ) -> None:
         if not isinstance(maps, Mapping) or not maps:
-            raise InvalidInput("maps: needs a mapping of names to arrays, with at least one")
+            raise InvalidInput("maps: must be a mapping of names to arrays, with at least one")
         self._axes = as_int(axes, "axes", 2, 3)
         for option, given in (("roles", roles), ("spaces", spaces), ("weights", weights)):
             if given is not None and not isinstance(given, Mapping):
-                raise InvalidInput(f"{option}: needs a mapping by the names of maps, got {given!r}")
+                raise InvalidInput(f"{option}: must be a mapping by the names of maps, got {given!r}")
         said, how, share = dict(roles or {}), dict(spaces or {}), dict(weights or {})
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
@@ -117,7 +117,7 @@ class Material(Exports):
         for name, size in sizes.items():
             if size != self._shape:
                 raise InvalidInput(
-                    f"maps: all must have one size; {name} has {size}, {next(iter(sizes))} has {self._shape}"
+                    f"maps: must all have one size, but {name} has {size} and {next(iter(sizes))} has {self._shape}"
                 )
         with collect() as settled:
             report_guesses(why, guessed, said)
@@ -126,7 +126,7 @@ class Material(Exports):
         self._notices.assumed.extend(settled.assumed)
         self._weights = {name: as_float(w, f"weights[{name!r}]", 0, 100) for name, w in share.items()}
         if len(self) > 1 and not any(self._weights.get(name, WEIGHTS[each.role]) for name, each in self.items()):
-            raise InvalidInput("weights: all are 0, so there is nothing to decide on")
+            raise InvalidInput("weights: must not all be 0")
 
     def _check(
         self, name: str, value: Array | Map, guessed: Role | None, role: Role | str | None, space: Space | None
@@ -220,11 +220,11 @@ class Material(Exports):
         axes = as_axes(axes)
         place = None if isinstance(path, list | tuple) else as_path(cast(Path, path))
         if roles is not None and not isinstance(roles, Mapping):
-            raise InvalidInput(f"roles: needs a mapping of names to roles, got {roles!r}")
+            raise InvalidInput(f"roles: must be a mapping of names to roles, got {roles!r}")
         with collect() as notices:
             if place is not None and place.suffix.lower() == ".exr" and not place.is_dir():
                 if axes != 2:
-                    raise InvalidInput(f"axes: the layers of {path} are pictures, got {axes}")
+                    raise InvalidInput(f"axes: must be 2, because the layers of {path} are images; got {axes}")
                 layers, found, weights = read_exr(place, dict(roles or {}))
                 made = cls(layers, roles=found, weights=weights)
             else:
@@ -506,10 +506,10 @@ def check_alike(materials: Sequence[Material]) -> None:
     for other in materials[1:]:
         if list(other) != list(first):
             raise InvalidInput(
-                f"exemplars: need materials with the same maps, got {', '.join(first)} and {', '.join(other)}"
+                f"exemplars: must be materials with the same maps, got {', '.join(first)} and {', '.join(other)}"
             )
         for name, each in first.items():
             theirs = other[name]
             mine, its = ((m.role.value, str(m.pixels.dtype), m.channels) for m in (each, theirs))
             if mine != its:
-                raise InvalidInput(f"exemplars: the maps {name!r} differ: {mine} and {its}")
+                raise InvalidInput(f"exemplars: must have equal types of the map {name!r}, got {mine} and {its}")

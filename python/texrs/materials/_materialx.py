@@ -50,13 +50,13 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
     """Write a document and the maps that it names, and return the files."""
     target = as_path(path)
     if target.suffix.lower() != ".mtlx":
-        raise FileError(f"{path}: the suffix {target.suffix!r} is not that of MaterialX: .mtlx")
+        raise FileError(f"{path}: the suffix must be .mtlx, got {target.suffix!r}")
     maps = make_plain(maps)
     chosen = {role: name for role in USED for name, each in maps.items() if each is find_map(maps, role)}
     if Role.NORMAL in chosen:
         chosen.pop(Role.NORMAL_DX, None)
     if not chosen:
-        raise InvalidInput(f"material: none of {', '.join(maps)} is a map that a surface has")
+        raise InvalidInput(f"material: must have a map of a surface, got {', '.join(maps)}")
     names = {name: rename(name, maps[name].role) for name in chosen.values()}
     chosen = {role: names[name] for role, name in chosen.items()}
     stored = {f"{target.stem}_{new}": prepare(name, maps, depth) for name, new in names.items()}

@@ -49,7 +49,7 @@ def render_preview(
     first = next(iter(maps.values())).pixels
     rows, columns = first.shape[:2]
     if most < max(down, right):
-        raise InvalidInput(f"side: {most} pixels do not hold {max(down, right)} tiles")
+        raise InvalidInput(f"side: must be larger, because {most} pixels cannot show {max(down, right)} tiles")
     scale = min(1.0, most / max(rows * down, columns * right))
     shape = max(1, int(rows * scale)), max(1, int(columns * scale))
     slopes = measure_slopes(maps, (down > 1, right > 1))

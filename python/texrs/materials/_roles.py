@@ -270,4 +270,4 @@ def as_role(value: object, name: str) -> Role:
         return Role(AMERICAN.get(str(value), value))
     except ValueError:
         allowed = ", ".join(role.value for role in Role)
-        raise InvalidInput(f"{name}: allowed roles are {allowed}; got {value!r}") from None
+        raise InvalidInput(f"{name}: must be one of {allowed}; got {value!r}") from None

@@ -97,7 +97,7 @@ def _read_file(path: FilePath) -> Surface:
     if flat:
         ignore(f"{path.name}: {flat} parts are points or lines, which are not used")
     if not parts:
-        raise InvalidInput(f"mesh: {path.name} has no triangles")
+        raise InvalidInput(f"mesh: {path.name} contains no triangles")
     return _join(parts)
 
 

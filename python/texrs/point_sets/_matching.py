@@ -44,7 +44,7 @@ def match_points(source: Points, target: Points) -> tuple[NDArray[np.intp], floa
 
     """
     if len(source) < len(target):
-        raise InvalidInput(f"source: needs a point for each of {len(target)} targets, got {len(source)}")
+        raise InvalidInput(f"source: must have a point for each of {len(target)} targets, got {len(source)}")
     if len(source) * len(target) <= DENSE:
         of = _assign(((target[:, None] - source[None]) ** 2).sum(axis=-1))
     else:

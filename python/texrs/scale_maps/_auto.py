@@ -84,7 +84,9 @@ def auto_mask(
     as_trend(trend)
     colours = guidance(pixels)
     if float(colours[there].std(axis=0).max()) < _FLAT:
-        raise InvalidInput("image: has one colour, so there are no features; give the scale by a mask or by angles")
+        raise InvalidInput(
+            "image: must have more than one colour, to show features; give the scale by a mask or by angles"
+        )
     grey = take_grey(colours, there)
     # Detail below `fine` is ignored, so work on cells of half this size. Large images then cost less.
     cells = Lattice((size[0], size[1]), max(1, int(fine / 2)), 1)

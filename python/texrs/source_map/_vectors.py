@@ -67,7 +67,7 @@ def turn_all(source: Parted, vectors: Array, map_type: str, green: str, signed: 
         sides = ("rows, columns", "planes, rows, columns")[source.axes - 2]
         raise InvalidInput(f"exemplars: {what} must have shape ({sides}, {count}), got {vectors.shape}")
     if vectors.dtype == np.bool_:
-        raise InvalidInput(f"exemplars: {what} cannot be bool")
+        raise InvalidInput(f"exemplars: {what} must not be bool")
     jacobian = source.jacobian_array()
     if jacobian is None:
         return vectors

@@ -353,7 +353,7 @@ def _as_choices(
     several = list(overlap) if isinstance(overlap, Sequence | np.ndarray) and not isinstance(overlap, str) else None
     several = [overlap] * 2 if several is None else several
     if len(several) != 2:
-        raise InvalidInput(f"overlap: needs one number or (rows, columns), got {overlap!r}")
+        raise InvalidInput(f"overlap: must be one number or (rows, columns), got {overlap!r}")
     found = []
     for axis, (each, side) in enumerate(zip(several, shape, strict=True)):
         try:

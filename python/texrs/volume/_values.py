@@ -56,7 +56,7 @@ def check_field(field: object, axes: int) -> Field | None:
     """Check that a field, if given, has a number of axes, and return it."""
     if field is not None and (not isinstance(field, Field) or field.axes != axes):
         got = field if isinstance(field, Field) else type(field).__name__
-        raise InvalidInput(f"field: needs a field of {axes} axes, got {got}")
+        raise InvalidInput(f"field: must be a field of {axes} axes, got {got}")
     return field
 
 
@@ -96,5 +96,5 @@ def as_direction(value: object, name: str) -> NDArray[np.float64]:
     """Return three numbers, for planes, rows and columns. A normal must have a length."""
     out = try_array(value, np.float64)
     if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
-        raise InvalidInput(f"{name}: needs three numbers (plane, row, column), got {str(value)[:60]}")
+        raise InvalidInput(f"{name}: must be three numbers (plane, row, column), got {str(value)[:60]}")
     return out

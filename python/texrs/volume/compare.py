@@ -205,11 +205,11 @@ def compare(
     first, second = (as_image(a, n, minimum=16, axes=count) for a, n in ((first, "exemplar"), (second, "output")))
     if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
         raise InvalidInput(
-            f"output: needs {first.dtype} with {first.shape[-1]} channels as the exemplar has, "
-            f"got {second.dtype} with {second.shape[-1]}"
+            f"output: must be {first.dtype} with {first.shape[-1]} channels, like the exemplar, got {second.dtype} "
+            f"with {second.shape[-1]}"
         )
     if source is not None and (not isinstance(source, SourceMap) or source.shape != second.shape[:count]):
-        raise InvalidInput(f"source: needs the source map of the output, over {second.shape[:count]}")
+        raise InvalidInput(f"source: must be the source map of the output, over {second.shape[:count]}")
     # Classify both arrays, and choose the classes whose pieces are counted.
     if classes is None:
         labels = _as_labels(first, "exemplar"), _as_labels(second, "output")
@@ -283,14 +283,14 @@ def _share_range(first: Array, second: Array) -> tuple[Array, Array]:
 
 def _as_labels(array: Array, name: str) -> Array:
     if array.shape[-1] != 1 or array.dtype.kind not in "bui" or array.min() < 0 or array.max() > 255:
-        raise InvalidInput(f"{name}: labels are whole numbers from 0 to 255, without channels")
+        raise InvalidInput(f"{name}: must be labels from 0 to 255, without channels")
     return array[..., 0].astype(np.uint8)
 
 
 def _choose(chosen: object, kinds: int) -> tuple[int, ...]:
     several = chosen if isinstance(chosen, tuple | list) else (chosen,)
     if not several:
-        raise InvalidInput("chosen: needs at least one class")
+        raise InvalidInput("chosen: must contain at least one class")
     return tuple(as_int(k, "chosen", 0, kinds - 1) for k in several)
 
 

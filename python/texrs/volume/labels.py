@@ -50,7 +50,7 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
     """
     array = try_array(labels)
     if array.dtype.kind not in "bui" or array.ndim not in (2, 3) or array.size == 0:
-        raise InvalidInput(f"labels: needs integers of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
+        raise InvalidInput(f"labels: must be integers of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
     least, largest = int(array.min()), int(array.max())
     if least < 0:
         raise InvalidInput(f"labels: must be at least 0, got {least}")
@@ -66,7 +66,7 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
             f"colours: must be numbers from 0 to 255 of shape (K, 3), got {given.dtype} of {given.shape}"
         )
     if largest >= len(given):
-        raise InvalidInput(f"labels: reach {largest}, but there are {len(given)} colours")
+        raise InvalidInput(f"labels: must be less than {len(given)}, the number of colours, got {largest}")
     return np.ascontiguousarray(given.astype(np.uint8)[array.astype(np.intp)])
 
 
@@ -119,7 +119,7 @@ def extract_surface(
     if as_bool(closed, "closed"):
         solid = np.pad(solid, 1)
     if solid.all() or not solid.any():
-        raise InvalidInput("mask: is constant, so it has no surface")
+        raise InvalidInput("mask: must not be constant, because it would have no surface")
     corners, faces, _, _ = marching_cubes(solid.astype(np.float32), 0.5, allow_degenerate=False)
     vertices = ((corners - (1 if closed else 0)) * steps)[:, ::-1]
     return np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int64)

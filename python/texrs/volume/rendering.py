@@ -137,7 +137,7 @@ def oblique_slice(
         low, high = _clip_ray(steps, middle, shape)
         start, sides = np.ceil(low), tuple((np.floor(high) - np.ceil(low) + 1).astype(int).tolist())
         if min(sides) < 1:
-            raise InvalidInput("point, normal: this cut does not meet the volume")
+            raise InvalidInput("point, normal: must give a cut through the volume")
     else:
         sides = as_size(size, "size")
         start = -(np.array(sides) - 1) / 2
@@ -272,7 +272,7 @@ def turntable(
 
     count, side, above, period = check_turntable(frames, size, elevation, seconds)
     if not str(path).lower().endswith(".gif"):
-        raise FileError(f"{path}: needs a name that ends in .gif")
+        raise FileError(f"{path}: the suffix must be .gif")
     shade = as_tuple(background, "background", 3, "three integers")
     ground = np.array([as_int(b, "background", 0, 255) for b in shade], np.float32)
     colours = guidance(as_image(volume, "volume", axes=3))
@@ -374,11 +374,11 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
 def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
     """Return the steps of rows and columns on a plane, (2, 3): the given ones, or unit steps across a normal."""
     if (normal is None) == (axes is None):
-        raise InvalidInput("normal, axes: needs one of the two")
+        raise InvalidInput("normal, axes: must be one of the two")
     if axes is not None:
         steps = try_array(axes, np.float64)
         if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
-            raise InvalidInput("axes: needs two directions of three numbers that are not parallel")
+            raise InvalidInput("axes: must be two directions of three numbers that are not parallel")
         return steps
     # A normal along an axis gives the steps of an ordinary slice.
     across = as_direction(normal, "normal")

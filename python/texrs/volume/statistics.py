@@ -89,7 +89,7 @@ class Classes:
         """
         colours = as_colours(image, "image", axes)
         if colours.shape[-1] != self.centres.shape[1]:
-            raise InvalidInput(f"image: needs {self.centres.shape[1]} colour channels, got {colours.shape[-1]}")
+            raise InvalidInput(f"image: must have {self.centres.shape[1]} colour channels, got {colours.shape[-1]}")
         return self._find_nearest(colours)
 
     def shares(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.float64]:

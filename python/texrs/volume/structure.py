@@ -272,7 +272,7 @@ def texture_normal(values: ArrayLike, *, spacing: Sequence[float] | None = None)
     v = as_values(values)
     tensor = _measure_structure(v, 0.0, find_distances(spacing, values, v.ndim))
     if not np.isfinite(tensor).all():
-        raise InvalidInput("values: are so large that their products are infinite")
+        raise InvalidInput("values: must be small enough that their products are finite")
     vectors = np.linalg.eigh(tensor.reshape(-1, *tensor.shape[-2:]).mean(axis=0))[1]
     normal: NDArray[np.float64] = vectors[:, -1]
     return normal * (1 if normal[np.abs(normal).argmax()] > 0 else -1)
@@ -330,12 +330,12 @@ def orientation_errors(
     v, edge = as_values(values), as_int(margin, "margin", 0, 2**20)
     each = as_int(step, "step", 1, 2**20)
     if min(v.shape) <= 2 * edge:
-        raise InvalidInput(f"margin: {edge} on both sides leaves nothing of {v.shape}")
+        raise InvalidInput(f"margin: must leave a part of {v.shape}, got {edge} on both sides")
     turned, spacing = check_field(field, v.ndim), find_distances(spacing, values, v.ndim)
     turned = None if turned is None else space(turned, spacing)
     n = texture_normal(v, spacing=spacing) if normal is None else try_array(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
-        raise InvalidInput(f"normal: needs {v.ndim} numbers, not all zero, got shape {n.shape}")
+        raise InvalidInput(f"normal: must be {v.ndim} numbers, not all zero, got shape {n.shape}")
     inner = (slice(edge, -edge or None, each),) * v.ndim
     tensor = _measure_structure(v, 4.0, spacing)[inner]
     out = np.empty(tensor.shape[: v.ndim], np.float32)

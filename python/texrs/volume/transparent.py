@@ -135,7 +135,7 @@ def parse_transfer(text: str) -> list[Stop]:
             stops.append((float(value), None if colour == "own" else colour, float(alpha)))
         except ValueError:
             raise InvalidInput(
-                f"transfer: needs VALUE:COLOUR:ALPHA, as in 0:own:0,0.6:#cc3322:0.2; got {part.strip()!r}"
+                f"transfer: must be VALUE:COLOUR:ALPHA, as in 0:own:0,0.6:#cc3322:0.2; got {part.strip()!r}"
             ) from None
     return stops
 
@@ -149,11 +149,11 @@ def _as_stops(transfer: Sequence[Stop]) -> NDArray[np.float64]:
     """Return value, alpha, share of the stop's own colour, red, green and blue of each stop, (N, 6)."""
     flat = getattr(transfer, "ndim", 1) == 0
     if flat or not isinstance(transfer, Sequence | np.ndarray) or not 1 <= len(transfer) <= 256:
-        raise InvalidInput(f"transfer: needs 1 to 256 stops (value, colour, alpha), got {str(transfer)[:60]}")
+        raise InvalidInput(f"transfer: must be 1 to 256 stops (value, colour, alpha), got {str(transfer)[:60]}")
     rows = []
     for stop in transfer:
         if not isinstance(stop, Sequence) or len(stop) != 3:
-            raise InvalidInput(f"transfer: needs (value, colour, alpha), got {str(stop)[:60]}")
+            raise InvalidInput(f"transfer: must be (value, colour, alpha), got {str(stop)[:60]}")
         value, colour, alpha = stop
         given = colour is not None
         rgb = _as_colour(colour) if given else (0.0, 0.0, 0.0)
@@ -161,7 +161,7 @@ def _as_stops(transfer: Sequence[Stop]) -> NDArray[np.float64]:
         rows.append((*numbers, float(given), *rgb))
     found = np.array(rows)
     if (np.diff(found[:, 0]) < 0).any():
-        raise InvalidInput(f"transfer: needs rising values, got {', '.join(f'{v:g}' for v in found[:, 0])}")
+        raise InvalidInput(f"transfer: must have rising values, got {', '.join(f'{v:g}' for v in found[:, 0])}")
     return found
 
 
@@ -173,7 +173,7 @@ def _as_colour(colour: object) -> tuple[float, float, float]:
     if isinstance(colour, Sequence | np.ndarray) and not isinstance(colour, str) and len(colour) == 3:
         red, green, blue = (as_float(c, "transfer", 0, 255) / 255 for c in colour)
         return red, green, blue
-    raise InvalidInput(f"transfer: needs a colour such as #cc3322, three numbers, or own; got {colour!r}")
+    raise InvalidInput(f"transfer: must have a colour such as #cc3322, three numbers, or own; got {colour!r}")
 
 
 def _classify(voxels: NDArray[np.generic], stops: NDArray[np.float64] | None) -> Floats:

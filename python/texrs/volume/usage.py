@@ -172,7 +172,7 @@ def _find_steps(source: SourceMap, field: Field | None, i: int, here: tuple[slic
 def _check(source: SourceMap, field: Field | None) -> Field | None:
     """Return the field that J is taken from: the given one, or the map's own if it is a field."""
     if not isinstance(source, SourceMap):
-        raise InvalidInput(f"source: needs a source map, got {type(source).__name__}")
+        raise InvalidInput(f"source: must be a source map, got {type(source).__name__}")
     check_field(field, source.axes)
     frame: Any = source.jacobian
     return frame if field is None and isinstance(frame, Field) else field

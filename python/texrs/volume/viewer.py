@@ -88,7 +88,7 @@ class Viewer:
 
         """
         if not str(path).lower().endswith((".html", ".htm")):
-            raise FileError(f"{path}: needs a name that ends in .html")
+            raise FileError(f"{path}: the suffix must be .html")
         head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>A volume</title>\n<body>\n'
         with atomic(path, overwrite=overwrite) as temporary:
             temporary.write_text(f"{head}{as_page(self._voxels)}</body></html>\n", encoding="utf-8")

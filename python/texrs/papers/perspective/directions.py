@@ -34,8 +34,8 @@ def as_turn(direction: object, size: tuple[int, int], wrap: Sequence[bool]) -> S
         if closed and across > 2 * float(np.abs(np.diff(turn, axis=axis)).max(initial=0.0)) + 0.02:
             name = ("rows", "columns")[axis]
             raise InvalidInput(
-                f"wrap: directions of the first and last {name} differ, so the result cannot repeat along {name}; make them "
-                f"alike, or leave wrap off along {name}"
+                f"wrap: directions of the first and last {name} differ, so the result cannot repeat along {name}; "
+                f"make them equal, or leave wrap off along {name}"
             )
     return turn
 
@@ -47,7 +47,7 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
     given = try_array(direction)
     if given.ndim != 2 or given.dtype.kind not in "iuf" or given.size == 0:
         raise InvalidInput(
-            f"direction: needs degrees, one number or (rows, columns), or a field; got {given.dtype} of {given.shape}"
+            f"direction: must be degrees, one number or (rows, columns), or a field; got {given.dtype} of {given.shape}"
         )
     angles = given.astype(np.float64)
     if not (np.abs(angles) <= FARTHEST).all():
@@ -61,7 +61,7 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
 def follow_field(field: Field, size: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return cosines and sines of the rotations nearest to the frames of a field."""
     if field.axes != 2:
-        raise InvalidInput(f"direction: needs a field of 2 axes, got one of {field.axes}")
+        raise InvalidInput(f"direction: must be a field of 2 axes, got one of {field.axes}")
     j = field.over(size).lattice(size).astype(np.float64)
     return normalise(j[..., 0, 0] + j[..., 1, 1], j[..., 0, 1] - j[..., 1, 0])
 

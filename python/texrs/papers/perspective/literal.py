@@ -45,11 +45,11 @@ def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
     """Run the algorithm of the paper. The stage ``before_blending`` shows the sources of the averages."""
     image, target = asked.exemplar.pixels, asked.target
     if any(asked.wrap):
-        raise InvalidInput("wrap: the paper's method knows none; leave out wrap, or method='paper'")
+        raise InvalidInput("wrap: cannot be combined with method='paper'")
     if image.shape[-1] > 4:
-        raise InvalidInput(f"exemplar: the paper's method takes up to 4 channels, got {image.shape[-1]}")
+        raise InvalidInput(f"exemplar: must have at most 4 channels for method='paper', got {image.shape[-1]}")
     if min(*image.shape[:2], *target.shape) < 2 * SIDE:
-        raise InvalidInput(f"size: the paper's method needs at least {2 * SIDE} pixels a side, got {target.shape}")
+        raise InvalidInput(f"size: must be at least {2 * SIDE} pixels a side for method='paper', got {target.shape}")
     made, coordinates, energies = average(
         image, asked.scale, target, weight=asked.strength, seed=asked.seed, progress=progress
     )

@@ -129,7 +129,7 @@ class Request:
         said = None if scale_kind is None else as_kind(scale_kind)
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
         if fov is not None and (isinstance(scale_map, Plane) or is_words(scale_map)):
-            raise InvalidInput("fov: the plane has one already")
+            raise InvalidInput("fov: cannot be combined with a plane, which has its own")
         as_choice(target_green, "target_green", ("up", "down"))
         # The size of the target is the default size of the result.
         asked = as_target(target, target_green)
@@ -142,7 +142,7 @@ class Request:
         turn = None if direction is None else as_turn(direction, shape, closed)
         if method == "paper" and (surface is not None or turn is not None):
             raise InvalidInput(
-                "method: the paper's knows no surfaces and no directions; give a scale map as target, or leave out the method"
+                "method: cannot be combined with surfaces or directions; give a scale map as target, or omit the method"
             )
         # Measure the scale map, and bring the target to the size of the result.
         plane, scale, measured = find_scale(known, scale_map, scale_measurement)
@@ -189,14 +189,14 @@ def find_scale(
     """Return the given plane of an exemplar, the size of its elements, and the measurement."""
     if scale_measurement is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
         raise InvalidInput(
-            "scale_measurement: a scale map is given, so that nothing is measured; leave out one of them"
+            "scale_measurement: cannot be combined with a scale map, because nothing is measured; omit one of them"
         )
     if is_words(scale_map):
         scale_map = read_plane(scale_map, exemplar.shape, "scale_map")
     if isinstance(scale_map, Plane):
         if scale_map.shape != exemplar.shape:
             raise InvalidInput(
-                f"scale_map: needs a plane in a picture of {exemplar.shape}, as the exemplar is, got {scale_map.shape}"
+                f"scale_map: must be a plane in an image of {exemplar.shape}, like the exemplar, got {scale_map.shape}"
             )
         return scale_map, scale_map.scale_map(), None
     if not isinstance(scale_map, str):
@@ -207,7 +207,7 @@ def find_scale(
         found = measure_known_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
         return None, found.scale, found
     if not isinstance(scale_measurement, Measuring):
-        raise InvalidInput(f"scale_measurement: needs a texrs.scale_maps.Measuring, got {scale_measurement!r}")
+        raise InvalidInput(f"scale_measurement: must be a texrs.scale_maps.Measuring, got {scale_measurement!r}")
     return None, scale_measurement.measure(exemplar.image), None
 
 

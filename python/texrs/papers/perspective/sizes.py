@@ -48,7 +48,7 @@ def check_sizes(asked: object) -> tuple[float, ...] | None:
         sizes = [as_float(s, "augment_scales", SMALLEST, LARGEST) for s in asked]
         # The exemplar itself is always included.
         return (1.0, *dict.fromkeys(s for s in sizes if s != 1))
-    raise InvalidInput(f"augment_scales: needs 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
+    raise InvalidInput(f"augment_scales: must be 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
 
 
 def count_samples(scale: Floats, target: Floats) -> float:

@@ -48,7 +48,7 @@ def as_target(target: object, green: Literal["up", "down"] = "up") -> Plane | st
         return as_jacobians(given, "target")
     if given.ndim == 3 and given.shape[2] in (2, 3):
         if given.shape[2] == 2 and given.dtype.kind != "f":
-            raise InvalidInput(f"target: coordinates (rows, columns, 2) need floats, got {given.dtype}")
+            raise InvalidInput(f"target: coordinates (rows, columns, 2) must be floats, got {given.dtype}")
         try:
             made = jacobians_of_coordinates(given) if given.shape[2] == 2 else jacobians_of_normals(given, green=green)
         except InvalidInput as error:
@@ -94,9 +94,7 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
 
 def read_plane(words: str, shape: Sequence[int], name: str) -> Plane:
     """Return the plane in words: ``plane:slant=50,tilt=90,fov=60``."""
-    form = (
-        f"{name}: needs plane:slant=DEGREES and, if they are known, tilt=, fov= and rotation=, with commas between them"
-    )
+    form = f"{name}: must be plane:slant=DEGREES and, if known, tilt=, fov= and rotation=, separated by commas"
     if not words.startswith(PREFIX):
         raise InvalidInput(f"{form}; got {words!r}")
     values: dict[str, float] = {}

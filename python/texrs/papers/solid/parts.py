@@ -55,7 +55,7 @@ class Endless(InParts):
         """Check that a part begins within the world. Return its reader."""
         start, sides = as_origin(origin, self.axes), as_sides(shape, "shape", self.axes)
         if any(o + n > MAX_COORDINATE for o, n in zip(start, sides, strict=True)):
-            raise InvalidInput(f"origin, shape: need to lie within {MAX_COORDINATE}, got {start} and {sides}")
+            raise InvalidInput(f"origin, shape: must be within {MAX_COORDINATE}, got {start} and {sides}")
         return Part(_Windows(self, start), start, IMAGE if self.material is None else self.material.base_name)
 
 

@@ -68,7 +68,7 @@ def check_plan(patches: object, method: object, quality: Quality) -> Choice:
     name: Choice = as_choice(patches, "patches", (*PLANS, "auto"))  # type: ignore[assignment]
     if name != "default" and (method is not None or quality == "fast"):
         what = f"method={method!r}" if method is not None else "quality='fast'"
-        raise InvalidInput(f"patches: {what} puts no patches together; leave out patches, or {what.partition('=')[0]}")
+        raise InvalidInput(f"patches: cannot be combined with {what}; omit patches, or {what.partition('=')[0]}")
     return name
 
 

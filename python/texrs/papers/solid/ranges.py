@@ -26,32 +26,34 @@ def as_origin(origin: object, axes: int) -> tuple[int, ...]:
         ends = [_as_end(v) for v in values]
         if None not in ends:
             return tuple(int(v) for v in values)
-    raise InvalidInput(f"origin: needs {axes} integers within {MAX_COORDINATE}, got {origin!r}")
+    raise InvalidInput(f"origin: must be {axes} integers within {MAX_COORDINATE}, got {origin!r}")
 
 
 def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
     """Return the region of an index, and a mask of the axes that a single number removes."""
     parts = index if isinstance(index, tuple) else (index,)
     if len(parts) != axes:
-        raise InvalidInput(f"texture: needs {axes} ranges, {_ORDER[axes]}; got {len(parts)}")
+        raise InvalidInput(f"texture: must have {axes} ranges, {_ORDER[axes]}; got {len(parts)}")
     origin, shape, single = [], [], []
     for part in parts:
         one = isinstance(part, numbers.Integral) and not isinstance(part, bool)
         if isinstance(part, slice):
             if part.start is None or part.stop is None:
-                raise InvalidInput(f"texture: has no end, so a range needs both: start:stop; got {_spell(part)}")
+                raise InvalidInput(
+                    f"texture: must have both ends of a range, start:stop, because it is unbounded; got {_spell(part)}"
+                )
             if part.step is not None:
-                raise InvalidInput(f"texture: ranges have no step; got {_spell(part)}")
+                raise InvalidInput(f"texture: must have ranges without a step, got {_spell(part)}")
             start, stop = _as_end(part.start), _as_end(part.stop)
         elif one:
             start = _as_end(part)
             stop = None if start is None else start + 1
         else:
-            raise InvalidInput(f"texture: takes integers and ranges, {_ORDER[axes]}; got {part!r}")
+            raise InvalidInput(f"texture: must be indexed by integers and ranges, {_ORDER[axes]}; got {part!r}")
         if start is None or stop is None:
-            raise InvalidInput(f"texture: a range needs integers within {MAX_COORDINATE}, got {_spell(part)}")
+            raise InvalidInput(f"texture: must have a range of integers within {MAX_COORDINATE}, got {_spell(part)}")
         if stop <= start:
-            raise InvalidInput(f"texture: the range {_spell(part)} is empty")
+            raise InvalidInput(f"texture: must not have an empty range, got {_spell(part)}")
         origin.append(start)
         shape.append(stop - start)
         single.append(one)

@@ -98,9 +98,9 @@ class Request:
         as_method(method, None, "paper", "paper-compensated")
         if method is not None and (constraints is not None or guide is not None):
             what = "constraints" if constraints is not None else "guide"
-            raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method={method!r}")
+            raise InvalidInput(f"{what}: cannot be combined with method={method!r}; omit one of them")
         if bend_patches is not None and not isinstance(bend_patches, bool):
-            raise InvalidInput(f"bend_patches: needs True, False or None, got {bend_patches!r}")
+            raise InvalidInput(f"bend_patches: must be True, False or None, got {bend_patches!r}")
         chosen = check_plan(patches, method, as_quality(quality))
         how = as_interpolation(interpolation, known, "cubic" if method is None else "nearest")
         turned = as_field(field, axes, region.shape, spacing)

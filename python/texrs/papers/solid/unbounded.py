@@ -325,7 +325,7 @@ class Texture(Endless):
 
         """
         if self._material is None:
-            raise InvalidInput("texture: is made from one array, not from a material; its values are those of sample()")
+            raise InvalidInput("texture: must be of a material, got one of an array; use sample() for its values")
         return self._sample_maps(as_points(points, self.axes), self._as_how(interpolation), listen(progress))
 
     def trace(self, points: ArrayLike, *, progress: Progress | bool | None = None) -> SourceMap:
@@ -431,7 +431,7 @@ class Texture(Endless):
         None if J is the identity.
         """
         if len(at) and np.abs(at).max() > MAX_COORDINATE:
-            raise InvalidInput(f"points: need to lie within {MAX_COORDINATE} of the origin, got {np.abs(at).max():g}")
+            raise InvalidInput(f"points: must be within {MAX_COORDINATE} of the origin, got {np.abs(at).max():g}")
         places = np.empty(at.shape, np.float32)
         frames = None if self._field is None else np.empty((*at.shape, self.axes), np.float32)
         voxel = np.floor(at + 0.5).astype(np.int64)
