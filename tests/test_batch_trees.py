@@ -169,7 +169,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
         assert main(["batch", "inpaint", "photos", "-o", f"one{number}", *words, "-q"]) == 0
         assert made(f"one{number}") == ["a/two.png", "one.jpg"]
     assert main(["batch", "remove", "photos", "-o", "none"]) == 2
-    assert "--argument: texrs remove needs MASK for each input" in capsys.readouterr().err
+    assert "--argument: must give MASK of texrs remove for each input" in capsys.readouterr().err
 
 
 def test_masks_next_to_the_images_are_not_inputs(here: Path) -> None:

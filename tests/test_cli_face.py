@@ -105,7 +105,7 @@ def test_sizes_cannot_be_mistaken(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     io.write("in.png", np.arange(48 * 48, dtype=np.uint8).reshape(48, 48))
     assert main(["tile", "in.png", "-o", "out.png", "--size", text]) == 2
-    assert "--size: needs WIDTHxHEIGHT, as in 1024x512, or one number" in capsys.readouterr().err
+    assert "--size: must be WIDTHxHEIGHT, as in 1024x512, or one number" in capsys.readouterr().err
     assert main(["tile", "in.png", "-o", "out.png", "--size", "64x56"]) == 0
     assert io.read("out.png").shape == (56, 64)
     assert "wrote out.png: 64 x 56, 1 channel" in capsys.readouterr().err

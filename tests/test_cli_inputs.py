@@ -75,7 +75,7 @@ def test_no_command_writes_over_what_it_reads(here: Path, command: str, read: st
                     arguments += values
                 else:
                     options += [max(p.opts, key=len), *values]
-        with pytest.raises(InvalidInput, match=f"{as_flag(written)}: {target} is read"):
+        with pytest.raises(InvalidInput, match=f"{as_flag(written)}: {target} is an input"):
             find_command(command).main([*arguments, *options], standalone_mode=False)
         assert files(here) == before
 
@@ -105,7 +105,7 @@ def test_no_name_that_a_command_makes_is_read(here: Path, capsys: Capture, comma
     texrs.TextureDatabase("db").add("in.png", "dots", mask=mask, layout="disjoint")
     before = files(here)
     assert main(command.split()) == 2
-    assert "is read" in complaint(capsys)
+    assert "is an input" in complaint(capsys)
     assert files(here) == before
 
 
@@ -115,4 +115,4 @@ def test_a_folder_of_inputs_may_take_what_replaces_none(here: Path, capsys: Capt
     Path("gravel").mkdir()
     assert main(["samples", "gravel", "-o", "gravel", "-q"]) == 0
     assert main(["design", "in.png", *TINY, "-o", "many.png", "--variants", "2", "--stages", "."]) == 2
-    assert "--stages: needs a name" in complaint(capsys)
+    assert "--stages: must be a name" in complaint(capsys)

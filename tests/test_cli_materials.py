@@ -161,7 +161,7 @@ def test_what_else_lies_in_a_folder_of_maps_does_not_count(here: Path, capsys: p
 
 def test_a_material_says_itself_what_labels_are(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synthesize", "rock", "-o", "new", "--size", "64", "--labels", "-q"]) == 2
-    assert "--labels: is for a picture" in capsys.readouterr().err
+    assert "--labels: not available for materials" in capsys.readouterr().err
 
 
 def test_a_folder_is_made_again_as_a_whole(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -176,13 +176,13 @@ def test_a_folder_is_made_again_as_a_whole(here: Path, capsys: pytest.CaptureFix
     assert main(["rerun", "small", "-q"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 12
     assert main(["rerun", "new", "-o", "other", "-q"]) == 2
-    assert "--out: is for one file" in capsys.readouterr().err
+    assert "--out: only available for one file" in capsys.readouterr().err
     assert main(["rerun", "rock", "-q"]) == 2
-    assert "rock: no file in it says how it was made" in capsys.readouterr().err
+    assert "rock: none of its files has a record of how it was made" in capsys.readouterr().err
     assert main(["tile", "rock", "-o", "other", "-q"]) == 0
     os.rename("other/rock_albedo.png", "new/other.png")
     assert main(["rerun", "new", "-q"]) == 2
-    assert "holds what several commands made" in capsys.readouterr().err
+    assert "contains results of several commands" in capsys.readouterr().err
 
 
 def texrs_hash(path: str) -> str:
@@ -248,22 +248,22 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock -o new --depth 12", "--depth: must be one of 8, 16, 32; got 12"),
         ("design rock -o new --format jpg", "--format: must be one of png, tif, exr; got 'jpg'"),
         ("design rock -o new --pack rgb", "--pack: must be one of orm, none; got 'rgb'"),
-        ("design rock -o new --gltf rock.gltf", "--gltf: needs a name that ends in .glb"),
-        ("design rock/rock_albedo.png -o new.png --mipmaps small", "--mipmaps: is for materials"),
+        ("design rock -o new --gltf rock.gltf", "--gltf: must be a name that ends in .glb"),
+        ("design rock/rock_albedo.png -o new.png --mipmaps small", "--mipmaps: only available for materials"),
         ("solid sample:stripes -o new.tif --size 32x32x32 --depth 16", "No such option: --depth"),
-        ("design rock -o new --role wet", "--role: needs MAP=ROLE"),
-        ("design rock -o new --role rock_wet=shiny", "allowed roles are"),
+        ("design rock -o new --role wet", "--role: must be MAP=ROLE"),
+        ("design rock -o new --role rock_wet=shiny", "must be one of"),
         ("design rock -o new --role dry=mask", "got 'dry'"),
-        ("design rock -o new.exr --depth 16", "--out: a file of layers keeps each map as it is"),
-        ("design rock/rock_albedo.png -o new.png --depth 16", "--depth: is for materials"),
-        ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: is for materials"),
+        ("design rock -o new.exr --depth 16", "--out: must be a folder with --depth"),
+        ("design rock/rock_albedo.png -o new.png --depth 16", "--depth: only available for materials"),
+        ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: only available for materials"),
         ("design rock rock/rock_albedo.png -o new", "must all be materials, or none of them"),
-        ("design rock -o mine", "mine/rock_albedo.png is there already"),
-        ("design same -o same", "--out: same is read, and would then contain other maps"),
-        ("tile rock -o new --mipmaps links/../rock", "rock is read, and would then contain other maps"),
-        ("tile uneven -o new", "uneven: all must have one size; height has"),
-        ("design rock -o links", "is read as rock/rock_albedo.png, and would be lost"),
-        ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is read"),
+        ("design rock -o mine", "mine/rock_albedo.png exists"),
+        ("design same -o same", "--out: same is an input, and would contain other maps"),
+        ("tile rock -o new --mipmaps links/../rock", "rock is an input, and would contain other maps"),
+        ("tile uneven -o new", "uneven: must all have one size, but height has"),
+        ("design rock -o links", "is an input (rock/rock_albedo.png), and would be lost"),
+        ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is an input"),
         ("design empty -o new", "empty: no image has a name that gives its role"),
     ],
 )

@@ -203,7 +203,7 @@ def test_types_and_names_say_how_an_option_is_read() -> None:
     for name, text, message in (
         ("colour", "green", "--colour: must be one of default, red, blue; got 'green'"),
         ("mode", "best", "--mode: must be one of plain, fine; got 'best'"),
-        ("knobs_kind", "near", "--knob-kind: needs --knob-width too"),
+        ("knobs_kind", "near", "--knob-kind: must be combined with --knob-width"),
     ):
         with pytest.raises(InvalidInput) as caught:
             OPTIONS.call(OPTIONS.read(GIVEN | {name: text}))

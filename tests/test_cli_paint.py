@@ -98,11 +98,11 @@ def test_colours_of_corners(here: Path) -> None:
     [
         (["-o", "a.png"], "must be a .glb, .gltf or .obj file"),
         (["-o", "a.ply"], ".ply is only for colours of vertices"),
-        (["-o", "a.glb", "--along", "y"], "--along: needs --directions"),
+        (["-o", "a.glb", "--along", "y"], "--along: must be combined with --directions"),
         (["-o", "a.glb", "--directions", "up"], "--directions: must be x, y, z"),
-        (["-o", "a.glb", "--directions", "x", "--field", "circular"], "one of them can be asked for"),
+        (["-o", "a.glb", "--directions", "x", "--field", "circular"], "cannot be combined with"),
         (["-o", "a.glb", "--bits", "12"], "--bits: must be one of 8, 16"),
-        (["-o", "a.glb", "--role", "a=height"], "--role: is for materials"),
+        (["-o", "a.glb", "--role", "a=height"], "--role: only available for materials"),
         (["-o", "a.glb", "--voxels", "0"], "--voxels"),
     ],
 )

@@ -173,12 +173,12 @@ def test_a_window_of_a_picture(files: Path) -> None:
     ("words", "message"),
     [
         (["--out", "x.bin", "--workers", "2"], "the suffix must be one of"),
-        (["--out", "x.exr", "--workers", "2"], "x.exr: .exr cannot hold volumes"),
-        (["--out", "x.zarr", "--workers", "2", "--scheduler", "tcp://a"], "one of them can be asked for"),
+        (["--out", "x.exr", "--workers", "2"], "x.exr: .exr cannot store volumes"),
+        (["--out", "x.zarr", "--workers", "2", "--scheduler", "tcp://a"], "cannot be combined with"),
         (["--out", "x.zarr", "--workers", "0"], "--workers: must be an integer"),
-        (["--out", "x.zarr", "--wrap", "xyz"], "--wrap: is for results that are made at once"),
-        (["--out", "x.zarr", "--source-map", "m.npz"], "--source-map: is for results that are made at once"),
-        (["--out", "x.zarr", "--origin", "1,2"], "--origin: needs X,Y,Z"),
+        (["--out", "x.zarr", "--wrap", "xyz"], "--wrap: only available for results that are not written in parts"),
+        (["--out", "x.zarr", "--source-map", "m.npz"], "--source-map: cannot be combined with"),
+        (["--out", "x.zarr", "--origin", "1,2"], "--origin: must be X,Y,Z"),
         (["--out", "x.npy", "--size", "2048"], "to OUT.zarr, or with --chunks, it is made in parts"),
         (["--out", "x.zarr", "--chunks", "0"], "--chunks: each side must be at least 1"),
     ],
@@ -193,7 +193,7 @@ def test_what_is_refused(files: Path, words: list[str], message: str, capsys: py
 def test_how_maps_are_written_is_not_ignored(option: str, files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["synthesize", f"{files}/weave.png", "-o", f"{files}/p.zarr", "--size", "70", "--chunks", "32"]
     assert main([*words, *option.split()]) == 2
-    assert f"{option.split()[0]}: is for results that are made at once" in capsys.readouterr().err
+    assert f"{option.split()[0]}: only available for results" in capsys.readouterr().err
 
 
 def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -213,7 +213,7 @@ def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixt
     assert main([*words, f"{files}/b.zarr", weave, "--force", "--map-type", "label", "-q"]) == 0
     assert np.array_equal(io.read(files / "b.zarr"), io.read(files / "a.png"))
     assert main([*words, f"{files}/c.zarr", weave, "--screening", "0.2"]) == 2
-    assert "--screening 0 leaves them as they are" in capsys.readouterr().err
+    assert "pass --screening 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -264,5 +264,5 @@ def test_voxels_of_results_lie_as_far_apart_as_those_of_examples(files: Path) ->
     texture = texrs.SolidTexture(STRIPES)
     texture.to_file(files / "c.vti", 8, spacing=apart)
     assert io.read_spacing(files / "c.vti") == apart
-    with pytest.raises(InvalidInput, match="spacing: .npy cannot keep it"):
+    with pytest.raises(InvalidInput, match="spacing: .npy cannot store it"):
         texture.to_file(files / "c.npy", 8, spacing=apart)

@@ -50,11 +50,11 @@ def test_corners_are_x_and_y(here: Path) -> None:
     ("corners", "words"),
     [
         ("20,20 110,100 104,24 14,112", "the sides cross"),
-        ("20,20 24,150 100,110 112,14", "1 of the four leave the picture; understood as the x,y 20,20 24,150"),
+        ("20,20 24,150 100,110 112,14", "1 of the four leave the image; read as the x,y 20,20 24,150"),
         ("20,20 24,150 100,110 112,14", "they fit as row,column, but x comes first"),
-        ("20,20 999,24 110,999 14,112", "2 of the four leave the picture"),
-        ("20,20 104,24", "--corners: needs four places X,Y"),
-        ("20,20 104,24 110,100 14", "--corners: needs X,Y"),
+        ("20,20 999,24 110,999 14,112", "2 of the four leave the image"),
+        ("20,20 104,24", "--corners: must be four places X,Y"),
+        ("20,20 104,24 110,100 14", "--corners: must be X,Y"),
     ],
 )
 @pytest.mark.parametrize("verb", ["rectify", "extend", "remove"])
@@ -90,8 +90,8 @@ def test_errors_speak_of_x_and_y(here: Path, capsys: Capture) -> None:
     err = capsys.readouterr().err
     assert "--background: point 0, (x, y) = [10.0, 150.0], is outside the image of 160 x 120" in err
     assert "if the two numbers of each point are exchanged, all are inside" in err
-    assert say_places("box: needs (row, column, height, width), got [1, 2, 3, 4]") == (
-        "box: needs (x, y, width, height), got [2, 1, 4, 3]"
+    assert say_places("box: must be (row, column, height, width), got [1, 2, 3, 4]") == (
+        "box: must be (x, y, width, height), got [2, 1, 4, 3]"
     )
     assert {"corners", "background", "points", "box"} <= set(PLACED)
 

@@ -65,13 +65,13 @@ def test_windows_larger_than_memory(here: Path, tiles: texrs.CornerTiles) -> Non
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["-o", "set", "--origin", "3,4"], "--origin: is of a window, and needs --size"),
-        (["-o", "set", "--workers", "2"], "--workers: is of a window"),
-        (["-o", "w.png", "--size", "8", "--index", "8"], "--index: is of the index texture"),
+        (["-o", "set", "--origin", "3,4"], "--origin: must be combined with --size"),
+        (["-o", "set", "--workers", "2"], "--workers: must be combined with --size"),
+        (["-o", "w.png", "--size", "8", "--index", "8"], "--index: cannot be combined with --size"),
         (["-o", "set", "--tile-size", "50"], "--tile-size: must be a multiple of 4"),
-        (["-o", "w.png", "--size", "8", "--origin", "1"], "--origin: needs X,Y"),
-        (["-o", "set", "--role", "a=height"], "--role: is for materials"),
-        (["-o", "dots.png", "--size", "8"], "dots.png is read"),
+        (["-o", "w.png", "--size", "8", "--origin", "1"], "--origin: must be X,Y"),
+        (["-o", "set", "--role", "a=height"], "--role: only available for materials"),
+        (["-o", "dots.png", "--size", "8"], "dots.png is an input"),
     ],
 )
 def test_what_is_refused(here: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

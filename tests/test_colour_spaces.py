@@ -247,7 +247,7 @@ def test_a_single_picture_is_not_converted_silently(
 ) -> None:
     io.write(tmp_path / "albedo.png", texrs.samples.pebbles((48, 48)).image)
     assert main(["tile", str(tmp_path / "albedo.png"), "-o", str(tmp_path / out)]) == 2
-    assert "cannot hold uint8" in capsys.readouterr().err
+    assert "cannot store uint8" in capsys.readouterr().err
 
 
 def test_colours_are_divided_by_alpha_on_the_way_out_of_exr(tmp_path: Path) -> None:

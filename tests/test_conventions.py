@@ -293,8 +293,8 @@ def test_names_come_back_as_they_came(tmp_path: Path, monkeypatch: pytest.Monkey
     [
         ("design in -o new --convention maya", "--convention: must be one of ambientcg, polyhaven, gltf,"),
         ("design in -o new --convention gltf --pack orm", "--pack: cannot be combined with --convention"),
-        ("design in/a_color.png -o new.png --convention gltf", "--convention: is for materials"),
-        ("design in -o new.exr --convention gltf", "--out: a file of layers keeps each map as it is"),
+        ("design in/a_color.png -o new.png --convention gltf", "--convention: only available for materials"),
+        ("design in -o new.exr --convention gltf", "--out: must be a folder with --depth"),
     ],
 )
 def test_bad_conventions_are_refused(

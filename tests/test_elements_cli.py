@@ -57,9 +57,9 @@ def test_a_material_is_analysed_by_all_its_maps(here: Path, capsys: Capture) -> 
     assert main(["rerun", "f.npz", "-q"]) == 0
     assert "the same bytes" in capsys.readouterr().out
     assert main(["analyse", "in.png", "-o", "g.npz", "--role", "wet=mask"]) == 2
-    assert "--role: is for materials" in capsys.readouterr().err
+    assert "--role: only available for materials" in capsys.readouterr().err
     assert main(["analyse", "stuff", "-o", "g.npz", "--role", "wet"]) == 2
-    assert "--role: needs MAP=ROLE" in capsys.readouterr().err
+    assert "--role: must be MAP=ROLE" in capsys.readouterr().err
     assert not Path("g.npz").exists()
 
 
@@ -116,11 +116,11 @@ def test_database(here: Path, capsys: Capture) -> None:
     assert main(["database", "db", "list"]) == 0
     assert capsys.readouterr().out.startswith("dots\t")
     for command, message in (
-        ("splice dots -o s.png", "NAME: splice needs two names"),
+        ("splice dots -o s.png", "NAME: must be two names for splice"),
         ("splice dots nobody -o new.png", "NAME: texture 'nobody' is not in"),
-        ("remove", "NAME: remove needs names"),
-        ("list --cell 32", "--cell: needs matrix, got list"),
-        ("splice dots dots -o new.png --each all", "--each: needs matrix, got splice"),
+        ("remove", "NAME: must be given for remove"),
+        ("list --cell 32", "--cell: must be used with matrix, got list"),
+        ("splice dots dots -o new.png --each all", "--each: must be used with matrix, got splice"),
     ):
         assert main(["database", "db", *command.split(), "-q"]) == 2
         assert message in capsys.readouterr().err
@@ -129,10 +129,10 @@ def test_database(here: Path, capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("analyse in.png -o before.npz --box 10,20", "--box: needs X,Y,WIDTH,HEIGHT"),
+        ("analyse in.png -o before.npz --box 10,20", "--box: must be X,Y,WIDTH,HEIGHT"),
         ("analyse in.png -o before.npz --box 20,500,20,20", "--box: reaches from 490 to 510 along the rows"),
-        ("analyse in.png -o before.npz --background 10", "--background: needs X,Y"),
-        ("analyse in.png -o before.npz --background 10,nan", "--background: needs X,Y"),
+        ("analyse in.png -o before.npz --background 10", "--background: must be X,Y"),
+        ("analyse in.png -o before.npz --background 10,nan", "--background: must be X,Y"),
         (
             "analyse in.png -o before.npz --background 900,10",
             r"--background: point 0, \(x, y\) = \[900.0, 10.0\], is outside",
@@ -144,19 +144,19 @@ def test_database(here: Path, capsys: Capture) -> None:
         ),
         ("analyse in.png -o before.npz --points nan.csv", "--points: must be finite, but point 1"),
         ("analyse in.png -o before.npz --points twice.csv", "--points: point 2, .* occurs twice"),
-        ("analyse in.png -o before.npz --points words.csv", "words.csv: line 2 needs x,y, got 'here,there'"),
-        ("analyse in.png -o before.npz --points empty.csv", "empty.csv: holds no points"),
+        ("analyse in.png -o before.npz --points words.csv", "words.csv: line 2 must be x,y, got 'here,there'"),
+        ("analyse in.png -o before.npz --points empty.csv", "empty.csv: contains no points"),
         ("analyse in.png -o before.npz --points none.csv", "none.csv: cannot be read"),
-        ("analyse in.png -o before.npz --scales large", "--scales: needs numbers"),
+        ("analyse in.png -o before.npz --scales large", "--scales: must be numbers"),
         ("analyse in.png -o before.npz --method letter", "--method: must be one of default, paper"),
         ("analyse in.png -o before.npz --rotations 0", "--rotations: must be an integer between 1 and 72"),
-        ("analyse in.png -o before.png", "--out: needs a name that ends in .npz"),
+        ("analyse in.png -o before.png", "--out: must be a name that ends in .npz"),
         ("analyse none.png -o before.npz", "none.png: does not exist"),
         ("database db rename", "add\\|list\\|remove\\|splice\\|matrix: must be one of"),
         ("database db list", "db: the folder does not exist"),
-        ("database db add", "IMAGE: add needs images"),
+        ("database db add", "IMAGE: must be given for add"),
         ("database in.png add in.png", "in.png: a folder cannot be created"),
-        ("database db add in.png mask.png --name both", "IMAGE: --name"),
+        ("database db add in.png mask.png --name both", "IMAGE: must be one image with --name"),
     ],
 )
 def test_bad_input_gets_one_line_and_leaves_what_was_there(

@@ -131,7 +131,7 @@ def test_numbers_are_seen_on_their_elements(found: ElementAnalysis) -> None:
         ([{"op": "drop", "elements": [object()]}], "step 0: must contain only"),
         ([{"op": "drop", "elements": float("nan")}], "step 0: must contain only"),
         ([{"op": "add", "points": [[500, 3]]}], "step 0, add: points: point 0, .* outside"),
-        ([{"op": "add", "points": "here"}], "points: needs points"),
+        ([{"op": "add", "points": "here"}], "points: must be points"),
         ([{"op": "move", "element": 0, "to": [[1, 2], [3, 4]]}], "to: must be one place"),
         ([{"op": "layout", "layout": "net"}], "layout: must be one of disjoint"),
         ([{"op": "background", "points": [[48, 48]], "radius": 1000}], "leaves no foreground"),

@@ -130,7 +130,7 @@ def test_what_is_not_finite_is_refused_where_it_is_looked_up(interpolation, bad,
     image[4, 4, 1] = bad
     assert (gather(image, [[[0.5, 8.0], [1.0, 1.25]]], interpolation=interpolation) == 1).all()
     for at in ([4, 4], [3.6, 4.3], [4.4, 3.75]):
-        with pytest.raises(InvalidInput, match=r"^exemplars: 1 of 162 values are NaN or infinite"):
+        with pytest.raises(InvalidInput, match=r"^exemplars: must be finite, but 1 of 162 values are NaN or infinite"):
             gather(image, [[[0, 0], at]], interpolation=interpolation)
 
 

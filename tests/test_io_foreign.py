@@ -114,17 +114,17 @@ def test_stores_that_hold_something_else(tmp_path: Path) -> None:
     (tmp_path / "bent.zarr" / "zarr.json").write_text("{")
     (tmp_path / "folder").mkdir()
     for name, kind, words in (
-        ("several", FileError, r"holds several arrays \(albedo, height\); name one, as in .*albedo"),
+        ("several", FileError, r"contains several arrays \(albedo, height\); name one, as in .*albedo"),
         ("empty", FileError, "is an empty group"),
-        ("line", FileError, "holds an array of 4, which is not a volume"),
-        ("complex", FileError, "holds complex64"),
+        ("line", FileError, "contains an array of 4, which is not a volume"),
+        ("complex", FileError, "got complex64"),
         ("large", LimitExceeded, "more than the limit"),
         ("bent", FileError, "reading the store failed"),
     ):
         with pytest.raises(kind, match=words):
             io.read_volume(tmp_path / f"{name}.zarr")
     assert_array_equal(io.read_volume(tmp_path / "several.zarr" / "height"), VOLUME)
-    with pytest.raises(FileError, match="is a folder"):
+    with pytest.raises(FileError, match="got a folder"):
         io.read_volume(tmp_path / "folder")
 
 
@@ -188,14 +188,18 @@ GOOD = make_image_data("appended", "vtkZLibDataCompressor", "LittleEndian", "UIn
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("a.vti", GOOD.replace(b"ZLib", b"LZ4", 1), "is compressed by vtkLZ4DataCompressor; zlib and LZMA are read"),
-        ("a.vti", GOOD.replace(b'Scalars="density" Vectors="flow"', b""), "needs a single array, has density, flow"),
-        ("a.vti", GOOD.replace(b"UInt16", b"String", 1), "samples of type 'String'"),
-        ("a.vti", GOOD.replace(b"<Piece", b"<Part"), "reading failed|not image data"),
+        ("a.vti", GOOD.replace(b"ZLib", b"LZ4", 1), "must be compressed by zlib or LZMA, got vtkLZ4DataCompressor"),
+        (
+            "a.vti",
+            GOOD.replace(b'Scalars="density" Vectors="flow"', b""),
+            "must contain a single array, got density, flow",
+        ),
+        ("a.vti", GOOD.replace(b"UInt16", b"String", 1), "must contain integers or floats, got type 'String'"),
+        ("a.vti", GOOD.replace(b"<Piece", b"<Part"), "reading failed|must be image data"),
         ("a.vti", GOOD[:-3000], "reading failed|is cut off"),
         ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="0 9', 1), "is cut off"),
-        ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="9 6', 1), "holds no voxels"),
-        ("a.vti", b'<?xml version="1.0"?><svg/>', "not image data"),
+        ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="9 6', 1), "must have voxels"),
+        ("a.vti", b'<?xml version="1.0"?><svg/>', "must be image data"),
     ],
 )
 def test_damaged_grids(tmp_path: Path, name: str, content: bytes, words: str) -> None:
@@ -265,15 +269,15 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("value", "axes", "words"),
     [
-        (np.zeros((4, 4)), 3, "field: needs a field of 3 axes, got ndarray"),
+        (np.zeros((4, 4)), 3, "field: must be a field of 3 axes, got ndarray"),
         (np.zeros((4, 4, 4, 4)), 3, r"field: must be directions, \(R, C, 2\) or \(P, R, C, 3\), or frames"),
-        (np.ones((4, 4, 2)), 3, r"field: holds \(4, 4, 2\), a field of 2 axes; 3 are needed"),
-        (np.zeros((4, 4, 4, 3)), 3, "directions: all have length 0"),
-        (7, 3, "field: needs a field of 3 axes, got int"),
+        (np.ones((4, 4, 2)), 3, r"field: must have 3 axes, got shape \(4, 4, 2\), a field of 2 axes"),
+        (np.zeros((4, 4, 4, 3)), 3, "directions: must not all have length 0"),
+        (7, 3, "field: must be a field of 3 axes, got int"),
         ("nowhere.npy", 3, "does not exist"),
-        ("flow.npy:around=z", 3, "knows along=, order=, up=, signed= after a file"),
-        ("flow.npy:up=1x", 3, "up= needs three numbers"),
-        ("flow.npy:signed=1", 3, "signed= needs yes or no"),
+        ("flow.npy:around=z", 3, "must be followed only by along=, order=, up=, signed="),
+        ("flow.npy:up=1x", 3, "up= must be three numbers"),
+        ("flow.npy:signed=1", 3, "signed= must be yes or no"),
         ("flow.npy:along=w", 3, "along: must be one of z, y, x"),
         ("cubes.npy", 3, "cubes.npy: must be directions"),
     ],

@@ -194,7 +194,7 @@ def test_what_has_no_estimate_is_refused(wrong):
         ("--time-limit 1e-9", "the limit of 1e-09 s was reached"),
         ("--time-limit 0", "--time-limit: must be a number of seconds above 0, got 0"),
         ("--pixel-limit 0", "--pixel-limit: must be a number of pixels"),
-        ("--memory-limit some", "--memory-limit: needs a number of bytes"),
+        ("--memory-limit some", "--memory-limit: must be a number of bytes"),
     ],
 )
 def test_commands_have_options_of_them(option, said, tmp_path, capsys, monkeypatch):

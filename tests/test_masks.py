@@ -463,7 +463,7 @@ def test_options_of_masks_are_those_of_the_class(here: Path, capsys: Capture) ->
     assert main(["apply", "map.npz", "in.png", "-o", "again.png", "-q"]) == 0
     np.testing.assert_array_equal(io.read("again.png"), expected.image)
     assert main(["inpaint", "in.png", "-o", "no.png", "--grow", "3"]) == 2
-    assert "--grow: needs MASK too" in capsys.readouterr().err
+    assert "--grow: must be combined with MASK" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -267,10 +267,10 @@ def test_pictures_of_16_bit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "error", "words"),
     [
-        ("a.obj", {}, FileError, "is not one of glTF"),
+        ("a.obj", {}, FileError, "the suffix must be .gltf or .glb"),
         ("none/a.glb", {}, FileError, "does not exist"),
-        ("a.glb", {"shapes": []}, InvalidInput, "shapes: needs plane, sphere or both"),
-        ("a.glb", {"shapes": ["plane", "plane"]}, InvalidInput, "shapes: needs plane, sphere or both"),
+        ("a.glb", {"shapes": []}, InvalidInput, "shapes: must be plane, sphere or both"),
+        ("a.glb", {"shapes": ["plane", "plane"]}, InvalidInput, "shapes: must be plane, sphere or both"),
         ("a.glb", {"shapes": ["cube"]}, InvalidInput, "must be one of plane, sphere"),
         ("a.glb", {"repeat": 0}, InvalidInput, "repeat: must be an integer between 1"),
         ("a.glb", {"depth": 32}, InvalidInput, "depth: must be one of 8, 16"),

@@ -78,7 +78,7 @@ def test_the_same_for_any_number_of_threads():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: PatchIndex([]), "images: needs at least one"),
+        (lambda: PatchIndex([]), "images: must contain at least one"),
         (lambda: PatchIndex([np.zeros((9, 9)), np.zeros((9, 9, 3))]), "agree in channels"),
         (lambda: PatchIndex(np.full((9, 9), 1e300)), "infinite as float32"),
         (
@@ -87,7 +87,7 @@ def test_the_same_for_any_number_of_threads():
         ),
         (
             lambda: PatchIndex([np.zeros((9, 9))], allowed=[None, None]),
-            "allowed: needs a list of 1",
+            "allowed: must be a list of 1",
         ),
         (lambda: PatchIndex(np.zeros((9, 9)), max_patch=0), "max_patch"),
         (lambda: PatchIndex(np.zeros((9, 9))).best(np.zeros((10, 3))), r"patch: .*\(10, 3\)"),
@@ -118,7 +118,7 @@ def test_an_index_made_again_finds_what_a_new_one_finds():
     assert again.shapes == new.shapes
     assert again.max_patch == new.max_patch == (24, 24)
     assert again.best(patch, weight, count=5) == new.best(patch, weight, count=5)
-    with pytest.raises(InvalidInput, match="allowed: needs a list of 2"):
+    with pytest.raises(InvalidInput, match="allowed: must be a list of 2"):
         again.again(allowed=allowed[0])
     with pytest.raises(InvalidInput, match=r"allowed\[1\]: must have shape"):
         again.again(allowed=[None, allowed[0]])

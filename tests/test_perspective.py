@@ -168,10 +168,10 @@ BAD = [
     ({"scale_map": np.full((32, 32), np.nan)}, "scale_map: .* NaN"),
     ({"scale_map": np.ones((32, 32), np.uint8)}, "scale_map: must be floats"),
     ({"target": np.ones((5, 5, 7), np.float32)}, "target: must have shape"),
-    ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: a scale map is given"),
+    ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: cannot be combined with a scale map"),
     (
         {"scale_map": "auto", "scale_measurement": {"min_feature_size": 3}},
-        "scale_measurement: needs a texrs.scale_maps.Measuring",
+        "scale_measurement: must be a texrs.scale_maps.Measuring",
     ),
     (
         {"scale_map": "auto", "scale_measurement": texrs.scale_maps.Measuring(min_feature_size=9)},
@@ -182,7 +182,7 @@ BAD = [
     ({"seed": -1}, "seed: "),
     ({"method": "fast"}, "method: must be one of None, 'paper'"),
     ({"scale_weight": 17}, "scale_weight: "),
-    ({"augment_scales": "some"}, "augment_scales: needs 'auto'"),
+    ({"augment_scales": "some"}, "augment_scales: must be 'auto'"),
     ({"augment_scales": [9.0]}, "augment_scales: "),
     ({"interpolation": "sinc"}, "interpolation: "),
     ({"exemplar": np.zeros((8, 40, 3), np.uint8)}, "exemplar: each side must be at least 16"),

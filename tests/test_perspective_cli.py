@@ -88,7 +88,7 @@ def test_holes_are_filled_by_scale(files):
         ),
         (
             "perspective @floor.png --scale-map @scale.npy -o @out.png --augment-scales big",
-            "--augment-scales: needs auto",
+            "--augment-scales: must be auto",
         ),
         ("perspective @floor.png --scale-map @scale.npy -o @out.png --wrap xy", "wrap"),
         (
@@ -99,13 +99,13 @@ def test_holes_are_filled_by_scale(files):
         ("perspective @floor.png --trend steep -o @out.png", "--trend: must be one of none, plane, linear, quadratic"),
         (
             "perspective @floor.png --scale-map @scale.npy --min-feature-size 3 --foreshortened -o @out.png",
-            "--min-feature-size and --foreshortened: a scale map is given",
+            "--min-feature-size and --foreshortened: cannot be combined with a scale map",
         ),
         ("inpaint @floor.png alpha -o @out.png", "MASK: 'alpha' needs an image with an alpha channel"),
         ("inpaint @floor.png @hole.png -o @out.png --method heal", "--method: must be one of"),
         (
             "inpaint @floor.png @hole.png -o @out.png --method optimise --patch-size 9",
-            "--patch-size: method 'optimise' has no",
+            "--patch-size: cannot be combined with method='optimise'",
         ),
     ],
 )

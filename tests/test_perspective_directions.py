@@ -125,10 +125,10 @@ def test_same_bytes_for_any_number_of_threads(lines, count):
     [
         ({"direction": np.nan}, "direction: must be a number"),
         ({"direction": np.full((4, 4), np.inf)}, "direction: must be finite degrees"),
-        ({"direction": np.zeros((4, 4, 2))}, "direction: needs degrees"),
+        ({"direction": np.zeros((4, 4, 2))}, "direction: must be degrees"),
         ({"direction": "up"}, "field"),
-        ({"direction": fields.circular()}, "direction: needs a field of 2 axes"),
-        ({"direction": 9.0, "method": "paper"}, "method: the paper's knows no surfaces and no directions"),
+        ({"direction": fields.circular()}, "direction: must be a field of 2 axes"),
+        ({"direction": 9.0, "method": "paper"}, "method: cannot be combined with surfaces or directions"),
         (
             {"direction": np.array([[0.0, 90.0]]), "wrap": (False, True)},
             "wrap: directions of the first and last columns",

@@ -271,9 +271,9 @@ MARKED[70:90, 60:90] = True
         (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: must be a texrs.PlaneView"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: must mark at least one"),
-        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=MARKED), "allowed: marks nothing"),
-        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, method="optimise"), "allowed: is not for use"),
-        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, exemplar=FLOOR), "allowed: is not for use"),
+        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=MARKED), "allowed: must mark known pixels"),
+        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, method="optimise"), "allowed: cannot be combined"),
+        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, exemplar=FLOOR), "allowed: cannot be combined"),
     ],
 )
 def test_what_cannot_be_done_gets_a_sentence(make: Callable[[], object], words: str) -> None:
@@ -312,8 +312,8 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     np.testing.assert_array_equal(io.read(out), texrs.remove(picture, marked, view=views).image)
     capsys.readouterr()
     for more, words in (
-        (["--slant", "50"], "--slant: needs one for each of 2 grounds"),
-        (["--slant", "fifty", "--slant", "3"], "--slant: needs a number, or found"),
+        (["--slant", "50"], "--slant: must be one for each of 2 grounds"),
+        (["--slant", "fifty", "--slant", "3"], "--slant: must be a number, or found"),
         (["--ground", "found", "--ground", "found"], "--ground: must be given for all but one"),
     ):
         assert main([*said, *more]) == 2

@@ -144,7 +144,7 @@ def test_user_and_angles_do_not_need_a_map() -> None:
         ((FLOOR, (5, 0)), {}, r"^size: each side must be at least 1"),
         ((FLOOR - 5, (5, 5)), {}, r"^scale: \d+ of 4800 scales are outside 0.001 to 1000"),
         ((np.zeros((4, 4)), (5, 5)), {}, r"^scale: 16 of 16 scales are outside"),
-        ((np.full((4, 4), np.nan), (5, 5)), {}, r"^scale: 16 of 16 values are NaN or infinite"),
+        ((np.full((4, 4), np.nan), (5, 5)), {}, r"^scale: must be finite, but 16 of 16 values are NaN or infinite"),
         ((np.full((4, 4), 128, np.uint8), (5, 5)), {}, r"^scale: must be floats, got uint8; convert"),
         ((np.ones((4, 4, 3)), (5, 5)), {}, r"^scale: must have shape \(rows, columns\), got \(4, 4, 3\)"),
         ((FLOOR, (5, 5), "user"), {"pattern": np.ones(4)}, r"^pattern: must have shape \(rows, columns\)"),

@@ -300,8 +300,8 @@ def test_no_overlap_and_no_b_only_pixel():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"b": np.zeros((4, 5))}, "b: needs the shape of a"),
-        ({"a": np.full((4, 4), np.nan)}, "a: 16 of 16 values are NaN"),
+        ({"b": np.zeros((4, 5))}, "b: must have the shape of a"),
+        ({"a": np.full((4, 4), np.nan)}, "a: must be finite, but 16 of 16 values are NaN"),
         ({"mask_a": np.ones((4, 5), bool)}, "mask_a: must have shape"),
         ({"mask_b": np.ones((4, 4))}, "mask_b: must be bool"),
         ({"mask_a": True}, "mask_a: must have shape"),

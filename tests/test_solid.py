@@ -416,7 +416,7 @@ def held(mask, **what):
 @pytest.mark.parametrize(
     ("exemplar", "options", "says"),
     [
-        (NAN, {}, "exemplar: 1 of 98304 values are NaN"),
+        (NAN, {}, "exemplar: must be finite, but 1 of 98304 values are NaN"),
         (STRIPES[:1], {}, "exemplar: each side must be at least 16, got shape (1, 32, 32)"),
         (STRIPES[:15], {}, "exemplar: each side must be at least 16"),
         (np.zeros((0, 32, 32)), {}, "exemplar: each side"),
@@ -429,10 +429,10 @@ def held(mask, **what):
         (STRIPES, {"size": (20, 20)}, "size: must be (planes, rows, columns)"),
         (STRIPES, {"size": 20.5}, "size: must be (planes, rows, columns)"),
         (STRIPES, {"size": None}, "size: must be (planes, rows, columns)"),
-        (STRIPES, {"field": fields.zigzag(axes=2)}, "field: needs a field of 3 axes, got <2-D field"),
+        (STRIPES, {"field": fields.zigzag(axes=2)}, "field: must be a field of 3 axes, got <2-D field"),
         (STRIPES, {"field": "no-such-field"}, "field: "),
-        (STRIPES, {"field": np.eye(3)}, "field: needs a field of 3 axes, got ndarray"),
-        (STRIPES, {"field": fields.constant(np.eye(3) * 0.12)}, "field: features may shrink to an eighth"),
+        (STRIPES, {"field": np.eye(3)}, "field: must be a field of 3 axes, got ndarray"),
+        (STRIPES, {"field": fields.constant(np.eye(3) * 0.12)}, "field: must not shrink elements"),
         (
             STRIPES,
             {"field": fields.from_function(lambda p: np.eye(3) * (10 - p[:, 2, None, None]), 3)},
@@ -452,15 +452,15 @@ def held(mask, **what):
         (STRIPES, {"memory_limit": "1G"}, "memory_limit: must be an integer"),
         (STRIPES, held(SIZED[:9], values=STRIPES), "mask: must have shape (20, 20, 20)"),
         (STRIPES, held(SIZED * 0.5, values=STRIPES), "mask: must be bool or integers"),
-        (STRIPES, held(SIZED, values=STRIPES), "values: needs uint8 of shape (20, 20, 20, 3)"),
-        (STRIPES, held(SIZED, values=np.zeros((20, 20, 20, 3))), "values: needs uint8"),
+        (STRIPES, held(SIZED, values=STRIPES), "values: must be uint8 of shape (20, 20, 20, 3)"),
+        (STRIPES, held(SIZED, values=np.zeros((20, 20, 20, 3))), "values: must be uint8"),
         (
             NAN[8:24, 8:24, 8:24],
             held(SIZED, values=np.full((20, 20, 20, 3), np.inf, np.float32)),
-            "values: those of given points must be finite",
+            "values: must be finite",
         ),
-        (STRIPES, held(SIZED, coordinates=np.full((20, 20, 20, 3), 32.0)), "coordinates: those of given points"),
-        (STRIPES, held(SIZED, coordinates=np.full((20, 20, 20, 3), np.nan)), "coordinates: those of given points"),
+        (STRIPES, held(SIZED, coordinates=np.full((20, 20, 20, 3), 32.0)), "coordinates: must be finite and inside"),
+        (STRIPES, held(SIZED, coordinates=np.full((20, 20, 20, 3), np.nan)), "coordinates: must be finite and inside"),
         (STRIPES, held(SIZED, coordinates=np.zeros((20, 20, 20, 2))), "coordinates: must be numbers of shape"),
     ],
 )
@@ -476,7 +476,7 @@ def test_bad_input_of_pictures():
         (WEAVE[:10], 20, {}, "exemplar: each side must be at least 16"),
         (STRIPES, 20, {}, "a volume is not an image"),
         (WEAVE, (20, 20, 20), {}, "size: must be (rows, columns)"),
-        (WEAVE, 20, {"field": fields.rotation_3d()}, "field: needs a field of 2 axes, got <3-D field"),
+        (WEAVE, 20, {"field": fields.rotation_3d()}, "field: must be a field of 2 axes, got <3-D field"),
     ):
         with pytest.raises(InvalidInput) as caught:
             texrs.synthesize(exemplar, size, **options)

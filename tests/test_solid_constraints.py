@@ -119,18 +119,18 @@ VALUES = texrs.Constraints(mask=np.ones((40, 40), bool), values=np.zeros((40, 40
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ({"guide": (MAP, MAP[:40, :40])}, "guide: needs a texrs.Guide, got tuple"),
-        ({"constraints": MAP}, "constraints: needs a texrs.Constraints, got ndarray"),
+        ({"guide": (MAP, MAP[:40, :40])}, "guide: must be a texrs.Guide, got tuple"),
+        ({"constraints": MAP}, "constraints: must be a texrs.Constraints, got ndarray"),
         (
             {"guide": texrs.Guide(exemplar=np.zeros((7, 1)), output=0)},
-            "guide: the map of the exemplar needs finite numbers",
+            "guide: the map of the exemplar must be finite numbers",
         ),
         (
             {"guide": texrs.Guide(exemplar=0, output=MAP)},
-            "guide: the map of the output needs finite numbers that broadcast",
+            "guide: the map of the output must be finite numbers that broadcast",
         ),
-        ({"guide": texrs.Guide(exemplar=0, output=0), "constraints": VALUES}, "guide: cannot be followed where values"),
-        ({"guide": texrs.Guide(exemplar=0.0, output=0.0), "method": "paper"}, "guide: the paper's method"),
+        ({"guide": texrs.Guide(exemplar=0, output=0), "constraints": VALUES}, "guide: cannot be combined with values"),
+        ({"guide": texrs.Guide(exemplar=0.0, output=0.0), "method": "paper"}, "guide: cannot be combined with method"),
     ],
 )
 def test_wrong_maps_get_a_sentence(more, says):
@@ -144,16 +144,16 @@ def test_wrong_maps_get_a_sentence(more, says):
         (
             texrs.Guide,
             {"exemplar": 0, "output": np.full((40, 40), np.nan)},
-            "guide: the map of the output needs finite",
+            "guide: the map of the output must be finite",
         ),
-        (texrs.Guide, {"exemplar": "up", "output": 0}, "guide: the map of the exemplar needs finite numbers"),
-        (texrs.Guide, {"exemplar": 0, "output": [[1], [1, 2]]}, "guide: the map of the output needs finite numbers"),
+        (texrs.Guide, {"exemplar": "up", "output": 0}, "guide: the map of the exemplar must be finite numbers"),
+        (texrs.Guide, {"exemplar": 0, "output": [[1], [1, 2]]}, "guide: the map of the output must be finite numbers"),
         (texrs.Guide, {"exemplar": 0, "output": 0, "weight": -1}, "weight: must be a number between 0 and 100"),
-        (texrs.Constraints, {"mask": MAP > 0}, "constraints: needs either values or coordinates"),
+        (texrs.Constraints, {"mask": MAP > 0}, "constraints: must have either values or coordinates"),
         (
             texrs.Constraints,
             {"mask": MAP > 0, "values": MAP, "coordinates": MAP},
-            "constraints: needs either values or",
+            "constraints: must have either values or",
         ),
     ],
 )

@@ -156,11 +156,11 @@ def test_a_single_index_selects_a_plane() -> None:
 @pytest.mark.parametrize(
     ("index", "says"),
     [
-        ((slice(0, 4),), "needs 3 ranges"),
-        ((slice(None, 4), slice(0, 4), slice(0, 4)), "start:stop; got :4"),
-        ((slice(0, None), slice(0, 4), slice(0, 4)), "start:stop; got 0:"),
-        ((slice(0, 4, 2), slice(0, 4), slice(0, 4)), "no step; got 0:4:2"),
-        ((slice(4, 4), slice(0, 4), slice(0, 4)), "4:4 is empty"),
+        ((slice(0, 4),), "must have 3 ranges"),
+        ((slice(None, 4), slice(0, 4), slice(0, 4)), "start:stop, .*got :4"),
+        ((slice(0, None), slice(0, 4), slice(0, 4)), "start:stop, .*got 0:"),
+        ((slice(0, 4, 2), slice(0, 4), slice(0, 4)), "without a step, got 0:4:2"),
+        ((slice(4, 4), slice(0, 4), slice(0, 4)), "empty range, got 4:4"),
         ((slice(0, 4.5), slice(0, 4), slice(0, 4)), "integers"),
         ((slice(0, 4), slice(0, 4), 10**10), "within 1000000000"),
         ((slice(0, 4), slice(0, 4), "x"), "integers and ranges"),
@@ -175,7 +175,7 @@ def test_bad_indices(index: tuple[object, ...], says: str) -> None:
 
 def test_bad_options() -> None:
     for options, says in (
-        ({"field": fields.circular(axes=2)}, "field: needs a field of 3 axes"),
+        ({"field": fields.circular(axes=2)}, "field: must be a field of 3 axes"),
         ({"cache_bytes": -1}, "cache_bytes"),
         ({"interpolation": "best"}, "interpolation"),
         ({"seed": -1}, "seed"),

@@ -105,7 +105,7 @@ def test_bend_overrules_what_the_exemplar_says(bend):
     bricks = samples.bricks((96, 96)).image
     made = texrs.synthesize(bricks, 128, field=fields.circular(axes=2), bend_patches=bend)
     assert made.report["stitched"]["bent"] == bend
-    with pytest.raises(InvalidInput, match="bend_patches: needs True, False or None, got 'no'"):
+    with pytest.raises(InvalidInput, match="bend_patches: must be True, False or None, got 'no'"):
         texrs.synthesize(bricks, 128, bend_patches="no")
 
 

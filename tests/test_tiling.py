@@ -334,7 +334,7 @@ def test_smallest_pictures(shape):
         ({"overlap": 21}, "between 1 and 20, got 21: at most half of the 40 rows"),
         ({"overlap": (4, 26)}, "between 1 and 25, got 26: at most half of the 50 columns"),
         ({"overlap": 2.5}, "overlap: must be an integer"),
-        ({"overlap": (3, 4, 5)}, "overlap: needs one number or"),
+        ({"overlap": (3, 4, 5)}, "overlap: must be one number or"),
         ({"overlap": "8"}, "overlap: must be an integer"),
         ({"overlap": True}, "overlap: must be an integer"),
         ({"size": 30, "overlap": 4}, "overlap: cannot be combined with size"),

@@ -67,31 +67,34 @@ def test_turntables_and_samples(here, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ("v.npy -o out.png --at depth=3", "--at: needs x="),
-        ("v.npy -o out.png --at plane=3.5", "--at: needs x="),
-        ("v.npy -o out.png --at 3,4", "--at: needs x="),
+        ("v.npy -o out.png --at depth=3", "--at: must be x="),
+        ("v.npy -o out.png --at plane=3.5", "--at: must be x="),
+        ("v.npy -o out.png --at 3,4", "--at: must be x="),
         ("v.npy -o out.png --at plane=99", "--at: must be an integer between -32 and 31, got 99"),
         ("v.npy -o out.png --at 99,4,3", "--at: must be an integer between -40 and 39"),
-        ("v.npy -o out.png --oblique 1,1,0", "--oblique: needs X,Y,Z/X,Y,Z"),
-        ("v.npy -o out.png --oblique /1,1", "--oblique: needs X,Y,Z/X,Y,Z"),
-        ("v.npy -o out.png --oblique /0,0,0", "--oblique: needs three numbers"),
-        ("v.npy -o out.png --oblique 900,2,1/1,0,0", "does not meet"),
-        ("v.npy -o out.png --cube --at plane=3", "--at and --cube: one of them"),
+        ("v.npy -o out.png --oblique 1,1,0", "--oblique: must be X,Y,Z/X,Y,Z"),
+        ("v.npy -o out.png --oblique /1,1", "--oblique: must be X,Y,Z/X,Y,Z"),
+        ("v.npy -o out.png --oblique /0,0,0", "--oblique: must be three numbers"),
+        ("v.npy -o out.png --oblique 900,2,1/1,0,0", "must give a cut"),
+        ("v.npy -o out.png --cube --at plane=3", "--at and --cube: cannot be combined"),
         ("v.npy -o out.png --cube --size 9", "--size: must be an integer between 16"),
         ("v.npy -o out.png --cube --interpolation best", "--interpolation: must be one of nearest"),
         (
             "v.npy -o out.png --interpolation cubic",
-            "--interpolation: needs --oblique or --cube or --turntable, got --at",
+            "--interpolation: must be used with --oblique or --cube or --turntable, got --at",
         ),
-        ("v.npy -o out.png --cube --seconds 9", "--seconds: needs --turntable, got --cube"),
-        ("v.npy -o out.png --turntable", "--turntable is written to .gif"),
-        ("v.npy -o out.gif --cube", "a picture is not written to .gif"),
-        ("v.npy -o out.jpg --cube", "out.jpg: .jpg cannot hold uint8 with 4 channels"),
+        ("v.npy -o out.png --cube --seconds 9", "--seconds: must be used with --turntable, got --cube"),
+        ("v.npy -o out.png --turntable", "--out: must end in .gif with --turntable"),
+        ("v.npy -o out.gif --cube", "--out: must not end in .gif without --turntable"),
+        ("v.npy -o out.jpg --cube", "out.jpg: .jpg cannot store uint8 with 4 channels"),
         ("v.npy -o out.tiff --cube --threads 0", "--threads"),
         ("v.npy -o none/out.png", "does not exist"),
         ("w.npy -o out.png", "does not exist"),
         ("out.png -o out.png", "out.png"),
-        ("sample:bricks -o out.png", "sample:bricks: is an image; volumes are particles, stripes, weave_solid"),
+        (
+            "sample:bricks -o out.png",
+            "sample:bricks: must be a volume, got an image; volumes are particles, stripes, weave_solid",
+        ),
         ("v.npy", "Missing option"),
     ],
 )
@@ -113,7 +116,7 @@ def test_labels_are_painted(here, capsys, dtype):
     expected = volume.label_to_color((marked != 0 if dtype == "bool" else marked).astype(np.int64))
     np.testing.assert_array_equal(iio.imread("a.png"), expected[:, 9])
     assert main(["slice", "v.npy", "-o", "b.png", "--labels"]) == 2
-    assert "v.npy: needs integers of shape" in capsys.readouterr().err
+    assert "v.npy: must be integers of shape" in capsys.readouterr().err
 
 
 def test_fields_in_words_and_in_files(here):
@@ -125,9 +128,9 @@ def test_fields_in_words_and_in_files(here):
     np.savez("two.npz", frames, frames)
     np.savez("flat.npz", frames * 0)
     for text, extent, says in (
-        ("round", size, "--field: there is no 'round'"),
-        ("rotation_3d", size[:2], "--field: rotation_3d is for volumes"),
-        ("two.npz", size, "two.npz: needs a single array, or one with the key"),
+        ("round", size, "--field: must be one of identity"),
+        ("rotation_3d", size[:2], "--field: rotation_3d is only available for volumes"),
+        ("two.npz", size, "two.npz: must contain a single array, or one with the key"),
         ("flat.npz", size, "flat.npz: the frame at"),
         ("frames.npz", size[:2], "frames.npz: holds (2, 2, 2, 3, 3), a field of 3 axes; 2 are needed"),
         ("none.npz", size, "none.npz: does not exist"),

@@ -99,7 +99,7 @@ def test_labels_are_not_mixed() -> None:
     assert result.report["labels"]
     assert result.report["screening"] == 0
     assert set(np.unique(result.image)) <= set(np.unique(labels[~hole]))
-    with pytest.raises(InvalidInput, match="screening: labels cannot be mixed"):
+    with pytest.raises(InvalidInput, match="screening: must be omitted or 0 for labels"):
         texrs.inpaint(labels, hole, screening=0.1)
 
 
@@ -149,9 +149,9 @@ def test_holes_of_any_shape() -> None:
     [
         ({"mask": np.ones((40, 40, 40), bool)}, "mask: "),
         ({"mask": np.ones((40, 40, 4), bool)}, "mask: "),
-        ({"scale_map": "auto"}, "scale_map: is for pictures"),
-        ({"method": "optimise"}, "method: is for pictures"),
-        ({"wrap": True}, "wrap: is for pictures"),
+        ({"scale_map": "auto"}, "scale_map: only available for images"),
+        ({"method": "optimise"}, "method: only available for images"),
+        ({"wrap": True}, "wrap: only available for images"),
         ({"patch_size": 3}, "patch_size: "),
         ({"patch_size": 41}, "patch_size: "),
         ({"screening": -1}, "screening: "),
@@ -177,4 +177,4 @@ def test_the_command_fills_volumes(tmp_path: Path, capsys: pytest.CaptureFixture
     np.testing.assert_array_equal(io.read_volume(names[2]), texrs.inpaint(volume, hole).image)
     assert io.read_spacing(names[2]) == (3, 1, 0.5)
     assert main(["inpaint", names[0], names[1], "-o", names[2], "--wrap", "x", "-q"]) == 2
-    assert "--wrap: is for pictures; leave it out for a volume" in capsys.readouterr().err
+    assert "--wrap: only available for images; omit it for a volume" in capsys.readouterr().err

@@ -26,7 +26,7 @@ def test_slices_are_read_in_the_order_of_their_numbers(tmp_path, suffix):
     write_slices(tmp_path / "scan", volume, suffix)
     np.testing.assert_array_equal(tio.read_volume(tmp_path / "scan"), volume)
     assert tio.read_spacing(tmp_path / "scan") is None
-    with pytest.raises(FileError, match="is a slices file, which holds a volume"):
+    with pytest.raises(FileError, match="is a slices file, which contains a volume"):
         tio.read(tmp_path / "scan")
 
 
@@ -188,7 +188,7 @@ def test_commands_read_folders_and_headerless_samples(tmp_path, capsys, monkeypa
         assert main(["solid", name, "-o", "a.tif", "--size", "20", "--quality", "fast", "--force", "-q"]) == 0
         assert tio.read_volume("a.tif").shape == (20, 20, 20)
     assert main(["solid", "scan.raw:28x24x20:uint16:big", "-o", "scan.raw", "--size", "20", "-q"]) == 2
-    assert "scan.raw is read" in capsys.readouterr().err
+    assert "scan.raw is an input" in capsys.readouterr().err
     # What a format cannot state is reported.
     tio.write_volume("b.nrrd", volume, spacing=(2, 1, 1))
     assert main(["solid", "b.nrrd", "-o", "b.npy", "--size", "20", "--quality", "fast"]) == 0

@@ -110,17 +110,17 @@ def test_transfer_functions() -> None:
 @pytest.mark.parametrize(
     ("transfer", "words"),
     [
-        ("0:own", "needs VALUE:COLOUR:ALPHA"),
-        ("a:own:1", "needs VALUE:COLOUR:ALPHA"),
-        ("0:red:1", "needs a colour such as #cc3322"),
-        ("0:#12345:1", "needs a colour such as #cc3322"),
+        ("0:own", "must be VALUE:COLOUR:ALPHA"),
+        ("a:own:1", "must be VALUE:COLOUR:ALPHA"),
+        ("0:red:1", "must have a colour such as #cc3322"),
+        ("0:#12345:1", "must have a colour such as #cc3322"),
         ("0:own:2", "transfer"),
         ("2:own:1", "transfer"),
-        ("0.5:own:0,0.2:own:1", "needs rising values, got 0.5, 0.2"),
-        ([], "needs 1 to 256 stops"),
-        ([0.5], r"needs \(value, colour, alpha\), got 0.5"),
-        (7, "needs 1 to 256 stops"),
-        ([(0, (1, 2), 1)], "needs a colour"),
+        ("0.5:own:0,0.2:own:1", "must have rising values, got 0.5, 0.2"),
+        ([], "must be 1 to 256 stops"),
+        ([0.5], r"must be \(value, colour, alpha\), got 0.5"),
+        (7, "must be 1 to 256 stops"),
+        ([(0, (1, 2), 1)], "must have a colour"),
         ([(0, (1, 2, 300), 1)], "transfer"),
     ],
 )
@@ -136,7 +136,7 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     wanted = volume.render_volume(PARTICLES.image, 64, transfer="0:own:0,0.3:#ff8800:0.1")
     assert_array_equal(io.read(tmp_path / "a.png"), wanted)
     assert main([*words, "--transfer", "0.3"]) == 2
-    assert "needs VALUE:COLOUR:ALPHA" in capsys.readouterr().err
+    assert "must be VALUE:COLOUR:ALPHA" in capsys.readouterr().err
     assert main([*words, "--cube"]) == 2
     assert main(["slice", f"{tmp_path}/a.npy", "-o", f"{tmp_path}/b.png", "--transfer", "0:own:1"]) == 2
     np.save(tmp_path / "labels.npy", PARTICLES.labels % 50)

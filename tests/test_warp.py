@@ -103,7 +103,7 @@ def test_bad_warps() -> None:
     ):
         with pytest.raises(InvalidInput, match=words):
             from_points(source, target, (10, 10))  # type: ignore[arg-type]
-    with pytest.raises(InvalidInput, match="two or more"):
+    with pytest.raises(InvalidInput, match="at least two"):
         mesh(np.zeros((1, 5, 2)))
     with pytest.raises(InvalidInput, match="finite"):
         mesh(np.full((4, 4, 2), np.nan))

@@ -48,7 +48,7 @@ MOST_CHANNELS = 4
 NAMES: set[str] = set()
 """Names of all commands."""
 PYTHON = {
-    r"texrs\.io\.read_volume reads \w+(?: as a volume)?": "texrs slice and texrs solid take volumes",
+    r"read (?:it|them) with texrs\.io\.read_volume": "use texrs slice or texrs solid",
     r"a mask, 'alpha', or an image that is a masked array": "a mask, or 'alpha'",
 }
 """Python words of errors and help texts, and the words of the command line."""

@@ -245,7 +245,7 @@ def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> Non
             old = read_status(file)
             for name, status in found:
                 if old is not None and os.path.samestat(old, status):
-                    known = "" if name == file else f" as {name}"
+                    known = "" if name == file else f" ({name})"
                     raise InvalidInput(
                         f"{as_flag(option)}: {file} is an input{known}, and would be lost; write to another file"
                     )

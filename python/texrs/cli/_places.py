@@ -187,10 +187,10 @@ def _find_fault(points: np.ndarray, size: Sequence[int]) -> str:
     # Corners are placed by hand, so they may be on the border itself.
     outside = ((points < -1) | (points > np.asarray(size[:2]))).any(axis=1)
     if outside.any():
-        return f"{outside.sum()} of the four leave the picture"
+        return f"{outside.sum()} of the four leave the image"
     sides = np.roll(points, -1, axis=0) - points
     after = np.roll(sides, -1, axis=0)
     turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
     if np.all(turns > 0) or np.all(turns < 0):
         return ""
-    return "the sides cross, or the shape is not convex: give the corners in the order in which one goes around"
+    return "the sides cross, or the shape is not convex: give the corners in order around it"

@@ -312,7 +312,7 @@ def _find_other(running: Record, path: str) -> str:
     """Return why an existing file is not this command's own."""
     made = io.read_metadata(path).made
     if made is None:
-        return "is there already, and no texrs command says that it made it"
+        return "exists, and was not written by a texrs command"
     if not is_unchanged(path, made):
         return "was changed since texrs made it"
     said = json.loads(made)

@@ -96,7 +96,7 @@ class Arguments:
 
 def as_box(value: object, shape: Shape, name: str = "box") -> Box:
     """Check a box (row, column, height, width): centre and size, inside the image."""
-    wanted = f"{name}: needs (row, column, height, width), the centre and the size of a box in pixels"
+    wanted = f"{name}: must be (row, column, height, width), the centre and the size of a box in pixels"
     numbers = try_array(value, np.float64)
     if numbers.shape != (4,) or not np.isfinite(numbers).all():
         raise InvalidInput(f"{wanted}, got {value!r}")
@@ -117,7 +117,7 @@ def as_box(value: object, shape: Shape, name: str = "box") -> Box:
 
 def as_points(value: object, shape: Shape, name: str) -> Points:
     """Check a list of points (row, column): inside the image, finite and different."""
-    wanted = f"{name}: needs points (row, column), shape (n, 2)"
+    wanted = f"{name}: must be points (row, column), shape (n, 2)"
     try:
         points = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError, MemoryError):

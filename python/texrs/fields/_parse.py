@@ -85,7 +85,7 @@ def parse(
     >>> fields.parse("zigzak")
     Traceback (most recent call last):
         ...
-    texrs.errors.InvalidInput: field: there is no 'zigzak'; did you mean zigzag? Known are identity, ...
+    texrs.errors.InvalidInput: field: must be one of identity, ...; got 'zigzak'; did you mean zigzag?
 
     """
     if not isinstance(text, str):
@@ -93,8 +93,8 @@ def parse(
     name, _, rest = text.strip().partition(":")
     if name not in _KNOWN:
         near = get_close_matches(name, _KNOWN, 1)
-        hint = f"; did you mean {near[0]}? Known are" if near else "; known are"
-        raise InvalidInput(f"field: there is no {name!r}{hint} {', '.join(_KNOWN)}")
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InvalidInput(f"field: must be one of {', '.join(_KNOWN)}; got {name!r}{hint}")
     make, options = _KNOWN[name], {}
     allowed = _list_parameters(make)
     for part in rest.split(",") if rest.strip() else []:

@@ -346,7 +346,7 @@ def write(
     ...     write(pathlib.Path(folder, "height.png"), np.zeros((2, 2), np.float32))
     Traceback (most recent call last):
         ...
-    texrs.errors.InvalidInput: array: .png cannot hold float32 with 1 channel; .exr, ... can
+    texrs.errors.InvalidInput: array: .png cannot store float32 with 1 channel; use one of .exr, ...
 
     """
     if description is not None and not (isinstance(description, str) and description.isascii()):

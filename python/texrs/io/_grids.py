@@ -34,7 +34,7 @@ def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
         shape = header.shape
         if len(shape) not in (axes, axes + 1):
             what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
-            hint = "; texrs.io.read_volume reads volumes" if axes == 2 and len(shape) == 4 else ""
+            hint = "; read it with texrs.io.read_volume" if axes == 2 and len(shape) == 4 else ""
             raise FileError(f"{name}: contains an array of shape {shape}; {what}{hint}")
         channels = shape[axes] if len(shape) > axes else 1
         if channels > _MOST_CHANNELS:
