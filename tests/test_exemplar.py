@@ -108,7 +108,7 @@ def test_damaged_files_are_refused(tmp_path):
         (WEAVE, {"axes": 4}, "axes: must be an integer between 2 and 3"),
         (WEAVE, {"labels": True}, "labels: must have one channel, got 3"),
         (WEAVE, {"repeat": "xyz"}, "repeat: must be True, False or 2"),
-        (np.full((20, 20), np.nan), {}, "image: 400 of 400 values are NaN"),
+        (np.full((20, 20), np.nan), {}, "image: must be finite, but 400 of 400 values are NaN"),
     ],
 )
 def test_bad_input_gets_a_sentence(image, options, says):

@@ -274,7 +274,7 @@ def narrowing(points):
         (lambda: fields.from_function(3), "function: must be a function"),
         (lambda: fields.from_function(lambda p: 1 / 0).frames((0, 0, 0)), "failed with ZeroDivisionError"),
         (lambda: fields.from_function(lambda p: p).frames((0, 0, 0)), "got float64 of shape"),
-        (lambda: fields.from_function(lambda p: "no").frames((0, 0, 0)), "gave"),
+        (lambda: fields.from_function(lambda p: "no").frames((0, 0, 0)), "must return numbers"),
         (lambda: fields.from_function(narrowing).frames((3, 4, 10)), r"\(3, 4, 10\) is flat"),
         (lambda: fields.identity().frames((1, 2)), "points: must be numbers of shape"),
         (lambda: fields.identity().frames((1, 2, np.nan)), "points: must be finite, but 1 of 3 values"),

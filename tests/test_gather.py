@@ -142,5 +142,5 @@ def test_sums_beyond_the_largest_float_are_kept_as_they_come():
 
 def test_what_is_nowhere_finite_is_refused():
     for interpolation in ("nearest", "linear", "cubic"):
-        with pytest.raises(InvalidInput, match=r"^exemplars: 36 of 36 values"):
+        with pytest.raises(InvalidInput, match=r"^exemplars: must be finite, but 36 of 36 values"):
             gather(np.full((6, 6), np.nan), [[2.5, 2.25]], interpolation=interpolation)

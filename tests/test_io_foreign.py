@@ -270,7 +270,7 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
     ("value", "axes", "words"),
     [
         (np.zeros((4, 4)), 3, "field: must be a field of 3 axes, got ndarray"),
-        (np.zeros((4, 4, 4, 4)), 3, r"field: must be directions, \(R, C, 2\) or \(P, R, C, 3\), or frames"),
+        (np.zeros((4, 4, 4, 4)), 3, r"field: must be directions \(R, C, 2\), \(P, R, C, 3\) or frames"),
         (np.ones((4, 4, 2)), 3, r"field: must have 3 axes, got shape \(4, 4, 2\), a field of 2 axes"),
         (np.zeros((4, 4, 4, 3)), 3, "directions: must not all have length 0"),
         (7, 3, "field: must be a field of 3 axes, got int"),

@@ -172,7 +172,7 @@ def test_bad_ways_to_save_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="mipmaps: must be True or False"):
         stones.save(tmp_path, mipmaps=3)  # type: ignore[arg-type]
     (tmp_path / "mipmaps").write_text("mine")
-    with pytest.raises(FileError, match="is not a folder"):
+    with pytest.raises(FileError, match="must be a folder"):
         stones.save(tmp_path, mipmaps=True)
     assert (tmp_path / "mipmaps").read_text() == "mine"
     assert list(tmp_path.iterdir()) == [tmp_path / "mipmaps"]

@@ -77,7 +77,7 @@ def test_one_pixel_has_a_scale() -> None:
         ({"tilt": np.inf}, r"^tilt: .* got inf$"),
         ({"tilt": "up"}, r"^tilt: must be a number .* got 'up'$"),
         ({"fov": 180}, r"^fov: must be a number between 1 and 170, got 180$"),
-        ({"slant": 80, "fov": 90}, r"^slant: at 80 degrees the plane's horizon is inside an image with a fov of 90"),
+        ({"slant": 80, "fov": 90}, r"^slant: at 80 degrees the horizon is inside an image with a fov of 90"),
         ({"shape": (0, 5)}, r"^shape: each side must be at least 1"),
         ({"shape": (2**20, 2**20)}, r"^shape: .* more than the limit"),
     ],

@@ -118,7 +118,7 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
         ("--auto --tilt 3", "--tilt: must be used with --slant, got --auto"),
         ("--slant 3 --hole hole.png", "--hole: must be used with --mask or --auto, got --slant"),
         ("--slant 89", "--slant: must be a number between 0 and 85.0, got 89.0"),
-        ("--slant 80 --fov 100", "--slant: at 80 degrees the plane's horizon is inside"),
+        ("--slant 80 --fov 100", "--slant: at 80 degrees the horizon is inside"),
         ("--mask small.png", "--mask: must have the size of the image, 128 x 96; got 8 x 8"),
         ("--auto --hole small.png", "--hole: must have the size of the image, 128 x 96; got 8 x 8"),
         ("--mask mask.png --window 3", "--window: must be an integer between 16 and 128, got 3"),

@@ -262,9 +262,9 @@ BLANK = np.zeros((64, 64), bool)
 @pytest.mark.parametrize(
     ("mask", "options", "message"),
     [
-        (BLANK, {}, r"^mask: marks nothing, so there are no features to count; mark the elements"),
-        (~BLANK, {}, r"^mask: marks every pixel, so there are no features to count"),
-        (BLANK, {"measure": "area"}, r"^mask: marks nothing"),
+        (BLANK, {}, r"^mask: must show features to count, but it marks nothing; mark the elements"),
+        (~BLANK, {}, r"^mask: must show features to count, but it marks every pixel"),
+        (BLANK, {"measure": "area"}, r"^mask: must show features to count, but it marks nothing"),
         (np.arange(64) < np.full((64, 1), 30), {}, r"^mask: has too few features to count in windows of \d+ pixels"),
         (np.arange(64) < np.full((64, 1), 30), {"measure": "count"}, r"^mask: has too few features"),
         (np.ones((64, 64)), {}, r"^mask: must be bool or integers, got dtype float64$"),
@@ -272,7 +272,7 @@ BLANK = np.zeros((64, 64), bool)
         (np.eye(12, dtype=bool), {}, r"^mask: each side must be at least 16, got \(12, 12\)$"),
         (TILES.mask, {"known": BLANK}, r"^known: must have shape \(256, 256\), got \(64, 64\)$"),
         (TILES.mask, {"known": np.zeros((256, 256), bool)}, r"^known: must mark at least one pixel, got none$"),
-        (TILES.mask, {"known": TILES.mask}, r"^mask: marks every pixel"),
+        (TILES.mask, {"known": TILES.mask}, r"^mask: must show features to count, but it marks every pixel"),
         (TILES.mask, {"window": 8}, r"^window: must be an integer between 16 and 256, got 8$"),
         (TILES.mask, {"measure": "volume"}, r"^measure: must be one of boundary, skeleton, count, area; got 'volume'$"),
         (TILES.mask, {"trend": "cubic"}, r"^trend: must be one of none, plane, linear, quadratic; got 'cubic'$"),
@@ -286,9 +286,9 @@ def test_masks_without_features_are_refused(mask: np.ndarray, options: dict, mes
 @pytest.mark.parametrize(
     ("image", "options", "message"),
     [
-        (np.full((64, 64, 3), 90, np.uint8), {}, r"^image: has one colour, so there are no features"),
+        (np.full((64, 64, 3), 90, np.uint8), {}, r"^image: must have more than one colour"),
         (np.zeros((8, 64)), {}, r"^image: each side must be at least 16, got \(8, 64\)$"),
-        (np.full((64, 64), np.nan), {}, r"^image: 4096 of 4096 values are NaN"),
+        (np.full((64, 64), np.nan), {}, r"^image: must be finite, but 4096 of 4096 values are NaN"),
         (TILES.image, {"known": BLANK}, r"^known: must have shape \(256, 256\), got \(64, 64\)$"),
         (TILES.image, {"known": np.zeros((256, 256), bool)}, r"^known: must mark at least one pixel"),
         (TILES.image, {"min_feature_size": 0}, r"^min_feature_size: must be a number between 0.5 and 64.0, got 0$"),

@@ -99,8 +99,8 @@ def test_the_command_takes_a_plan(tmp_path, monkeypatch):
     ("options", "message"),
     [
         ({"patches": "fly"}, "^patches: "),
-        ({"patches": "large", "quality": "fast"}, "^patches: quality='fast' puts no patches together"),
-        ({"patches": "auto", "method": "paper"}, "^patches: method='paper' puts no patches together"),
+        ({"patches": "large", "quality": "fast"}, "^patches: cannot be combined with quality='fast'"),
+        ({"patches": "auto", "method": "paper"}, "^patches: cannot be combined with method='paper'"),
     ],
 )
 def test_plans_are_checked(beans, options, message):

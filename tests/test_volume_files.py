@@ -289,7 +289,7 @@ def nifti(dims=(3, 2, 2, 2), code=2, bits=8, magic=b"n+1\0", offset=352.0, tail=
         ("a.nrrd", header(sizes="2 -2 -2") + bytes(8), FileError, "contains no voxels|corrupt"),
         ("a.nrrd", header(sizes="9999 9999 9999"), LimitExceeded, "more than the limit"),
         ("a.nrrd", header(sizes="9999 9999 9999", encoding="gzip"), LimitExceeded, "more than the limit"),
-        ("a.nrrd", header(dimension=4, sizes="65 2 2 2") + bytes(520), FileError, "65 channels"),
+        ("a.nrrd", header(dimension=4, sizes="65 2 2 2") + bytes(520), FileError, "64 channels, got 65"),
         ("a.nrrd", header(dimension=5, sizes="2 2 2 2 2") + bytes(32), FileError, "5 axes"),
         ("a.nrrd", header(byte_skip=-1) + bytes(8), FileError, "skips"),
         ("a.nrrd", header(encoding="gzip") + bytes(8), FileError, "corrupt"),

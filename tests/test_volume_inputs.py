@@ -112,8 +112,8 @@ def test_samples_without_a_header_need_what_they_are(tmp_path):
     ):
         tio.read_volume(f"{scan}:96x96x96")
     for options, says in (
-        ({"shape": (96, 96, 96)}, "dtype: is needed with shape"),
-        ({"dtype": "uint8"}, "shape: is needed with dtype"),
+        ({"shape": (96, 96, 96)}, "dtype: must be given with shape"),
+        ({"dtype": "uint8"}, "shape: must be given with dtype"),
         ({"shape": (96, 96), "dtype": "uint8"}, "shape: "),
         ({"shape": (96, 96, 0), "dtype": "uint8"}, "shape: "),
         ({"shape": (96, 96, 96), "dtype": "rgb"}, "dtype: must be one of uint8"),

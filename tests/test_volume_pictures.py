@@ -186,7 +186,7 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
         (lambda p: volume.turntable(VOLUME, p / "a.gif", frames=100, size=1024), "more than 67108864 pixels"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", background=(1, 2)), "background"),
         (lambda p: volume.turntable(VOLUME, p / "none" / "a.gif", size=16), "does not exist"),
-        (lambda p: volume.label_to_color(np.zeros((4, 4))), "labels: needs integers"),
+        (lambda p: volume.label_to_color(np.zeros((4, 4))), "labels: must be integers"),
         (lambda p: volume.label_to_color([[0, -1]]), "at least 0, got -1"),
         (lambda p: volume.label_to_color([[0, 2]], [(0, 0, 0)]), "must be less than 1, the number of colours"),
         (lambda p: volume.label_to_color([[0, 2]], [(0, 0, 300)]), "from 0 to 255"),

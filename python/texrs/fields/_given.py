@@ -101,8 +101,8 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
         field = from_array(given, extent if extent is None or len(extent) == count else None)
     else:
         raise InvalidInput(
-            "must be directions, (R, C, 2) or (P, R, C, 3), or frames, (R, C, 2, 2) or (P, R, C, 3, 3); "
-            f"got {given.dtype} of shape {given.shape}"
+            "must be directions (R, C, 2), (P, R, C, 3) or frames (R, C, 2, 2), (P, R, C, 3, 3); "
+            f"got {given.dtype} of {given.shape}"
         )
     if axes is not None and field.axes != as_axes(axes):
         raise InvalidInput(f"must have {axes} axes, got shape {given.shape}, a field of {field.axes} axes")

@@ -90,8 +90,8 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
         scale = 1 - far * (tan(lean) / focal)
         if scale.min() < MIN_SCALE:
             raise InvalidInput(
-                f"slant: at {slant:g} degrees the plane's horizon is inside an image with a fov of {fov:g}; "
-                "reduce the slant or the fov, or crop the image"
+                f"slant: at {slant:g} degrees the horizon is inside an image with a fov of {fov:g}; "
+                "reduce slant or fov, or crop the image"
             )
     return ScaleMap(scale.astype(np.float32), "width")
 

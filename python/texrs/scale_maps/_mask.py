@@ -129,7 +129,7 @@ def _refuse_bare(mask: Bools, known: Bools | None) -> None:
     if marked in (0, total):
         what = "marks nothing" if marked == 0 else "marks every pixel"
         raise InvalidInput(
-            f"mask: {what}, so there are no features to count; mark the elements or the gaps between them, or use angles"
+            f"mask: must show features to count, but it {what}; mark the elements or the gaps between them, or use angles"
         )
 
 
