@@ -142,7 +142,7 @@ pub fn encode(
     let unheld = || {
         Error::value(
             "pixels",
-            format!("{format:?} cannot hold {channels} channels of {sample:?}"),
+            format!("must be storable as {format:?}, got {channels} channels of {sample:?}"),
         )
     };
     let color = color(format, sample, channels).ok_or_else(unheld)?;
@@ -196,7 +196,7 @@ fn rgbe(name: &str, metadata: &hdr::HdrMetadata) -> Result<()> {
     match format {
         Some((_, format)) if format.trim() != "32-bit_rle_rgbe" => Err(fail(
             name,
-            format!("Radiance samples of format {format:?} are not read, only 32-bit_rle_rgbe"),
+            format!("must have Radiance samples of format 32-bit_rle_rgbe, got {format:?}"),
         )),
         _ => Ok(()),
     }
@@ -309,7 +309,7 @@ impl Budget<'_> {
             ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => Sample::U16,
             ColorType::Rgb32F | ColorType::Rgba32F => Sample::F32,
             other => {
-                let message = format!("samples of type {other:?} are not read");
+                let message = format!("must have samples of 8 or 16 bit, or floats, got {other:?}");
                 return Err(fail(self.name, message));
             }
         };
