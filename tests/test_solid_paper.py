@@ -75,7 +75,7 @@ def test_labels_thin_volumes_and_other_channels():
 def test_what_it_does_not_do():
     weave = samples.weave((64, 64)).image
     given = texrs.Constraints(mask=np.ones((32, 32), bool), values=weave[:32, :32])
-    with pytest.raises(InvalidInput, match="constraints: the paper's method knows none"):
+    with pytest.raises(InvalidInput, match="constraints: cannot be combined with method='paper'"):
         texrs.synthesize(weave, 32, method="paper", constraints=given)
     with pytest.raises(InvalidInput, match="method: must be one of None, 'paper', 'paper-compensated'"):
         texrs.synthesize(weave, 32, method="su")

@@ -84,6 +84,7 @@ def write_shapes(
     files: dict[FilePath, bytes] = {}
     for number, (name, picture) in enumerate(pictures.items()):
         coded = encode(name, picture, "png")
+        # A .gltf file names files of images. A .glb file contains them.
         if suffix == ".gltf":
             beside = target.with_name(f"{target.stem}_{name}.png")
             files[beside] = coded
@@ -92,7 +93,6 @@ def write_shapes(
             image = {"bufferView": len(document["bufferViews"]), "mimeType": "image/png"}
             document["bufferViews"].append({"buffer": 0, "byteOffset": len(data), "byteLength": len(coded)})
             data += pad(coded, b"\0")
-        # A .gltf file names files of images. A .glb file contains them.
         document["images"].append({"name": name, **image})
         document["textures"].append({"sampler": 0, "source": number, "name": name})
     if not pictures:

@@ -319,7 +319,9 @@ def check_turntable(
     count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
     above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
     if count * side * side > _MOST:
-        raise LimitExceeded(f"frames, size: {count} pictures of {side} x {side} are more than {_MOST} pixels in all")
+        raise LimitExceeded(
+            f"frames, size: must have at most {_MOST} pixels in total, got {count} images of {side} x {side}"
+        )
     return count, side, above, period
 
 
@@ -374,7 +376,7 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
 def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
     """Return the steps of rows and columns on a plane, (2, 3): the given ones, or unit steps across a normal."""
     if (normal is None) == (axes is None):
-        raise InvalidInput("normal, axes: must be one of the two")
+        raise InvalidInput("normal, axes: must be given one without the other")
     if axes is not None:
         steps = try_array(axes, np.float64)
         if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
