@@ -3,10 +3,10 @@
     python benches/blind_pages.py OUT PICTURE ... --resynthesizer PROGRAM [--seed 1]
     python benches/blind_pages.py OUT --votes votes.json
 
-The first makes `OUT/NAME.png` for each picture, the exemplar in the middle of results A and B, and `OUT/key.json`, which is not
-to be read. Exemplars are the middles of the pictures, results twice as large a side. The second compares `{"NAME": "A" |
-"B" | "="}` with the key, and prints who was chosen. The program is that of `synthesize_table.py`; what was made before is
-used again, so that pages can be made anew when ours has changed.
+The first form writes `OUT/NAME.png` for each picture, with the exemplar between results A and B, and the hidden key
+`OUT/key.json`. Exemplars are the middles of the images, and results have twice the side. The second form compares
+`{"NAME": "A" | "B" | "="}` with the key, and prints the chosen programs. PROGRAM is the same as for
+`synthesize_table.py`. Existing results are used again, so that pages can be updated if only texrs has changed.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from synthesize_table import by_resynthesizer, middle
 from texrs import io
 
 GAP = 12
-"""Pixels between the pictures of a page."""
+"""Pixels between the images of a page."""
 
 
 def page(exemplar: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return the three side by side, on white."""
+    """Return the three images side by side, on white."""
     pictures = [p if p.ndim == 3 else np.repeat(p[..., None], 3, axis=2) for p in (left, exemplar, right)]
     rows = max(p.shape[0] for p in pictures)
     sheet = np.full((rows, sum(p.shape[1] + GAP for p in pictures) - GAP, 3), 255, np.uint8)
@@ -39,7 +39,7 @@ def page(exemplar: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarra
 
 
 def make(options: argparse.Namespace) -> None:
-    """Make the pages and their key."""
+    """Write the pages and their key."""
     options.out.mkdir(parents=True, exist_ok=True)
     key = {}
     order = np.random.default_rng()
@@ -60,7 +60,7 @@ def make(options: argparse.Namespace) -> None:
 
 
 def reveal(options: argparse.Namespace) -> None:
-    """Print who was chosen."""
+    """Print the chosen programs."""
     key = json.loads((options.out / "key.json").read_text(encoding="utf-8"))
     votes = json.loads(options.votes.read_text(encoding="utf-8"))
     chosen = {name: "equal" if vote == "=" else key[name][vote] for name, vote in votes.items()}
@@ -72,7 +72,7 @@ def reveal(options: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    """Make pages, or compare votes with their key."""
+    """Write pages, or compare votes with their key."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("pictures", type=Path, nargs="*")

@@ -2,9 +2,9 @@
 
     python benches/cancel_table.py [VERB ...]
 
-In seconds of processor time, for wall time hangs on what else the machine does; with one thread, so that the two are alike.
-Last comes the longest that a verb went on once it was told to stop, where each of its stages had begun. Pictures are new to
-a verb that is measured, for what was found of one is kept.
+Times are seconds of one thread's processor time, because wall time depends on other work of the machine. The last row
+is the longest time that a verb continued after a request to stop in each of its stages. Each measured verb gets new
+images, because results for an image are cached.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ import texrs
 
 SIDE, SIZE = 192, 384
 SHOWN = 0.05
-"""Seconds below which a gap has no row of its own."""
+"""Minimum seconds of a gap with its own row."""
 Call = Callable[[Any], object]
 
 
 class Given:
-    """What verbs are given: pictures of a number, of which nothing is known yet."""
+    """Inputs of verbs: images with a number, which are not in any cache."""
 
     def __init__(self, number: int) -> None:
         self.picture = np.roll(texrs.samples.pebbles((SIDE, SIDE)).image, 3 * number, (0, 1))
-        # What stands aslant may not go up or down.
+        # Slanting examples may not be moved up or down.
         self.floor = np.roll(texrs.samples.tilted_discs((SIDE, SIDE)).image, 3 * number, 1)
         self.volume = np.roll(texrs.samples.particles((48, 48, 48)).image, number, (0, 1, 2))
         self.hole = np.zeros((SIDE, SIDE), np.bool_)
@@ -42,7 +42,7 @@ class Given:
 
     @functools.cached_property
     def base(self) -> texrs.TextureDatabase:
-        """A database of two."""
+        """Return a database of two textures."""
         base = texrs.TextureDatabase(f"{self.folder}/two")
         base.add(self.picture, "a")
         base.add(self.turned, "b")
@@ -50,17 +50,17 @@ class Given:
 
     @functools.cached_property
     def made(self) -> texrs.Synthesis:
-        """A result, of seams."""
+        """Return a result with seams."""
         return texrs.synthesize(self.picture, SIZE)
 
     @functools.cached_property
     def material(self) -> texrs.Material:
-        """Two maps."""
+        """Return a material of two maps."""
         return texrs.Material({"albedo": self.picture, "height": self.picture[..., 0].copy()})
 
     @functools.cached_property
     def ball(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Corners and triangles."""
+        """Return vertices and triangles."""
         import trimesh
 
         ball = trimesh.creation.icosphere(subdivisions=4)
@@ -68,27 +68,27 @@ class Given:
 
     @functools.cached_property
     def light(self) -> NDArray[np.float32]:
-        """The picture in single precision, larger."""
+        """Return the image in single precision, larger."""
         return (np.tile(self.picture, (4, 4, 1)) / np.float32(255)).astype(np.float32)
 
     @functools.cached_property
     def turned(self) -> NDArray[np.uint8]:
-        """The picture, by a quarter."""
+        """Return the image, rotated by a quarter turn."""
         return np.rot90(self.picture).copy()
 
     @functools.cached_property
     def seeds(self) -> list[dict[str, int]]:
-        """Items to make."""
+        """Return the items to compute."""
         return [{"seed": seed} for seed in range(3)]
 
 
 def bind(function: Callable[..., Any], *arguments: object, **options: object) -> Call:
-    """Return a call that lacks its progress alone."""
+    """Return a call that lacks only its progress argument."""
     return lambda watch: function(*arguments, progress=watch, **options)
 
 
 def list_variants(*arguments: Any, **options: Any) -> list[texrs.Synthesis]:
-    """Make variants, which come one by one."""
+    """Compute variants, which are returned one by one."""
     return list(texrs.design_variants(*arguments, **options))
 
 
@@ -140,12 +140,12 @@ VERBS: dict[str, Callable[[Given], Call]] = {
 
 
 def in_one_stage(watch: Callable[[str, float], object] | None) -> Callable[[float], object] | None:
-    """Return what is called with a share alone."""
+    """Return a callback that gets only a share."""
     return None if watch is None else lambda share: watch("all", share)
 
 
 def measure(call: Call) -> tuple[dict[str, float], list[str]]:
-    """Return the longest gap that ended in each stage, and the stages."""
+    """Return the longest gap at the end of each stage, and the stages."""
     longest: dict[str, float] = {}
     stages: list[str] = []
     last, before = time.process_time(), "begin"
@@ -165,7 +165,7 @@ def measure(call: Call) -> tuple[dict[str, float], list[str]]:
 
 
 def measure_stop(call: Call, stage: str) -> float:
-    """Return for how long a call goes on that is told to stop the second time that a stage says where it is, if it does."""
+    """Return how long a call continues after a request to stop at the second report of a stage, if it stops."""
     seen, told = 0, 0.0
 
     def watch(now: str, share: float) -> None:
@@ -183,12 +183,12 @@ def measure_stop(call: Call, stage: str) -> float:
 
 
 def main(words: list[str]) -> None:
-    """Print a row for each stage of each verb in which a gap is above a twentieth of a second."""
+    """Print a row for each stage of each verb with a gap above 0.05 s."""
     warnings.simplefilter("ignore")
     print("| verb | stage | longest gap, processor s |\n|---|---|---|")
     for name in words or VERBS:
         with texrs.threads(1):
-            VERBS[name](Given(0))(None)  # So that its libraries are loaded.
+            VERBS[name](Given(0))(None)  # Load its libraries.
             found, stages = measure(VERBS[name](Given(1)))
             told = [(measure_stop(VERBS[name](Given(2 + n)), stage), stage) for n, stage in enumerate(stages)]
             stop = max(told, default=(0.0, "none"))

@@ -2,7 +2,7 @@
 
 python benches/design_speed.py [--rounds 3] [--threads N] [--quick]
 
-The exemplar is 256 x 256 pixels of the sample "pebbles". `--quick` leaves the 4096 x 4096 texture out.
+The exemplar is the sample "pebbles" of 256 x 256 pixels. `--quick` skips the texture of 4096 x 4096 pixels.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def timed(task: Callable[[], object]) -> float:
 
 
 class Stages:
-    """Seconds of each stage of a call, from what `progress` is told."""
+    """Seconds of each stage of a call, measured by its progress reports."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -44,7 +44,7 @@ class Stages:
 
 
 def peak() -> float:
-    """Return the peak of resident memory so far, in MiB."""
+    """Return the peak resident memory so far, in MiB."""
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most / (2**20 if sys.platform == "darwin" else 2**10)
 
@@ -72,7 +72,7 @@ def run(image: np.ndarray, options: argparse.Namespace) -> None:
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} at the start; medians of {options.rounds}\n")
     tasks: dict[str, Callable[[], object]] = {
-        # One variant costs about the same whatever else is made: the difference of two and one is a further one.
+        # The cost of one further variant is the difference between two variants and one.
         "one 256^2 texture of 1 tile": lambda: texrs.design(image, 256, copies=1),
         "one 256^2 texture of 2 tiles": lambda: texrs.design(image, 256, copies=2),
         "1024^2, cyclic, 8 tiles": lambda: texrs.design(image, 1024, copies=8),

@@ -2,8 +2,8 @@
 
     TEXRS_TEXTURES=<folder> python benches/design_table.py [--seeds 3] [--size 2x] [--out table.md] [--pictures DIR]
 
-Without a folder: the generated samples and scikit-image's photographs. A folder may hold any tree of images that
-`texrs.io` reads; what it cannot read is named and left out. A long side is first cropped to `--crop` pixels.
+Without a folder, the generated samples and scikit-image's photographs are used. A folder may contain any tree of
+images that `texrs.io` reads. Other files are named and skipped. A long side is first cropped to `--crop` pixels.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def generated(crop: int) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
 
 
 def in_folder(folder: Path, crop: int) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
-    """Return the images of a folder and of those in it; say which files were left out, and why."""
+    """Return the images of a folder and its subfolders. Print the skipped files and the reasons."""
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         name = str(path.relative_to(folder))
         try:
@@ -57,7 +57,7 @@ def in_folder(folder: Path, crop: int) -> Iterator[tuple[str, np.ndarray, np.nda
         except TexrsError as error:
             print(f"left out: {name}: {str(error).removeprefix(f'{path}: ')}", file=sys.stderr)
             continue
-        # The middle: what a photograph's borders show is often not the texture.
+        # Use the middle, because the borders of a photograph often do not show the texture.
         box = tuple(slice(max(0, (n - crop) // 2), max(0, (n - crop) // 2) + crop) for n in image.shape[:2])
         yield name, np.ascontiguousarray(image[box]), None
 
@@ -72,14 +72,17 @@ def size_of(text: str, image: np.ndarray) -> tuple[int, int]:
 
 
 def worst(found: list[Any]) -> Any:
-    """Return the first that fails, else the first."""
+    """Return the first record that fails, or else the first."""
     return next((f for f in found if f.applies and not f.passed), found[0])
 
 
 def measure(
     image: np.ndarray, labels: np.ndarray | None, size: tuple[int, int], seeds: int
 ) -> tuple[dict[str, Any], list[Any], float]:
-    """Design a texture with several seeds; give the worst record of each check, the results, and seconds a result."""
+    """Design a texture with several seeds.
+
+    Return the worst record of each check, the results, and the seconds for a result.
+    """
     results, seconds = [], []
     for seed in range(seeds):
         start = time.perf_counter()
@@ -125,13 +128,13 @@ def row(name: str, image: np.ndarray, records: dict[str, Any], results: list[Any
 
 
 def seen(image: np.ndarray) -> np.ndarray:
-    """Return 8-bit RGB to look at."""
+    """Return an image as 8-bit RGB for display."""
     values = np.rint(255 * np.clip(checks.unit(image), 0, 1)).astype(np.uint8)
     return values[..., :3] if values.shape[-1] >= 3 else np.repeat(values[..., :1], 3, axis=-1)
 
 
 def sheet(image: np.ndarray, result: Any) -> np.ndarray:
-    """Lay the exemplar and the result side by side."""
+    """Put the exemplar and the result side by side."""
     left, right = seen(image), seen(result.image)
     out = np.full((max(left.shape[0], right.shape[0]), left.shape[1] + 8 + right.shape[1], 3), 255, np.uint8)
     out[: left.shape[0], : left.shape[1]] = left

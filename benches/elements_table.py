@@ -2,11 +2,11 @@
 
 TEXRS_TEXTURES=FOLDER python benches/elements_table.py [PICTURES]
 
-FOLDER holds b-disjoint, c-connected and d-background, each image with its annotation. With PICTURES, a folder, what
-was found is drawn there. Detections within half a box of the border do not count; of the keyboard, whose centres are
-not all listed, recall alone does. IoU is the mean over the cells of `data/cells.json`, which were drawn by hand, of the
-intersection over the union with the element that covers most of each. After the table it says how reliable what the
-automatic start states is: in bins of stated confidence, how much was right, of layouts and of single elements.
+FOLDER contains b-disjoint, c-connected and d-background, each image with its annotation. PICTURES is a folder for
+drawings of the found elements. Detections within half a box of the border do not count. For the keyboard only recall
+counts, because not all of its centres are listed. IoU is the mean over the hand-drawn cells of `data/cells.json`. It
+is the intersection over the union with the element that covers most of the cell. After the table, the reliability of
+the automatic start is printed: for each bin of stated confidence, the share of correct layouts and elements.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from element_checks import Annotated, annotated, pair, passes, score
 
 BINS = (0.0, 0.5, 0.65, 0.8, 0.9, 1.0)
-"""Between which stated confidences are put together."""
+"""Limits of the bins of stated confidence."""
 DRAWN = Path(__file__).resolve().parent / "data" / "cells.json"
-"""Outlines of cells of ten of the textures, (row, column), drawn by hand; of each some, all over it."""
+"""Outlines of some cells of ten textures, (row, column), drawn by hand and spread over each texture."""
 Stated = list[tuple[float, bool]]
-"""How sure something was said to be, and whether it was right."""
+"""A stated confidence, and whether the statement was right."""
 
 
 def main(folder: Path, pictures: Path | None) -> None:
@@ -99,9 +99,9 @@ def measure_overlap(found: elements.ElementAnalysis, cells: list[list[list[float
 
 
 def judge_elements(found: elements.ElementAnalysis, texture: Annotated) -> Stated:
-    """Return how sure each element is said to be, and whether one is there; of those that are not all listed, none.
+    """Return the confidence of each element, and whether there is one. Textures without a full list have none.
 
-    Those of a wrong layout count, those within half a box of the border do not.
+    Elements of a wrong layout count. Elements within half a box of the border do not count.
     """
     if texture.centres is None or "keyboard" in texture.name:
         return []
@@ -113,7 +113,7 @@ def judge_elements(found: elements.ElementAnalysis, texture: Annotated) -> State
 
 
 def print_reliability(name: str, stated: Stated) -> None:
-    """Print how much was right of what was stated to be about as sure, and by how much the two differ on the average."""
+    """Print the share of correct statements by confidence, and the mean difference between the two."""
     if not stated:
         return
     print(f"\n| {name}: stated | number | mean stated | right |")

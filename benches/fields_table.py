@@ -2,11 +2,12 @@
 
     [TEXRS_TEXTURES=<folder>] python benches/fields_table.py [--size 256] [--seed 1] [--only NAME] [--pictures DIR]
 
-Each picture (the middle 192 a side; without a folder the samples) under circular, zigzag, slanted, ramped and drawn frames.
-"fast" starts from blocks and corrects points, as all of SOLID once did. The cost of seams: where neighbours do not lie beside
-each other in the exemplar, the difference between what would lie beside the one and what is there, and the same from the other;
-the mean over all pairs of neighbours, in 1000ths of the range. Shares: four classes of brightness of equal size in the
-exemplar, the least and the most of what the result has over that.
+Each image (its middle 192 pixels a side; without a folder the samples) is grown under circular, zigzag, slanted,
+ramped and drawn frames. "fast" starts from blocks and corrects points, as SOLID once did everywhere. The cost of seams
+counts neighbours that are not neighbours in the exemplar. It is the difference between each of them and the exemplar's
+continuation of the other. The table gives the mean over all pairs of neighbours, in 1000ths of the range. Shares: four
+classes of brightness of equal size in the exemplar. The table gives the minimum and maximum share in the result
+divided by the share in the exemplar.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ SUFFIXES = {".png", ".jpg", ".jpeg", ".tif"}
 
 
 def load() -> Iterator[tuple[str, NDArray[np.uint8]]]:
-    """Yield the pictures."""
+    """Yield the images."""
     folder = os.environ.get("TEXRS_TEXTURES")
     if folder is None:
         for name in ("bricks", "dots", "net", "pebbles", "weave"):
@@ -42,7 +43,7 @@ def load() -> Iterator[tuple[str, NDArray[np.uint8]]]:
 
 
 def list_fields(size: int) -> dict[str, texrs.fields.Field]:
-    """Return the fields; the last one is drawn: directions that turn by noise that changes slowly."""
+    """Return the fields. The last one is drawn: its directions follow slowly changing noise."""
     angle = np.add.outer(np.sin(np.arange(size) / 40), np.cos(np.arange(size) / 55)) * 0.6
     drawn = np.stack([np.stack([np.cos(angle), -np.sin(angle)], -1), np.stack([np.sin(angle), np.cos(angle)], -1)], -2)
     return {
@@ -55,7 +56,7 @@ def list_fields(size: int) -> dict[str, texrs.fields.Field]:
 
 
 def measure_seams(image: NDArray[np.uint8], source: texrs.SourceMap) -> float:
-    """Return what seams cost a pair of neighbours, in 1000ths of the range."""
+    """Return the mean cost of seams for a pair of neighbours, in 1000ths of the range."""
     colours = image.astype(np.float64) / 255
     at, frames = source.coordinates.astype(np.float64), source.jacobians()
     total, pairs = 0.0, 0
@@ -74,13 +75,13 @@ def measure_seams(image: NDArray[np.uint8], source: texrs.SourceMap) -> float:
 
 
 def source_colours(colours: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what lies at places, nearest."""
+    """Return the colours at the nearest pixels of coordinates."""
     place = np.clip(np.rint(at), 0, np.array(colours.shape[:2]) - 1).astype(np.intp)
     return np.asarray(colours[place[..., 0], place[..., 1]])
 
 
 def measure_shares(image: NDArray[np.uint8], made: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Return the shares of four classes of brightness over the exemplar's."""
+    """Return the shares of four classes of brightness divided by the shares of the exemplar."""
     before, after = image.mean(axis=-1), made.mean(axis=-1)
     ends = np.quantile(before, (0.25, 0.5, 0.75))
     counts = [np.bincount(np.digitize(x, ends).ravel(), minlength=4) / x.size for x in (before, after)]

@@ -1,13 +1,13 @@
-"""Other programs that fill holes: each takes a picture and a mask, and gives what it made and the CPU seconds of one thread.
+"""Other programs that fill holes: each gets an image and a mask, and returns a result and CPU seconds of one thread.
 
-The Resynthesizer (https://github.com/bootchk/resynthesizer, GPL) is an external program that is neither part of texrs nor
-linked to it: PROGRAM IMAGE.ppm MASK.pgm OUT.ppm prints the CPU seconds that `imageSynth` of `lib/imageSynth.h` took with the
-parameters of `setDefaultParams` on image and mask (255 in the hole). To build it, write a `main` of some twenty lines around
-that call and compile it with imageSynth.c, engine.c, glibProxy.c, engineParams.c, imageFormat.c and progress.c of its folder
-`lib`: `gcc -O3 -march=native -DNDEBUG -DSYNTH_LIB_ALONE`, after taking SYNTH_THREADED and SYNTH_USE_GLIB_THREADS out of
-`lib/buildSwitches.h`.
+The Resynthesizer (https://github.com/bootchk/resynthesizer, GPL) is an external program that is neither part of texrs
+nor linked to it. PROGRAM IMAGE.ppm MASK.pgm OUT.ppm prints the CPU seconds of `imageSynth` of `lib/imageSynth.h`, with
+the parameters of `setDefaultParams` on image and mask (255 in the hole). To build it, write a `main` of about twenty
+lines around that call. Remove SYNTH_THREADED and SYNTH_USE_GLIB_THREADS from `lib/buildSwitches.h`. Compile with
+imageSynth.c, engine.c, glibProxy.c, engineParams.c, imageFormat.c and progress.c of its folder `lib`: `gcc -O3
+-march=native -DNDEBUG -DSYNTH_LIB_ALONE`.
 
-OpenCV takes part where its contributed module xphoto is installed (`pip install opencv-contrib-python-headless`).
+OpenCV is included if its contributed module xphoto is installed (`pip install opencv-contrib-python-headless`).
 """
 
 from __future__ import annotations

@@ -3,14 +3,14 @@
     python benches/holes_pages.py OUT PICTURE ... [--resynthesizer PROGRAM] [--holes 3]
     python benches/holes_pages.py OUT --votes votes.json
 
-The first writes `OUT/NUMBER.png`, each one of the pictures with round holes that one method has filled: `texrs.remove` with
-nothing said, `texrs.inpaint` without scales, OpenCV (`inpaint`), the Resynthesizer, whose program `fillers.py`
-describes; and each picture as it is, on which nothing can be found. Numbers are drawn by chance, and so are the places of the
-holes, anew for each page, so that no page tells of another. `OUT/key.json` is not to be read.
+The first form writes `OUT/NUMBER.png`, each an image whose round holes one method has filled. The methods are
+`texrs.remove` with default options, `texrs.inpaint` without scales, OpenCV (`inpaint`), and the Resynthesizer (see
+`fillers.py`). Each unchanged image is also a page, without holes to find. Numbers and positions of holes are random
+for each page, so that no page gives hints about another. `OUT/key.json` is hidden.
 
-The second compares `{"NUMBER": [[row, column], ...]}`, the places at which holes were thought to be, with the key. A hole is
-found where a place lies in it, or by less than a quarter of its width beside it. Places beside all holes are counted, too: who
-guesses much finds by chance.
+The second form compares `{"NUMBER": [[row, column], ...]}`, the suspected positions of holes, with the key. A hole is
+found if a position is inside it, or outside by less than a quarter of its width. Positions outside all holes are also
+counted, because many guesses find holes by chance.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ except ImportError:
 
 Filler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 WIDE = 0.2
-"""Diameter of a hole, of the shorter side."""
+"""Diameter of a hole, as a share of the shorter side."""
 BESIDE = 0.25
-"""How far beside a hole a place may lie that finds it, of its diameter."""
+"""Maximum distance from a hole of a position that finds it, as a share of the diameter."""
 
 
 def fillers(program: Path | None) -> dict[str, Filler]:
-    """Return the methods that are here."""
+    """Return the installed methods."""
     found: dict[str, Filler] = {
         "untouched": lambda image, hole: image,
         "texrs.remove": lambda image, hole: texrs.remove(image, hole, seed=1).image,
@@ -55,7 +55,7 @@ def fillers(program: Path | None) -> dict[str, Filler]:
 
 
 def draw_holes(shape: tuple[int, ...], count: int, rng: np.random.Generator) -> list[tuple[float, float, float]]:
-    """Return middles and diameters of round holes that lie apart from each other, and from the border."""
+    """Return centres and diameters of round holes that are apart from each other and from the border."""
     side = min(shape[:2])
     wide, found = WIDE * side, list[tuple[float, float, float]]()
     for _ in range(10_000):
@@ -68,7 +68,7 @@ def draw_holes(shape: tuple[int, ...], count: int, rng: np.random.Generator) -> 
 
 
 def mark(shape: tuple[int, ...], holes: list[tuple[float, float, float]]) -> np.ndarray:
-    """Return where holes are."""
+    """Return the mask of the holes."""
     rows, columns = np.indices(shape[:2])
     return np.any([np.hypot(rows - r, columns - c) < wide / 2 for r, c, wide in holes], axis=0)
 
@@ -85,7 +85,7 @@ def make(options: argparse.Namespace) -> None:
         image = np.ascontiguousarray(image[..., :3] if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2))
         holes = draw_holes(image.shape, options.holes, rng)
         hole = mark(image.shape, holes)
-        # What was there is gone for everybody.
+        # Remove the pixels in the holes for all methods.
         bare = np.where(hole[..., np.newaxis], np.uint8(0), image) if name != "untouched" else image
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -96,13 +96,13 @@ def make(options: argparse.Namespace) -> None:
 
 
 def is_found(hole: list[float], places: list[list[float]]) -> bool:
-    """Return whether a place is that of a hole."""
+    """Return whether a position finds a hole."""
     row, column, wide = hole
     return any(np.hypot(row - r, column - c) < wide * (0.5 + BESIDE) for r, c in places)
 
 
 def reveal(options: argparse.Namespace) -> None:
-    """Print whose holes were found."""
+    """Print the found holes of each method."""
     key = json.loads((options.out / "key.json").read_text(encoding="utf-8"))
     votes = json.loads(options.votes.read_text(encoding="utf-8"))
     print("| method | holes | not found | share | places beside |\n" + "|---" * 5 + "|")
@@ -122,7 +122,7 @@ def reveal(options: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    """Make pages, or compare votes with their key."""
+    """Write pages, or compare votes with their key."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("pictures", type=Path, nargs="*")

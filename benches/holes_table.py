@@ -2,10 +2,10 @@
 
     TEXRS_TEXTURES=<folder> python benches/holes_table.py [--only NAME] [--resynthesizer PROGRAM] [--pictures DIR]
 
-Textures as in `perspective_table.py`; without a folder a generated floor of discs. Three holes are cut into each, one after
-the other, and filled: by both methods of `texrs.inpaint` with the true scale map, with one that is measured, with blended
-colours, and without regard to scales; by OpenCV (`inpaint`, and xphoto's shift map where its contributed modules are
-installed), and by the Resynthesizer, whose program `fillers.py` describes.
+Textures are the same as in `perspective_table.py`; without a folder, a generated floor of discs. Three holes are cut
+into each, one after the other, and filled. Both methods of `texrs.inpaint` use the true scale map, a measured one,
+blended colours, and no scales. OpenCV uses `inpaint`, and xphoto's shift map if its contributed modules are installed.
+The Resynthesizer is described in `fillers.py`.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def ours(options: dict[str, Any]) -> Filler:
 
 
 def peers(program: Path | None) -> dict[str, Filler]:
-    """Return the peers that are here; none of them knows scales, or seeds."""
+    """Return the installed peers. None of them supports scales or seeds."""
     found: dict[str, Filler] = {}
     if cv2 is not None:
         found["OpenCV inpaint"] = lambda image, hole, scale, seed: cv2.inpaint(
@@ -75,7 +75,7 @@ def peers(program: Path | None) -> dict[str, Filler]:
 
 
 def holes_of(shape: tuple[int, ...]) -> list[np.ndarray]:
-    """Return three holes side by side, of 0.44 of the height, where the scale changes, and 0.31 of the width."""
+    """Return three holes side by side where the scale changes: 0.44 of the height and 0.31 of the width in total."""
     found = []
     for middle in (0.3, 0.5, 0.7):
         hole = np.zeros(shape, bool)
@@ -90,7 +90,7 @@ def without(image: np.ndarray, hole: np.ndarray) -> np.ndarray:
 
 
 def agreement(image: np.ndarray, hole: np.ndarray, scale: np.ndarray) -> float:
-    """Return the correlation of sizes seen and true ones in a hole, away from its boundary."""
+    """Return the correlation of measured and true sizes in a hole, away from its boundary."""
     at = np.argwhere(hole)
     (top, left), (bottom, right) = at.min(axis=0) + 6, at.max(axis=0) - 5
     inside = (slice(top, bottom), slice(left, right))
@@ -103,7 +103,7 @@ def shown(value: float, low: float, high: float = np.inf) -> str:
 
 
 def main() -> None:
-    """Make the table."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="")
     parser.add_argument("--resynthesizer", type=Path)

@@ -3,9 +3,10 @@
     make wheel
     python benches/install_table.py [dist/texrs-*.whl] [--out docs/install.json]
 
-A clean place is an empty folder, with an environment that holds nothing but pip, an empty home and no cache. Two commands are
-measured: the installation, and the first picture. Seconds are those of the processor, for the net is another everywhere;
-megabytes are what the environment took when all was done, less what it takes empty. What cannot be had is said to be so.
+A clean environment is an empty folder, with a Python environment that contains only pip, an empty home and no cache.
+Two commands are measured: the installation, and the first image. Seconds are processor seconds, because networks
+differ. Megabytes are the size of the environment at the end, minus its size when empty. Packages that cannot be
+installed are listed as such.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ Image.fromarray(np.uint8(255 * made[0])).save("first.png")
 
 
 def list_candidates(wheel: Path) -> dict[str, tuple[list[str], list[str], str]]:
-    """Return for each what is installed, the command of the first picture, and what that shows."""
+    """Return for each candidate the packages, the command for the first image, and a description of the image."""
     return {
         "texrs": (
             [str(wheel)],
@@ -61,14 +62,14 @@ def count_bytes(folder: Path) -> int:
 
 
 def spend(command: list[str], place: Path) -> tuple[float, str]:
-    """Run a command in the place as a stranger would; return seconds of the processor, and what went wrong."""
+    """Run a command like a new user. Return processor seconds, and the error if there is one."""
     environment = {
         "HOME": str(place / "home"),
         "PATH": f"{place / 'env' / 'bin'}:/usr/bin:/bin",
         "PIP_NO_CACHE_DIR": "1",
         "PIP_DISABLE_PIP_VERSION_CHECK": "1",
     }
-    # How the net is reached is not the stranger's doing.
+    # The configuration of the network is not part of the test.
     kept = (name for name in os.environ if name.startswith(("PIP_", "SSL_")) or name.lower().endswith("_proxy"))
     environment = {name: os.environ[name] for name in kept} | environment
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -90,7 +91,7 @@ def try_out(packages: list[str], picture: list[str], python: str) -> dict[str, A
         spent, wrong = spend([str(bin_folder / "python"), "-m", "pip", "install", "--quiet", *packages], place)
         if wrong:
             return {"wrong": f"installation: {wrong}"}
-        # The first picture is made right after: byte code is compiled then, as it is for everybody.
+        # Make the first image right afterwards, so that byte code is compiled then, as it is for a new user.
         drawn, wrong = spend([str(bin_folder / picture[0]), *picture[1:]], place)
         count = len(list((place / "env").glob("lib/python*/site-packages/*.dist-info"))) - 2
         found = {

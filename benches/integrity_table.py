@@ -2,11 +2,15 @@
 
     python benches/integrity_table.py [--size 96] [--seeds 3] [--only NAME] [--pictures DIR]
 
-Cells of several colours behind walls, of three voxels and of two, and spheres of several colours in a ground, drawn by this
-script, 64^3 voxels, and the sample "particles"; without a field and under a circular one. Of each seed: contacts without a
-border in 1000 voxels, the share of the largest part, torn elements, parts of several colours, parts a voxel over the
-exemplar's, shares of the classes of elements over the exemplar's, the least and the most, and the share of points that show
-a sample which another one shows as well.
+This script draws volumes of 64^3 voxels: cells of several colours with walls of three and of two voxels, and spheres of
+several colours on a background. The sample "particles" is added. All are grown without a field and under a
+circular one. For each seed the table gives:
+
+- contacts without a border in 1000 voxels, and the share of the largest part;
+- torn elements, and parts of several colours;
+- parts for each voxel, divided by the exemplar's;
+- the minimum and maximum share of the classes of elements, divided by the exemplar's;
+- the share of points that show a sample which another point also shows.
 """
 
 from __future__ import annotations
@@ -34,7 +38,7 @@ Labels = NDArray[np.int64]
 
 
 def draw_cells(seed: int = 0, apart: float = 15.0, wall: float = 3.0) -> tuple[Volume, Labels]:
-    """Draw cells of five colours behind dark walls, and which colour is where, 0 for none."""
+    """Draw cells of five colours with dark walls. Return the volume and the colour index of each voxel, 0 for none."""
     random = np.random.default_rng(seed)
     steps = np.arange(-1.0, SIDE // apart + 2) * apart
     points = np.stack(np.meshgrid(*[steps] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -46,7 +50,7 @@ def draw_cells(seed: int = 0, apart: float = 15.0, wall: float = 3.0) -> tuple[V
 
 
 def draw_spheres(seed: int = 0, radius: tuple[float, float] = (4.0, 8.0)) -> tuple[Volume, Labels]:
-    """Draw spheres of five colours that do not touch in a dark ground, and which colour is where, 0 for none."""
+    """Draw separate spheres of five colours on a dark background. Return the volume and the colour index, 0 for none."""
     random = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), axis=-1)
     kind = np.zeros((SIDE,) * 3, np.int64)
@@ -66,7 +70,7 @@ def _paint(kind: Labels, random: np.random.Generator) -> tuple[Volume, Labels]:
 
 
 def measure_copies(source: texrs.SourceMap) -> float:
-    """Return the share of points that show a sample which another one shows as well."""
+    """Return the share of points that show a sample which another point also shows."""
     places = np.rint(source.coordinates).astype(np.int64)
     flat = np.sort(places.reshape(-1, 3) @ np.array([1 << 40, 1 << 20, 1]))
     return float((np.diff(flat) == 0).mean())

@@ -2,15 +2,15 @@
 
     python benches/materials_table.py OUT FOLDER ... [--size 2048] [--verb VERB ...] [--limit SECONDS]
 
-Each FOLDER holds the maps of a material by the usual names. A map of the numbers of its pixels, as labels, goes with them.
-Every verb makes the whole material in one command, which also writes a lit preview, a glTF file, a MaterialX document and
-mipmaps; these stay in OUT, to be looked at. Verbs that go on from a picture (inpaint, extend, remove, rectify, self-splice)
-have what was designed.
+Each FOLDER contains the maps of a material with the usual names. A map with the numbers of its pixels is added, as
+labels. Every verb computes the whole material in one command, which also writes a lit preview, a glTF file, a
+MaterialX document and mipmaps. These stay in OUT for inspection. Verbs that continue an image (inpaint, extend,
+remove, rectify, self-splice) get the designed one.
 
-Register: the share of pixels whose number is that of the pixel nearest to where the source map looks. Shading: the mean angle,
-in degrees, between the normals that were made and those of the example turned by hand, by the frames of the source map; and,
-beside it, what the angle would be if normals were looked up as colours are. Seconds are those of the clock, and of all
-processors; memory is the largest that the command had.
+Register is the share of pixels with the number of the pixel nearest to the coordinates of the source map. Shading is
+the mean angle, in degrees, between the computed normals and the example's normals, rotated independently by the frames
+of the source map. The angle without rotation is next to it. Seconds are wall time and the processor time of all
+processors. Memory is the peak of the command.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from texrs.materials._lit_maps import decode_normals
 
 IDS = "ids"
 NEAR = 0.501
-"""Pixels that a nearest one is away at most."""
+"""Maximum distance of a nearest pixel, in pixels."""
 ALONE = ("design", "tile", "synthesize", "perspective", "splice")
 
 
 def list_commands(stack: Path, designed: Path, hole: Path, size: int) -> Iterator[tuple[str, list[str], Path]]:
-    """Return each verb, its words, and the material that it looks into."""
+    """Return each verb, its arguments, and the material that it looks up."""
     wanted = ["--size", str(size)]
     yield "design", [str(stack), *wanted], stack
     yield "tile", [str(stack), *wanted, "--flatten-lighting"], stack
@@ -54,7 +54,7 @@ def list_commands(stack: Path, designed: Path, hole: Path, size: int) -> Iterato
 
 
 def prepare(folder: Path, target: Path) -> Path:
-    """Copy the maps of a material, with one of the numbers of its pixels."""
+    """Copy the maps of a material, and add a map with the numbers of its pixels."""
     shutil.rmtree(target, ignore_errors=True)
     shutil.copytree(folder, target)
     number_pixels(target)
@@ -62,17 +62,17 @@ def prepare(folder: Path, target: Path) -> Path:
 
 
 def number_pixels(folder: Path) -> None:
-    """Write the map of the numbers of the pixels of a material, over one that there is."""
+    """Write the map of pixel numbers of a material, over an existing one."""
     (folder / f"{IDS}.tif").unlink(missing_ok=True)
     rows, columns = texrs.Material.read(folder).shape
     io.write(folder / f"{IDS}.tif", np.arange(rows * columns, dtype=np.int32).reshape(rows, columns))
 
 
 def check(made: Path, example: Path, source: texrs.SourceMap) -> list[str]:
-    """Return whether register and dtypes are exact, and how normals lie."""
+    """Return whether register and dtypes are exact, and the error of normals."""
     before, after = texrs.Material.read(example), texrs.Material.read(made)
     shown = np.stack(np.divmod(after[IDS].pixels, before.shape[1]), axis=-1)
-    # Half way between two pixels either is the nearest; what looks over the border has the last pixel.
+    # Halfway between two pixels both are the nearest. Coordinates beyond the border use the last pixel.
     places = np.clip(source.coordinates, 0, np.array(before.shape) - 1)
     exact = float((np.abs(shown - places).max(axis=-1) <= NEAR).mean())
     kept = all(after[name].pixels.dtype == each.pixels.dtype for name, each in before.items())
@@ -83,7 +83,7 @@ def check(made: Path, example: Path, source: texrs.SourceMap) -> list[str]:
         plain = decode_normals(source.render(before[name].pixels), before[name].role, signed=False)
         made_so = decode_normals(after[name].pixels, after[name].role, signed=False)
         frames, looked = source.jacobians(), source.render(own, interpolation="linear")
-        # Heights h(S(p)) have the slopes J^T grad h; rows go down, y goes up.
+        # Heights h(S(p)) have the slopes J^T grad h. Rows go down, and y goes up.
         slopes = np.einsum("...ji,...j->...i", frames, np.stack([-looked[..., 1], looked[..., 0]], -1))
         expected = np.concatenate([slopes[..., 1:], -slopes[..., :1], looked[..., 2:]], axis=-1)
         expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
@@ -118,7 +118,7 @@ def main() -> None:
 
 
 def report(name: str, verb: str, words: list[str], example: Path, given: argparse.Namespace) -> None:
-    """Do one command, and print its row."""
+    """Run one command, and print its row."""
     made = given.out / f"{name}-{verb}"
     beside = {
         flag: str(made) + end for flag, end in (("--preview", ".png"), ("--gltf", ".glb"), ("--source-map", ".npz"))
@@ -131,7 +131,7 @@ def report(name: str, verb: str, words: list[str], example: Path, given: argpars
         while (done := os.wait4(process.pid, os.WNOHANG))[0] == 0:
             time.sleep(0.2)
             if time.monotonic() - start > given.limit:
-                # By its number: Popen would fetch the status that is waited for here.
+                # Kill by number, because Popen would fetch the status that is waited for here.
                 os.kill(process.pid, signal.SIGKILL)
     except KeyboardInterrupt:
         process.kill()

@@ -2,8 +2,8 @@
 
     python benches/memory_table.py [VERB ...]
 
-A process for each: its peak of resident memory while the verb works, less what it had before, when the verb had worked on
-something small, so that its libraries were there. Linux only.
+Each verb has its own process. The table gives its peak resident memory during the verb, minus the memory before. The
+verb has then already processed a small input, so that its libraries are loaded. Linux only.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ SIZES: dict[str, list[tuple[int, int]]] = {
     "analyse": [(256, 256), (512, 512), (768, 768)],
     "CornerTiles": [(256, 576), (256, 1152), (512, 1152)],
 }
-"""Sides of the example and of the result; of tiles it is the atlas of 81."""
+"""Sides of the example and of the result. For tiles, the result is the atlas of 81 tiles."""
 
 
 def make_call(verb: str, picture: np.ndarray[Any, Any], size: int) -> Callable[[], object]:
-    """Return what is measured."""
+    """Return the call to measure."""
     side = picture.shape[0]
     hole = np.zeros(picture.shape[:2], np.bool_)
     hole[side // 3 : side * 2 // 3, side // 3 : side * 2 // 3] = True
@@ -65,7 +65,7 @@ def make_call(verb: str, picture: np.ndarray[Any, Any], size: int) -> Callable[[
 
 
 def make_picture(verb: str, side: int) -> np.ndarray[Any, Any]:
-    """Return an example: a volume, a floor that is seen aslant, or stones."""
+    """Return an example: a volume, an oblique floor, or stones."""
     if verb == "solid":
         return texrs.samples.particles((side,) * 3).image
     aslant = verb in ("extend", "rectify", "remove")
@@ -73,14 +73,14 @@ def make_picture(verb: str, side: int) -> np.ndarray[Any, Any]:
 
 
 def measure(name: str) -> int:
-    """Return what the system says of the memory of this process, in bytes."""
+    """Return a memory value of this process from the system, in bytes."""
     return int(re.findall(rf"{name}:\s+(\d+)", Path("/proc/self/status").read_text())[0]) * 1024
 
 
 def run(verb: str, side: int, size: int) -> None:
-    """Measure one, and print its line."""
+    """Measure one verb, and print its line."""
     warnings.simplefilter("ignore")
-    # Another picture, for what is known of one is kept.
+    # Use another image, because results for an image are cached.
     small, larger = {"solid": (36, 40), "CornerTiles": (96, 288)}.get(verb, (96, 128))
     make_call(verb, make_picture(verb, small), larger)()
     picture = make_picture(verb, side)
@@ -88,7 +88,7 @@ def run(verb: str, side: int, size: int) -> None:
     several = [picture.shape] * (2 if verb == "splice" else 1)
     predicted = texrs.limits.estimate_memory(verb, several, result, dtype=picture.dtype)
     gc.collect()
-    # What the C library keeps for later is no memory of the verb.
+    # Memory that the C library keeps for later is not memory of the verb.
     ctypes.CDLL(None).malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")
     before, start = measure("VmRSS"), time.process_time()
@@ -100,7 +100,7 @@ def run(verb: str, side: int, size: int) -> None:
 
 
 def main(words: list[str]) -> None:
-    """Measure all, or the verbs that are named."""
+    """Measure all verbs, or the named ones."""
     if words[:1] == ["--one"]:
         run(words[1], int(words[2]), int(words[3]))
         return

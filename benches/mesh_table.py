@@ -1,8 +1,9 @@
-"""Measure visible cuts of an atlas: painted meshes, as a viewer interpolates their texels, and the texture itself.
+"""Measure the visibility of atlas cuts: painted meshes with interpolated texels, compared with the texture itself.
 
-Run ``python benches/mesh_table.py MESH... [--sample particles] [--atlas 1024]``. On edges along which the atlas is cut, and on
-all others, the table has the difference between the two sides, and that to the texture, in levels of 8 bit (the median, nine
-tenths and 99 % of 1500 points): a cut cannot be seen where its edges are as near to the texture as the others.
+Run ``python benches/mesh_table.py MESH... [--sample particles] [--atlas 1024]``. The table has two differences: between the two sides of an edge, and between a side and
+the texture. Cut edges and all others are separate rows. They are in
+levels of 8 bit (median, 90 % and 99 % of 1500 points). Cuts are invisible if their edges are as near to the texture as
+the others.
 """
 
 import argparse
@@ -20,7 +21,7 @@ SHARES = (0.5, 0.9, 0.99)
 
 
 def find_edges(painted: TexturedMesh) -> dict[str, np.ndarray]:
-    """Return corners (n, 2 sides, 2 ends) of the edges that two triangles share, by whether the atlas is cut there."""
+    """Return the vertices (n, 2 sides, 2 ends) of edges that two triangles share, separately for cut and other edges."""
     place = np.unique(np.round(painted.vertices, 5), axis=0, return_inverse=True)[1].reshape(-1)
     ends = np.concatenate([painted.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
     ends = np.where(place[ends[:, :1]] <= place[ends[:, 1:]], ends, ends[:, ::-1])
@@ -33,7 +34,7 @@ def find_edges(painted: TexturedMesh) -> dict[str, np.ndarray]:
 
 
 def mix(values: np.ndarray, pairs: np.ndarray, share: np.ndarray) -> list[np.ndarray]:
-    """Return what corners have at points of edges, as either side has it."""
+    """Return values interpolated between the vertices at points of edges, for each side."""
     return [values[pairs[:, side, 0]] * share + values[pairs[:, side, 1]] * (1 - share) for side in (0, 1)]
 
 

@@ -1,7 +1,7 @@
-"""Measure time and memory of PERSPECTIVE: seconds and CPU seconds by size, growth with the output, bytes a pixel.
+"""Measure time and memory of PERSPECTIVE: wall and CPU seconds by size, growth with the output, bytes for each pixel.
 
-Memory is the highest resident size since the start, less what a small result left and what is given back: the picture, its
-source map and its stages. The exemplar's copies in several sizes, some 20 megabytes here, do not grow with the output.
+Memory is the peak resident size since the start, without the remains of a small result and the returned image, source
+map and stages. The resized copies of the exemplar, about 20 MB here, do not grow with the output.
 
 python benches/perspective_speed.py [--largest 1024] [--repeat 3]
 """
@@ -30,7 +30,7 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=3)
     asked = parser.parse_args()
     image, scale = checks.floor((160, 160))
-    texrs.perspective(image, scale, 64)  # What is done once is not counted.
+    texrs.perspective(image, scale, 64)  # Exclude work that is done once.
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print("| output | seconds | CPU | microseconds of CPU a pixel | bytes a pixel above what is given back |")
     print("|---|---|---|---|---|")
@@ -46,7 +46,7 @@ def main() -> None:
             source = made.source_map
             parts = (source.coordinates, source.exemplar, source.label, *made.stages.values())
             given = sum(part.nbytes for part in parts)
-            del made, source, parts  # The next one is not to be counted with it.
+            del made, source, parts  # Do not count this result with the next one.
         peak = ((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 - given) / side**2
         print(
             f"| {side}^2 | {min(wall):.2f} | {min(cpu):.2f} | {min(cpu) / side**2 * 1e6:.2f} | {peak:.0f} |", flush=True

@@ -4,11 +4,12 @@
         [--variants default,alone,plain,paper] [--evaluator <texture_quality.py>] [--tears <deep_quality.py>]
         [--out table.md] [--pictures DIR]
 
-Generated discs and ellipses on a floor and, with a folder, each picture in it. A `NAME-scale.npy` beside one is its map, the
-square root of area ratios, S^1.5; of the others it is found. Variants: `alone` has no resized copies, `copies` five and no
-plane, `plain` has no weight of scales. With `--evaluator`, a module that has `perspective_agreement`, its rank correlation,
-slope and spread are columns; the lines `drawn` are what it says of discs that are drawn to the same target, without
-synthesis. With `--tears`, a module with `Judge(exemplar).scores(picture)`, the share of torn cells is one.
+The textures are generated discs and ellipses on a floor and, with a folder, each image in it. `NAME-scale.npy` is the
+map of an image, the square root of area ratios, S^1.5. Maps of other images are measured. Variants: `alone` has no
+resized copies, `copies` has five and no plane, `plain` has no weight of scales. With `--evaluator`, a module with
+`perspective_agreement`, its rank correlation, slope and spread are columns. The rows `drawn` are its values for discs
+that are drawn to the same target, without synthesis. With `--tears`, a module with `Judge(exemplar).scores(picture)`,
+the share of torn cells is a column.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ that are asked for.
 
 
 def textures(folder: str | None) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Return names, pictures and scale maps."""
+    """Return names, images and scale maps."""
     yield ("discs", *checks.floor((256, 256)))
     ellipses = texrs.samples.tilted_discs((256, 256))
     yield "ellipses", ellipses.image, ellipses.scale_map
@@ -78,7 +79,7 @@ def textures(folder: str | None) -> Iterator[tuple[str, np.ndarray, np.ndarray]]
 
 
 def drawn(evaluator: Any, target: np.ndarray, seeds: int) -> dict[str, float]:
-    """Return what the evaluator says of discs that have the wanted sizes by construction."""
+    """Return the evaluator's values for discs that have the requested sizes by construction."""
     relative = target / np.exp(np.log(target).mean())
     pictures = [checks.drawn(relative, seed) for seed in range(1, seeds + 1)]
     seen = [evaluator.perspective_agreement(p, target) for p in pictures]
@@ -88,7 +89,7 @@ def drawn(evaluator: Any, target: np.ndarray, seeds: int) -> dict[str, float]:
 
 
 def ask(scale: np.ndarray, shape: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Return the maps that are asked for: the exemplar's stretched, three others, and one size everywhere."""
+    """Return the targets: the exemplar's stretched map, three others, and one size everywhere."""
     constant = np.full(shape, np.exp(np.log(scale).mean()), np.float32)
     return {"larger": scale_maps.resample(scale, shape), **checks.targets(scale, shape), "constant": constant}
 
@@ -96,7 +97,7 @@ def ask(scale: np.ndarray, shape: tuple[int, int]) -> dict[str, np.ndarray]:
 def measure(
     evaluator: Any, judge: Any, image: np.ndarray, target: np.ndarray, example: np.ndarray, scale: np.ndarray
 ) -> dict[str, float]:
-    """Return the figures of one picture but those that only its synthesis knows."""
+    """Return the numbers of one image, except those that only its synthesis has."""
     flat = float(np.ptp(np.log(target))) < 1e-6
     agreed = {} if evaluator is None else evaluator.perspective_agreement(image, target)
     return {
@@ -112,7 +113,7 @@ def measure(
 
 
 def shown(name: str, value: float, target: str, own: dict[str, float]) -> str:
-    """Write a figure, bold where it fails."""
+    """Return a number as text, bold if it fails."""
     low, high = BOUNDS.get(name, (-np.inf, np.inf))
     if name == "rho":
         asked = {"larger": 0.95, "ramp": 0.95, "wave": 0.85, "radial": 0.9, "constant": -1.0}[target]
@@ -122,7 +123,7 @@ def shown(name: str, value: float, target: str, own: dict[str, float]) -> str:
 
 
 def main() -> None:
-    """Make the table."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--size", default="320x384")

@@ -2,11 +2,14 @@
 
     [TEXRS_TEXTURES=FOLDER] python benches/planes_table.py [--rounds 4] [--pictures DIR]
 
-Floors are flat samples seen by a pinhole camera: slants of 20 to 65 degrees, tilts all round, four angles of view, with noise
-and without, half of them as JPEG files. FOLDER holds pictures and ``ground-truth.json``, which tells slant, tilt, focal length
-and a scale map of some. With `--pictures` each is drawn beside its flat texture. After the errors of each texture it says how
-often planes were right that were said to be sure, how well automatic scale maps fit those of the folder, how well the ground is
-found beside skies, walls and things, and what each verb takes at 1024 x 1024.
+Floors are flat samples seen by a pinhole camera: slants of 20 to 65 degrees, all tilts, four angles of view, with and
+without noise, half as JPEG. FOLDER contains images and ``ground-truth.json``, which specifies slant,
+tilt, focal length and a scale map of some. With `--pictures`, each is drawn next to its flat texture. After the errors of each texture, four results follow:
+
+- the share of correct planes among those with high confidence;
+- the fit of automatic scale maps to the folder's maps;
+- the accuracy of the ground plane next to skies, walls and objects;
+- the time of each verb at 1024 x 1024.
 """
 
 from __future__ import annotations
@@ -33,12 +36,12 @@ from texrs.planes._choose import measure_known_scale
 NAMES = ("bricks", "setts", "pebbles", "dots", "weave", "beans", "scales")
 SIZE = (256, 320)
 RIGHT = (8.0, 15.0)
-"""Errors in slant and in tilt, in degrees, up to which a plane counts as found."""
+"""Maximum errors in slant and in tilt, in degrees, of a found plane."""
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def floors(rounds: int) -> Iterator[tuple[str, Plane, np.ndarray]]:
-    """Return pictures of floors, drawn by chance, whose horizons lie outside."""
+    """Return random images of floors with horizons outside."""
     rng = np.random.default_rng(0)
     for number in range(rounds):
         for name in NAMES:
@@ -52,7 +55,7 @@ def floors(rounds: int) -> Iterator[tuple[str, Plane, np.ndarray]]:
 
 
 def told(folder: str | None) -> Iterator[tuple[str, Plane, np.ndarray]]:
-    """Return the pictures of a folder whose planes its ground truth tells."""
+    """Return the images of a folder whose planes are in its ground truth."""
     for path in sorted(Path(folder).rglob("ground-truth.json")) if folder else ():
         for name, truth in json.loads(path.read_text(encoding="utf-8")).items():
             if isinstance(truth, dict) and {"slant_deg", "tilt_deg", "focal_px"} <= set(truth):
@@ -62,7 +65,7 @@ def told(folder: str | None) -> Iterator[tuple[str, Plane, np.ndarray]]:
 
 
 def print_maps(folder: str | None) -> None:
-    """Print how the automatic scale maps of a folder's pictures go with those that its ground truth tells."""
+    """Print how well automatic scale maps of a folder's images fit its ground truth."""
     print("\n| picture | correlation of the scale map |\n|---|---|")
     for path in sorted(Path(folder).rglob("*-scale.npy")) if folder else ():
         image = io.read(path.with_name(path.name.replace("-scale.npy", ".png")))
@@ -76,7 +79,7 @@ SCENES |= {f"a wall of {name}": {"above": name} for name in ("bark", "grit", "br
 
 
 def print_grounds() -> None:
-    """Print how well the ground of each scene is found, and its plane then, as intersection over union and degrees."""
+    """Print the accuracy of the ground area of each scene (intersection over union) and of its plane (degrees)."""
     print("\n| beside the floor | ground: mean | least | plane off: slant | tilt, medians |\n" + "|---" * 5 + "|")
     for kind, options in SCENES.items():
         over, offs = [], []

@@ -3,16 +3,15 @@
     [TEXRS_TEXTURES=FOLDER] python benches/rectify_table.py [--pictures DIR]
         [--evaluator <texture_quality.py>] [--tears <deep_quality.py>]
 
-Each floor, generated or told by ``ground-truth.json`` in FOLDER, is made flat as `texrs.rectify` finds it. Of every pixel of
-the texture the true plane says how large a piece of the floor it shows, and how far from square that is. The spread is the
-standard deviation of the natural logarithm of the size; 0.08 is asked at most. By hand: of the homography of four corners of a
-rectangle of the true plane, as they are clicked: whole pixels, one off. All are homographies, so that straight lines stay
-straight.
+Each floor, generated or specified by ``ground-truth.json`` in FOLDER, is flattened by `texrs.rectify` without hints.
+The true plane gives the size and stretch of the floor area that each pixel shows. The spread is the standard deviation
+of the natural logarithm of the size, and at most 0.08 is required. By hand: the homography of four clicked corners of
+a rectangle of the true plane, in whole pixels, one of them off. All are homographies, so straight lines stay straight.
 
-With an evaluator that has `tile`, both are tiled, ours by ``wrap=True``, that by hand as it is cut out: which bounds fail (a
-line inside may stand out half as much again as in the flat texture). With one that has `Judge`: what share of the tile looks
-torn to a judge of the flat texture once its borders are rolled into its middle; 0.18 is asked at most. With `--pictures` each
-photograph, its flat texture, and both tiles, two by two of each, are written.
+With an evaluator that has `tile`, both textures are tiled, ours by ``wrap=True`` and the other as it is cut. The table
+gives the failed bounds (a line inside may be 1.5 times as visible as in the flat texture). With an evaluator that has
+`Judge`, it gives the share of the tile that looks torn compared with the flat texture, after a roll by half the size.
+At most 0.18 is required. `--pictures` writes each photograph, its flat texture, and both tiles, 2 x 2 of each.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from planes_table import floors, told
 
 
 def measure(made: texrs.Synthesis, true: texrs.Plane) -> tuple[float, float]:
-    """Return the spread of sizes of a flat texture, and by how much things are stretched in the median."""
+    """Return the spread of sizes of a flat texture, and the median stretch."""
     at = made.source_map.coordinates[::4, ::4].astype(np.float64)
     shown = np.linalg.inv(true.projection_jacobians(true.flatten(at))) @ made.source_map.jacobians()[::4, ::4]
     values = np.linalg.svd(shown, compute_uv=False)
@@ -44,7 +43,7 @@ def measure(made: texrs.Synthesis, true: texrs.Plane) -> tuple[float, float]:
 
 
 def click(plane: texrs.Plane, rng: np.random.Generator) -> texrs.Plane:
-    """Return the plane of four corners of a rectangle that somebody clicks in a photograph: they are a pixel off."""
+    """Return the plane of four corners of a rectangle that a person clicks in a photograph, one pixel off."""
     rows, columns = plane.shape
     middle = plane.flatten(np.array([[0.62 * rows, 0.5 * columns]]))[0]
     for half in np.geomspace(0.5 * min(rows, columns), 8, 24):
@@ -56,7 +55,7 @@ def click(plane: texrs.Plane, rng: np.random.Generator) -> texrs.Plane:
 
 
 def judge_tile(evaluator: Any, tears: Any, flat: np.ndarray, tile: np.ndarray) -> tuple[list[str], float]:
-    """Return the bounds of an evaluator that a tile fails, and the share of it that looks torn to another's judge."""
+    """Return the evaluator's bounds that a tile fails, and the share that another evaluator finds torn."""
     one, other = as_float(flat), as_float(tile)
     failed = []
     if evaluator is not None:

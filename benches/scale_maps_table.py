@@ -56,7 +56,7 @@ def row(case: checks.Case) -> list[str]:
 
 
 def picture(case: checks.Case) -> np.ndarray:
-    """Return the picture, its mask, the truth, the map of the mask and the map of the angles, side by side."""
+    """Return the image, its mask, the truth, the map of the mask and the map of the angles, side by side."""
     mask = scale_maps.auto_mask(case.image)
     shown = np.rint(to_unit(case.image)[..., :3] * 255).astype(np.uint8)
     if shown.shape[-1] == 1:
@@ -71,7 +71,7 @@ def picture(case: checks.Case) -> np.ndarray:
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """Return the least processor time of five, which neighbours on the machine disturb least."""
+    """Return the minimum processor time of five runs, which other work on the machine disturbs least."""
     spent = []
     for _ in range(5):
         start = time.process_time()

@@ -2,11 +2,11 @@
 
     python benches/solid_speed.py [--rounds 3] [--threads N] [--quick] [--optimise]
 
-Volumes grow from 64^3 voxels of the sample "particles", under the field circular:axis=x unless said; pictures from
-256 x 256 pixels of "pebbles" under zigzag:period=64. The floor is the time of as many multiplications and additions
-as the projections of all windows have, in a matrix product of 32-bit floats on the same cores; windows where no pieces of
-the exemplar meet are left out by the kernel, so it may come below. The naive loop is the twin of the tests, which does the
-same to the bit. `--quick` leaves out 256^3.
+Volumes grow from 64^3 voxels of the sample "particles", by default under the field circular:axis=x. Images grow from
+256 x 256 pixels of "pebbles" under zigzag:period=64. The floor is the time of the multiplications and additions of the
+projections of all windows, in a float32 matrix product on the same cores. The kernel skips windows without borders of
+pieces, so it may be faster. The naive loop is the twin of the tests, with the same result to the bit. `--quick` skips
+256^3.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def products(report: dict[str, Any], channels: int) -> float:
 
 
 def rate() -> float:
-    """Return the multiplications a second of a matrix product of windows and components."""
+    """Return the multiplications for each second of a matrix product of windows and components."""
     rng = np.random.default_rng(0)
     windows, basis = (rng.random(shape, dtype=np.float32) for shape in ((1 << 16, 375), (375, KEEP)))
     seconds = min(timed(lambda: windows @ basis)[0] for _ in range(7))
@@ -59,8 +59,8 @@ def rate() -> float:
 
 
 def peak(size: int, quality: str) -> tuple[float, float]:
-    """Return the peak of memory of a process that grows a volume, and that of one that only loads texrs, in MiB."""
-    # Linux hands ru_maxrss down from the process that starts another; its own peak is in /proc.
+    """Return the peak memory of a process that grows a volume, and of one that only loads texrs, in MiB."""
+    # On Linux a process inherits ru_maxrss from its parent. Its own peak is in /proc.
     script = (
         "import pathlib, re, resource, sys, texrs; from texrs import fields, samples\n"
         "size = int(sys.argv[1])\n"
@@ -80,7 +80,7 @@ def peak(size: int, quality: str) -> tuple[float, float]:
 
 
 def naive() -> float:
-    """Return how many times longer the tests' slow twin takes for the same passes than the kernel on one thread."""
+    """Return the time of the tests' slow twin for the same passes, divided by the time of the kernel on one thread."""
     level = texrs.Exemplar(samples.particles().image, axes=3).analyse().levels[0]
     region = Region.whole((12, 12, 12))
     frames = to_fixed(fields.circular(axis="x").over(region.shape), region)
@@ -94,7 +94,7 @@ def naive() -> float:
 
 
 def analyse(image: np.ndarray, axes: int) -> Any:
-    """Return the analysis of an exemplar as if it were seen for the first time."""
+    """Return the analysis of an exemplar without the cache."""
     _FACTS.clear()
     return texrs.Exemplar(image, axes=axes).analyse()
 
@@ -140,7 +140,7 @@ def run(options: argparse.Namespace) -> None:
         if size != 128:
             tasks[f"{size}^3 fast"] = grow(size, field=wound, quality="fast")
     for quality in ("fast", "optimise") if options.optimise else ("fast",):
-        texrs.solid(solid, 32, quality=quality)  # The analysis is made once, and timed apart.
+        texrs.solid(solid, 32, quality=quality)  # Make the analysis once, and time it separately.
         texrs.synthesize(flat, 64, quality="fast")
     times: dict[str, list[float]] = {name: [] for name in tasks}
     work: dict[str, float] = {}

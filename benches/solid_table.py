@@ -3,8 +3,8 @@
     [TEXRS_TEXTURES=<folder>] python benches/solid_table.py [--seeds 3] [--size 96] [--only NAME] [--quality preserve]
         [--evaluator <texture_quality.py>] [--out table.md] [--pictures DIR]
 
-Without a folder: the generated samples, exactly those that are volumes. With one: each volume in it too, cut to its
-middle 64 a side. With `--evaluator`, a module that has `compare_volumes` and `failures`, its verdict is a column.
+Without a folder: the generated volumes. With one: also each volume in it, cropped to its middle 64 voxels a side. With
+`--evaluator`, a module with `compare_volumes` and `failures`, its verdict is a column.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ CROP = 64
 HEAD = ("S1", "S2", "S3", "S3b", "S5", "S6", "S9")
 FIELDS = {
     "identity": fields.identity(),
-    # Its folds must not lie on planes at which S6 looks for traces of the algorithm.
+    # Its folds must not be on planes where S6 looks for traces of the algorithm.
     "zigzag": fields.zigzag(period=60, angle=30, plane="xz"),
     "circular": fields.circular(axis="x", radial="z"),
     "rotation": fields.rotation(30, "xz"),
@@ -54,7 +54,7 @@ Figures are means over the seeds; **bold** fails; "-" where a check does not app
 
 
 def textures(folder: str | None) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
-    """Return the samples, and what of a folder are volumes of at least 16 a side."""
+    """Return the samples, and the volumes of a folder with sides of at least 16."""
     for name in samples.names():
         sample = samples.load(name)
         if sample.image.ndim == 4:
@@ -78,7 +78,7 @@ def asked(name: str) -> tuple[str, ...]:
 def measure(
     name: str, image: np.ndarray, mask: np.ndarray | None, kind: str, results: list[Any], still: list[Any], side: int
 ) -> dict[str, Any]:
-    """Return what each check finds, the mean over the seeds; none where it does not apply."""
+    """Return the results of each check, the mean over the seeds, or none if a check does not apply."""
     turned = kind != "identity"
     found: dict[str, list[Any]] = {check: [] for check in HEAD}
     for seed, (made, unturned) in enumerate(zip(results, still, strict=True)):
@@ -103,7 +103,7 @@ def cell(record: Any) -> str:
 
 
 def judged(evaluator: Any, image: np.ndarray, made: np.ndarray) -> str:
-    """Return what the evaluator says of a volume: its figures, and which fail."""
+    """Return the evaluator's numbers for a volume, and the names of those that fail."""
     try:
         scores = evaluator.compare_volumes(image, made)
     except ValueError as problem:

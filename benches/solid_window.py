@@ -1,7 +1,7 @@
 """Measure time and memory of windows of unbounded textures.
 
-Run ``python benches/solid_window.py [--quality Q] [--volume N]``. Processor seconds are those of all threads together; a
-machine that does nothing else needs them divided by its cores. ``--volume`` also writes a volume of N voxels a side to
+Run ``python benches/solid_window.py [--quality Q] [--volume N]``. Processor seconds are the sum over all threads. On
+an idle machine, divide them by its cores to get wall time. ``--volume`` also writes a volume of N voxels a side to
 disk, slab by slab.
 """
 
@@ -19,7 +19,7 @@ from texrs import fields, io, samples
 
 
 def measured(name: str, work: Callable[[], object]) -> None:
-    """Print how long something takes."""
+    """Print the time of a call."""
     began, processor = time.perf_counter(), time.process_time()
     work()
     print(
@@ -29,7 +29,7 @@ def measured(name: str, work: Callable[[], object]) -> None:
 
 
 def peak() -> str:
-    """Return the most memory that was held so far."""
+    """Return the peak memory so far."""
     return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB at most"
 
 

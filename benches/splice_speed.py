@@ -3,9 +3,10 @@
     python benches/splice_speed.py [SIDE ...]
     python benches/splice_speed.py growth [SIDE ...]
 
-The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the elements' parts are. The
-system's side includes the margin. "growth" analyses and splices ever larger pictures, of disjoint elements and a wall, each in
-a process of its own, whose peak of memory is told; there the similarity sets are part of a splice.
+The similarity sets are computed in advance. "cold": nothing else is cached. "cached": the factor and the parts of
+elements are. The side of the system includes the margin. "growth" analyses and splices larger and larger images, of
+disjoint elements and of a wall. Each has its own process, whose peak memory is printed. There, the similarity sets are
+part of a splice.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def entry(name: str, side: int) -> ElementAnalysis:
 def best(
     work: Callable[[], object], before: Callable[[], object] = lambda: None, rounds: int = ROUNDS
 ) -> tuple[float, float]:
-    """Return the least time that passed, and the least time of all processors, in milliseconds."""
+    """Return the minimum wall time, and the minimum time of all processors, in milliseconds."""
     found = []
     for _ in range(rounds):
         before()
@@ -64,7 +65,7 @@ def splices(sides: list[int]) -> None:
             def work(mine: ElementAnalysis = mine, theirs: ElementAnalysis = theirs) -> texrs.Synthesis:
                 return texrs.splice(mine, theirs, seed=1)
 
-            # What is put together from cells or knots has no system to solve.
+            # Textures composed of cells or knots have no system to solve.
             system = work().report.get("system", [0])
             cold, cached = best(work, forget), best(work)
             preview = best(lambda mine=mine, theirs=theirs: texrs.splice(mine, theirs, seed=1, method="preview"))
@@ -82,7 +83,7 @@ def warps() -> None:
 
 
 def grown(what: str, side: int) -> None:
-    """Do one thing with a picture of a side, and tell how long that took and the most memory that was held."""
+    """Process an image of one side. Return the time and the peak memory."""
     mine = entry("bricks" if what == "wall" else "dots", side)
     theirs = entry("pebbles", side) if what in ("splice", "wall") else mine
     middle = np.abs(mine.points - side / 2).sum(axis=1).argmin()

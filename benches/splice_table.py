@@ -2,14 +2,15 @@
 
     TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto] [--method paper] [--tears deep_quality.py]
 
-The folder holds ``b-disjoint``, ``c-connected`` and ``d-background``: pictures beside JSON files with a box, scribbles and a
-tag, all of them (x, y). With ``--auto`` only the pictures are used. Without a folder the built-in samples are spliced.
+The folder contains ``b-disjoint``, ``c-connected`` and ``d-background``: images next to JSON files with a box,
+scribbles and a tag, all in (x, y). With ``--auto`` only the images are used. Without a folder the built-in samples are
+spliced.
 
-A line a texture, means over all other layouts: how it was put together, the share of targets with an element within .2 of its
-size (by the source map), how much of the wanted way was realised, the sharpness (mean gradient, over the texture's own), the
-same of the ground between separate elements alone, lines that break off (`texrs.metrics`), how alike the results are on two
-layouts (correlation), and the seconds of a processor. With ``--tears``, a module with `Judge(exemplar).scores(picture)`, the
-share of torn cells on its own layout and on others.
+Each row is a texture, with means over all other layouts. It gives the method, and the share of targets with an element
+within 0.2 of its size (by the source map). It gives the reached share of the displacement, and the sharpness (mean
+gradient, divided by the texture's own), also for the background between separate elements only. It gives broken lines
+(`texrs.metrics`), the correlation of the results on two layouts, and the processor seconds. With ``--tears``, a module
+with `Judge(exemplar).scores(picture)`, it gives the share of torn cells on its own layout and on others.
 """
 
 from __future__ import annotations
@@ -32,13 +33,13 @@ from texrs.errors import TexrsError
 from texrs.papers.splice.stage_drawings import to_picture
 
 CLEAR = 4
-"""How far, in pixels, the ground that is measured lies from any element: nearer is what comes with it, its shadow."""
+"""Minimum distance in pixels between the measured background and elements, because their shadows are nearer."""
 HEAD = "| texture | method | present | realised | sharpness | ground | broken | torn: own | others | alike | s |"
 SAMPLES = ("dots", "pebbles", "leaves_and_flowers", "net", "bricks", "scales", "weave")
 
 
 def read(path: Path, *, auto: bool) -> ElementAnalysis:
-    """Analyse a picture, as its JSON says or all by itself."""
+    """Analyse an image with its JSON, or automatically."""
     image = io.read(path)
     told = json.loads(path.with_suffix(".json").read_text())
     if auto:
@@ -68,13 +69,13 @@ def entries(folder: str | None, *, auto: bool) -> dict[str, ElementAnalysis]:
 
 
 def measure_sharpness(image: np.ndarray) -> float:
-    """Return the mean size of the gradient of the grey values."""
+    """Return the mean gradient length of the grey values."""
     grey = to_picture(image).mean(axis=-1)
     return float(np.hypot(*np.gradient(grey)).mean())
 
 
 def measure_ground(a: ElementAnalysis, result: texrs.Synthesis) -> float:
-    """Return the mean gradient of the ground between separate elements, over the texture's own; nan where that is flat."""
+    """Return the mean gradient of the background between elements, divided by the texture's own, or NaN if it is flat."""
 
     def steep(image: np.ndarray, elements: np.ndarray) -> float:
         grey = to_picture(image).mean(axis=-1)
@@ -85,13 +86,13 @@ def measure_ground(a: ElementAnalysis, result: texrs.Synthesis) -> float:
 
 
 def measure_likeness(images: list[np.ndarray]) -> float:
-    """Return the mean correlation of all pairs of pictures."""
+    """Return the mean correlation of all pairs of images."""
     flat = [to_picture(i).mean(axis=-1).ravel() for i in images]
     return float(np.mean([np.corrcoef(a, b)[0, 1] for a, b in combinations(flat, 2)])) if len(flat) > 1 else 0.0
 
 
 def measure_present(result: texrs.Synthesis) -> float:
-    """Return the share of targets well within the picture where an element is."""
+    """Return the share of targets well inside the image with an element."""
     report = result.report
     if "present" in report:
         return float(report["present"])
@@ -101,7 +102,7 @@ def measure_present(result: texrs.Synthesis) -> float:
 
 
 def small(image: np.ndarray, side: int = 192) -> np.ndarray:
-    """Show the top left corner, padded to a square."""
+    """Return the top left corner, padded to a square."""
     shown = to_picture(image)[:side, :side]
     return np.pad(shown, ((0, side - shown.shape[0] + 4), (0, side - shown.shape[1] + 4), (0, 0)))
 

@@ -1,8 +1,8 @@
 """Measure how fast workers fill a store, and their memory; check that the bytes are the same.
 
-Run ``python benches/stores_table.py volume|items|matrix|tiles|model [--side 512] [--workers 1,2]``. Processor seconds are said
-beside those of the wall, which count only where nothing else runs: their ratio is the efficiency that a quiet machine would
-show.
+Run ``python benches/stores_table.py volume|items|matrix|tiles|model [--side 512] [--workers 1,2]``. Processor seconds
+are printed next to wall seconds, which are only valid on an idle machine. Their ratio is the efficiency on an idle
+machine.
 """
 
 import argparse
@@ -33,12 +33,12 @@ CLOSED = (False, False, False)
 
 @dataclass
 class Spent:
-    """What a piece of work took, in this process and in those that it started and that have ended."""
+    """Time and memory of work, in this process and in its finished children."""
 
     wall: float = 0.0
     processor: float = 0.0
     memory: float = 0.0
-    """GiB of the largest process that was started."""
+    """Memory of the largest child process, in GiB."""
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def measure() -> Iterator[Spent]:
     both = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     start, before = time.perf_counter(), sum(u.ru_utime + u.ru_stime for u in map(resource.getrusage, both))
     yield spent
-    # What a process took is known when it has ended.
+    # The memory of a process is known after its end.
     for each in multiprocessing.active_children():
         each.join(60)
     used = list(map(resource.getrusage, both))
@@ -61,7 +61,7 @@ def digest(array: np.ndarray) -> str:
 
 
 def volume(given: argparse.Namespace, folder: str) -> None:
-    """Fill a volume, and compare it with windows made alone."""
+    """Fill a volume, and compare it with windows computed separately."""
     texture = texrs.SolidTexture(samples.particles((48, 48, 48)).image, seed=1, cache_bytes=given.cache << 20)
     stated = texture.estimate_memory(given.chunks) / 2**30
     first = None
@@ -94,7 +94,10 @@ def volume(given: argparse.Namespace, folder: str) -> None:
 
 
 def model(given: argparse.Namespace, folder: str) -> None:
-    """Count the boxes that workers make, in place of making them: those along the sides of what each makes are made twice."""
+    """Count the boxes that workers would compute, instead of computing them.
+
+    Boxes at the sides of their parts are computed twice.
+    """
     texture = texrs.SolidTexture(samples.particles((48, 48, 48)).image, seed=1, cache_bytes=given.cache << 20)
     world, made = texture._world, 0
     texture.window(0, 1)
@@ -142,7 +145,7 @@ def make_pair(pictures: list[np.ndarray], size: int, folder: str | None, row: in
 
 
 def compute(given: argparse.Namespace, folder: str, function: functools.partial, items: list, shape: object) -> None:
-    """Compute items in this process and on a cluster, and compare time and digests."""
+    """Compute items in this process and on a cluster. Compare time and digests."""
     from distributed import Client, LocalCluster
 
     spent, found = {}, {}
@@ -183,14 +186,14 @@ def compute(given: argparse.Namespace, folder: str, function: functools.partial,
 
 
 def items(given: argparse.Namespace, folder: str) -> None:
-    """Variants of one picture."""
+    """Return variants of one image."""
     image = samples.dots((96, 96)).image
     work = functools.partial(make_variant, image, given.size)
     compute(given, folder, work, [{"seed": seed} for seed in range(given.count)], None)
 
 
 def matrix(given: argparse.Namespace, folder: str) -> None:
-    """Splices of all pairs of pictures."""
+    """Return splices of all pairs of images."""
     pictures = [samples.dots((96, 96), seed=seed).image for seed in range(given.rows)]
     work = functools.partial(make_pair, pictures, 96)
     pairs = [{"row": r, "column": c} for r, c in itertools.product(range(given.rows), repeat=2)]
@@ -198,7 +201,7 @@ def matrix(given: argparse.Namespace, folder: str) -> None:
 
 
 def tiles(given: argparse.Namespace, folder: str) -> None:
-    """Windows of corner tiles far away."""
+    """Return windows of corner tiles far away."""
     with measure() as spent:
         made = texrs.CornerTiles(samples.pebbles((192, 192)).image, seed=1)
     print(f"{made}: made in {spent.processor:.0f} processor seconds")

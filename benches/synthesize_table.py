@@ -3,12 +3,12 @@
     python benches/synthesize_table.py OUT --evaluator FILE.py ... [--verb synthesize] [--seeds 3] [--whole] [--size 768]
         [--shown 768] [--quality preserve] [--only NAME] [--resynthesizer PROGRAM] PICTURE ...
 
-The verbs: `texrs.synthesize`, `texrs.design`, and windows of `texrs.CornerTiles`. The exemplar is the middle 256 a side of each
-picture, or the whole of it; results are twice as large, or of the size that is asked for, and kept in OUT. Evaluators are shown
-the middle of them where they are larger than `--shown`. A result is fine where every score of every evaluator is in its bounds,
-or no worse than 1.1 times that of a second crop of the same photograph, as far from the exemplar as can be. Quilting is
-`texrs.design` with nothing deformed, mirrored or blended. The Resynthesizer is an external program (`fillers.py`
-says how it is built); it is given the exemplar with the rest to fill, once.
+The verbs are `texrs.synthesize`, `texrs.design`, and windows of `texrs.CornerTiles`. The exemplar is the middle 256
+pixels a side of each image, or all of it. Results have twice its size, or the requested one, and stay in OUT.
+Evaluators get the middle of results larger than `--shown`. A result is good if all its scores are in their bounds, or at
+most 1.1 times the score of a second crop of the same photograph. This crop is as far from the
+exemplar as possible. Quilting is `texrs.design` without deformation, mirror images and blending. The Resynthesizer is
+an external program (see `fillers.py`). It fills the rest around the exemplar, once.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def middle(image: np.ndarray, side: int = SIDE) -> np.ndarray:
 
 
 def second(image: np.ndarray) -> np.ndarray | None:
-    """Return the largest corner of the picture that overlaps the middle least; none where there is nothing beside it."""
+    """Return the largest corner of the image that overlaps the middle least, or none without other pixels."""
     if max(image.shape[:2]) < 1.5 * SIDE:
         return None
     rows, columns = (min(n, SIDE) for n in image.shape[:2])
@@ -45,7 +45,7 @@ def second(image: np.ndarray) -> np.ndarray | None:
 
 
 def by_resynthesizer(program: Path, image: np.ndarray) -> np.ndarray:
-    """Return what the engine fills beside the exemplar, with colours of the exemplar alone."""
+    """Return the engine's result next to the exemplar, with colours of the exemplar only."""
     rows, columns = image.shape[:2]
     canvas = np.zeros((2 * rows, 3 * columns, 3), np.uint8)
     canvas[:rows, :columns] = image[..., :3] if image.ndim == 3 else image[..., None]
@@ -62,7 +62,7 @@ def by_resynthesizer(program: Path, image: np.ndarray) -> np.ndarray:
 
 
 def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[str, int, np.ndarray]]:
-    """Return each way's results, one for each seed."""
+    """Return the results of each method, one for each seed."""
     size = (options.size, options.size) if options.size else (2 * image.shape[0], 2 * image.shape[1])
     for seed in range(1, options.seeds + 1):
         if options.verb == "design":
@@ -80,7 +80,7 @@ def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[st
 
 
 def judged(judges: evaluators.Judges, scores: dict[str, float], real: dict[str, float]) -> tuple[list[str], str]:
-    """Return which scores are neither in bounds nor like a real crop's, and them in words."""
+    """Return the scores that are neither in bounds nor similar to a real crop's, and their text."""
     bad = [n for n in judges.failed(scores) if n not in real or judges.worse(n, scores[n], real[n]) > 1.1]
     return bad, " ".join(f"{n} {scores[n]:.2f}" for n in bad)
 

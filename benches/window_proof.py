@@ -1,9 +1,9 @@
 """Check the bytes of random windows of unbounded textures: they must not depend on the order of requests.
 
-Run ``python benches/window_proof.py [--windows 100] [--seed 1] [--axes N] [--only FIELD]``. For pictures and volumes, each
-without a field and under two, a whole is made at once. Then workers, forked and spawned, with 1, 2 and 7 threads, each ask
-for the same random windows in an order of their own, from textures that keep all, little or nothing of what they have made.
-Pixels and coordinates are compared with those of the whole, byte by byte; a line of the table is a worker. Ends with 1 if any
+Run ``python benches/window_proof.py [--windows 100] [--seed 1] [--axes N] [--only FIELD]``. For images and volumes,
+each without a field and under two, a whole is computed first. Then workers, forked and spawned, with 1, 2 and 7
+threads, request the same random windows in different orders. Their textures cache all, little or nothing. Pixels and
+coordinates are compared with the whole, byte by byte. Each row of the table is a worker. The exit code is 1 if any
 byte differs.
 """
 
@@ -26,13 +26,13 @@ FIELDS: dict[str, Callable[[int], fields.Field | None]] = {
     "circular": lambda axes: fields.circular(centre=(5,) * axes, axes=axes),
     "zigzag": lambda axes: fields.zigzag(period=24, angle=30, axes=axes),
 }
-"""The pole of the circular field and folds of the zigzag one lie in the whole."""
+"""Fields. The pole of the circular field and folds of the zigzag field are inside the whole."""
 SIDE, LARGEST = {2: 160, 3: 28}, {2: 48, 3: 10}
-"""Of the whole, whose middle is the origin, and of a window."""
+"""Side of the whole, whose middle is the origin, and of a window."""
 KEPT = (1 << 28, 1 << 17, 0)
-"""Bytes that textures keep."""
+"""Bytes that textures cache."""
 SELDOM = (1, 20, 100)
-"""Of so many windows one is asked from a texture that keeps so much: the less it keeps, the longer that takes."""
+"""One in this many windows is requested from a texture with each cache size. A smaller cache takes longer."""
 
 Window = tuple[tuple[int, ...], tuple[int, ...]]
 """Origin and size."""
@@ -41,7 +41,7 @@ Task = tuple[int, str, int, int, tuple[Window, ...]]
 
 
 def make_texture(axes: int, field: str, kept: int) -> texrs.PlaneTexture | texrs.SolidTexture:
-    """Return a texture that keeps so many bytes."""
+    """Return a texture with a given cache size in bytes."""
     if axes == 2:
         return texrs.PlaneTexture(samples.dots((48, 48)).image, field=FIELDS[field](2), seed=3, cache_bytes=kept)
     return texrs.SolidTexture(samples.particles((32, 32, 32)).image, field=FIELDS[field](3), seed=3, cache_bytes=kept)
@@ -56,7 +56,7 @@ def draw(axes: int, count: int, seed: int) -> tuple[Window, ...]:
 
 
 def ask(task: Task) -> tuple[list[tuple[int, bytes, bytes]], float]:
-    """Return the windows in the order that they were asked for: number, pixels and coordinates; and processor seconds."""
+    """Return the windows in the requested order (number, pixels and coordinates), and processor seconds."""
     axes, field, threads, seed, windows = task
     rng = np.random.default_rng([seed, axes, threads])
     kept = [make_texture(axes, field, size) for size in KEPT]
@@ -76,14 +76,14 @@ def cut(whole: np.ndarray, axes: int, window: Window) -> bytes:
 
 
 def count_differing(a: bytes, b: bytes) -> int:
-    """Return how many bytes differ; all of them where there are not as many."""
+    """Return the number of different bytes, or all bytes if the numbers differ."""
     if len(a) != len(b):
         return max(len(a), len(b))
     return int(np.count_nonzero(np.frombuffer(a, np.uint8) != np.frombuffer(b, np.uint8)))
 
 
 def prove(axes: int, field: str, windows: Sequence[Window], seed: int) -> tuple[int, int]:
-    """Ask all workers, print a line for each, and return how many windows there were and how many bytes differed."""
+    """Run all workers, and print a line for each. Return the numbers of windows and of different bytes."""
     began, half = time.perf_counter(), SIDE[axes] // 2
     whole = make_texture(axes, field, KEPT[0]).window((-half,) * axes, (SIDE[axes],) * axes)
     image, coordinates = np.asarray(whole.image), np.asarray(whole.source_map.coordinates)

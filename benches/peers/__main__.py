@@ -1,15 +1,15 @@
-"""texrs beside others: the same work, results compared first, rounds in turn; written as JSON.
+"""Compare texrs with other libraries and programs: results first, then rounds in turn, written as JSON.
 
     make bench
     python benches/peers [--rounds 5] [--only strip-512 ...] [--out benches/peers.json] [--python .venv-peers/bin/python]
 
-Each side of a row works in a process of its own, in one thread, and takes its turn when it is told to: what the machine does
-besides falls on all alike. Seconds are those of the processor, but where threads are compared. Megabytes are those that the
-first time of the work took beyond what was there when all was ready. The floor is what copying the input once takes: nothing
-can be faster. The libraries of others live in an environment of their own (`make bench` makes .venv-peers): some are under the
-GPL, none is ever loaded beside texrs. Programs of others are found by a variable or on the PATH: RESYNTHESIZER, QUILTING,
-LEFEBVRE and APPEARANCE, which `holes.py` and `synthesis.py` describe. Who is missing is named with how to get it. Figures of
-papers are of other hardware, and say so. The page "Performance" of the documentation is drawn from what is written.
+Each side of a row has its own process with one thread. The sides take turns, so that other work of the machine affects
+all of them equally. Seconds are processor seconds, except where threads are compared. Megabytes are the additional
+memory of the first run, after preparation. The floor is the time of one copy of the input. Other libraries have their
+own environment (`make bench` creates .venv-peers), because some are under the GPL, and none is loaded together with
+texrs. Other programs are found by a variable or on the PATH: RESYNTHESIZER, QUILTING, LEFEBVRE and APPEARANCE (see
+`holes.py` and `synthesis.py`). Missing ones are listed with installation hints. Numbers from papers are marked as
+such, because they are from other hardware. The page "Performance" of the documentation shows the output.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ NEEDS = {
     "CHOLMOD": "cvxopt",
     "scikit-image": "skimage",
 }
-"""What is not here alone; NumPy and SciPy are in both environments."""
+"""Modules of the peers' environment only. NumPy and SciPy are in both environments."""
 
 
 def look_for(who: str, python: Path) -> str:
-    """Return how to get a side that is missing, or nothing."""
+    """Return the installation hint of a missing side, or nothing."""
     if who.startswith("texrs"):
         return ""
     if who in PROGRAMS:
@@ -69,7 +69,7 @@ def look_for(who: str, python: Path) -> str:
 
 
 def measure(name: str, row: Row, rounds: int, python: Path) -> dict[str, Any]:
-    """Let all sides of a row that are here take turns; return what is written of it."""
+    """Let all available sides of a row take turns. Return the record of the row."""
     absent = {who: get for who in row.sides if (get := look_for(who, python))}
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "arrays.npz")
@@ -109,7 +109,7 @@ def _hear(name: str, who: str, side: subprocess.Popen[str]) -> Any:
 
 
 def compare(name: str, row: Row, results: dict[str, np.ndarray]) -> None:
-    """Refuse to measure what does not do the same."""
+    """Refuse to measure sides with different results."""
     mine = results[next(iter(row.sides))]
     for who, theirs in results.items():
         apart = row.apart(mine, theirs)
@@ -118,8 +118,8 @@ def compare(name: str, row: Row, results: dict[str, np.ndarray]) -> None:
 
 
 def describe(row: Row, first: dict[str, Any], times: dict[str, list[float]], absent: dict[str, str]) -> dict[str, Any]:
-    """Return a row as it is written."""
-    # Of seconds that pass the least: what else the machine does makes all others longer.
+    """Return a row as printed."""
+    # Use the minimum of wall times, because other work of the machine makes all others longer.
     middle: Callable[[list[float]], float] = min if row.wall else lambda taken: float(np.median(taken))
     base = middle(next(iter(times.values())))
     rows = [

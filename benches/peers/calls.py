@@ -1,4 +1,4 @@
-"""Across rows: what a second thread brings, what a call from Python costs, and that no input is copied."""
+"""Rows about calls: the gain of a second thread, the cost of a call from Python, and a check that no input is copied."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ THREADS = {"near-256": matching, "near-24": matching, "patch-512": matching, "so
 
 
 def _with_two(side: Side) -> Side:
-    """The same, in two threads."""
+    """Run the same work in two threads."""
 
     def ready(given: Arrays) -> Work:
         from texrs._rust import set_threads
@@ -26,7 +26,7 @@ def _with_two(side: Side) -> Side:
 
 
 def _threaded(row: Row) -> Row:
-    """Two threads beside one: seconds that pass, and the same result to the bit."""
+    """Compare two threads with one: wall time, and the same result to the bit."""
     sides = {"texrs, two threads": _with_two(row.sides["texrs"]), "texrs, one thread": row.sides["texrs"]}
     asked, check = {"texrs, one thread": 1.8}, "the same result"
     plain: dict[str, Any] = {"published": {}, "most_ms": None, "most_mb": None, "shown": "", "wall": True}
@@ -34,12 +34,12 @@ def _threaded(row: Row) -> Row:
 
 
 def make_pixel() -> dict[str, Any]:
-    """Nothing to do."""
+    """Prepare almost no work."""
     return {"image": np.zeros((2, 2, 1), np.float32), "at": np.zeros((1, 1, 2), np.float32)}
 
 
 def call_often(given: Arrays) -> Work:
-    """A thousand look-ups of one pixel: milliseconds of these are microseconds of a call."""
+    """Look up one pixel a thousand times, so that milliseconds are microseconds for a call."""
     from texrs.kernels.gather import gather
 
     image, at = given["image"], given["at"]
@@ -53,12 +53,12 @@ def call_often(given: Arrays) -> Work:
 
 
 def make_large() -> dict[str, Any]:
-    """An exemplar of 128 MB, of which one pixel is looked up."""
+    """Prepare an exemplar of 128 MB for the lookup of one pixel."""
     return {"image": np.zeros((4096, 4096, 2), np.float32), "at": np.zeros((1, 1, 2), np.float32)}
 
 
 def call_once(given: Arrays) -> Work:
-    """Were the exemplar copied, the call would take 128 MB."""
+    """Look up one pixel. If the exemplar were copied, the call would take 128 MB."""
     from texrs.kernels.gather import gather
 
     return lambda: gather(given["image"], given["at"], interpolation="nearest")

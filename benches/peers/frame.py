@@ -1,7 +1,7 @@
-"""What a row is, and the process that is one side of it.
+"""Rows of the comparison, and the process of one side of a row.
 
-A side works in a process of its own, in its own environment, and takes its turn when it is told to. The sides of other
-libraries know nothing of texrs: what all work on is made once, and handed over as a file of arrays.
+A side has its own process and environment, and takes its turn on request. Sides of other libraries do not import
+texrs: the inputs are created once, and passed as a file of arrays.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ import numpy as np
 Arrays = Mapping[str, Any]
 Work = Callable[[], Any]
 Side = Callable[[Arrays], Work]
-"""Makes ready, and returns the work that is measured."""
+"""Function that prepares, and returns the work to measure."""
 
 
 class Timed(NamedTuple):
-    """What a program has made, and the seconds that it says it took itself, less reading and writing."""
+    """Result of a program, and its own report of its seconds, without reading and writing."""
 
     result: Any
     seconds: float
 
 
 def is_near(mine: np.ndarray, theirs: np.ndarray) -> float:
-    """Return how far apart two results are at most."""
+    """Return the maximum difference of two results."""
     return float(np.abs(mine - theirs).max())
 
 
 def is_mostly_near(mine: np.ndarray, theirs: np.ndarray) -> float:
-    """Return how far apart two results are at half their places."""
+    """Return the median difference of two results."""
     return float(np.median(np.abs(mine - theirs)))
 
 
@@ -51,36 +51,36 @@ def keep_all(result: Any) -> list[float]:
 
 
 def keep_some(result: Any) -> list[float]:
-    """Return every 97th value: enough to tell results apart."""
+    """Return every 97th value, which is enough to distinguish results."""
     return np.asarray(result, np.float64).ravel()[::97].tolist()
 
 
 @dataclass(frozen=True)
 class Row:
-    """Work that several do: what it is done on, who does it, how results are compared, and what is asked for.
+    """A row: its input, its sides, the comparison of results, and its targets.
 
     Attributes
     ----------
     number : str
-        Rows that measure one thing share a number.
+        Number of the row. Rows that measure the same work share it.
     title, check : str
-        What is done, and what of the results was compared.
+        Description of the work, and of the comparison of results.
     make : callable
-        Returns the arrays that all sides are given.
+        Function that returns the input arrays of all sides.
     sides : dict
-        texrs first.
+        Sides by name, texrs first.
     reduce, apart, tolerance
-        A result as a few numbers; how far apart those of two sides are, and how far they may be.
+        Function that reduces a result to a few numbers, difference of two such results, and maximum difference.
     asked : dict
-        How many times as long a side, or what was published, is to take at least.
+        Minimum ratio of the time of a side, or of published numbers, to the time of texrs.
     published : dict
-        Milliseconds that were printed, of other hardware.
+        Published milliseconds, from other hardware.
     most_ms, most_mb : float, optional
-        What texrs is to take at most.
+        Maximum time and memory of texrs.
     wall : bool
-        Whether seconds that pass count: where threads are compared. Those of the processor otherwise.
+        If True, wall time counts, for comparisons of threads. Otherwise processor time counts.
     shown : str
-        What the number that a result is reduced to is called, where results cannot be equal: an error of which less is better.
+        Name of the number that a result is reduced to, if results cannot be equal: an error, where less is better.
     """
 
     number: str
@@ -111,7 +111,7 @@ def find_rows() -> dict[str, Row]:
 
 
 def be_side(name: str, who: str, file: str) -> None:
-    """Be one side of a row: make ready, do the work once, then whenever a line comes in, and say what it took."""
+    """Run as one side of a row: prepare, work once, then work again for each input line, and report the time."""
     row = find_rows()[name]
     with np.load(file) as stored:
         arrays = {key: stored[key] for key in stored.files}
@@ -141,8 +141,8 @@ def be_side(name: str, who: str, file: str) -> None:
 
 
 def read_memory(what: str = "VmRSS") -> float:
-    """Return megabytes that this process has, or with VmHWM the most that it had since this was asked for without."""
-    # Writing 5 there forgets the most, which making ready may have taken.
+    """Return the megabytes of this process, or with VmHWM the peak since the last call without it."""
+    # Writing 5 there resets the peak, which preparation may have reached.
     if what == "VmRSS" and Path("/proc/self/clear_refs").exists():
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
     status = Path("/proc/self/status")
@@ -152,5 +152,5 @@ def read_memory(what: str = "VmRSS") -> float:
 
 
 if __name__ == "__main__":
-    # Of this file's other self, whose Timed the rows know.
+    # Use the module object of this file that the rows import, because of its class Timed.
     importlib.import_module("frame").be_side(*sys.argv[1:])

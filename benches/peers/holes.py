@@ -1,11 +1,12 @@
 """Row 9: square holes in textures, filled by example.
 
-Results are compared by the patch error over each hole: how far 9 x 9 patches that touch it are, in the mean, from the likest
-one of the picture around it, 1 less their correlation. It is shown beside the times. (By squared differences, what is blurred
-is nearest to all else: the Resynthesizer's pictures, of which two in three are, then come before the photograph itself.)
+Results are compared by the patch error over each hole. It is the mean of 1 minus the correlation between 9 x 9 patches
+that touch the hole and the most similar patches of the known image. It is shown next to the times. (With squared
+differences, blurred images are nearest to all others. Two of three results of the Resynthesizer are then better than
+the photograph itself.)
 
-The Resynthesizer (github.com/bootchk/resynthesizer, GPL) is an external program, named by the variable RESYNTHESIZER, which
-`fillers.py` says how to build.
+The Resynthesizer (github.com/bootchk/resynthesizer, GPL) is an external program, given by the variable RESYNTHESIZER.
+`fillers.py` describes how to build it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from frame import Arrays, Row, Side, Timed, Work
 
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # For fillers, which tables use too.
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # Import fillers, which tables also use.
 PATCH = 9
 GIVEN = 32
 EVEN = 2.0
@@ -27,7 +28,7 @@ TEXTURES = ("brick", "grass", "gravel")
 
 
 def make_holes(side: int) -> dict[str, Any]:
-    """A quarter of the side is missing in the middle of each of three textures."""
+    """Remove a square of a quarter of the side in the middle of each of three textures."""
     from skimage import data
 
     truth = np.stack([np.stack([getattr(data, name)()[:side, :side]] * 3, axis=-1) for name in TEXTURES])
@@ -37,21 +38,24 @@ def make_holes(side: int) -> dict[str, Any]:
 
 
 def fill_by_texrs(given: Arrays) -> Work:
-    """All that the verb does."""
+    """Fill with all steps of the verb."""
     import texrs
 
     return lambda: [texrs.inpaint(image, given["hole"]).image for image in given["images"]]
 
 
 def fill_by_one_size(given: Arrays) -> Work:
-    """With the size of patches given, as the others have one: by default several are tried, and the best is kept."""
+    """Fill with the given patch size, as the others have only one.
+
+    By default several are tried, and the best result is kept.
+    """
     import texrs
 
     return lambda: [texrs.inpaint(image, given["hole"], patch_size=GIVEN).image for image in given["images"]]
 
 
 def fill_by_opencv(given: Arrays) -> Work:
-    """Shifted pieces, in Lab as its documentation asks."""
+    """Fill with shifted pieces, in Lab as its documentation requests."""
     import cv2
 
     from fillers import by_opencv
@@ -61,7 +65,7 @@ def fill_by_opencv(given: Arrays) -> Work:
 
 
 def fill_by_program(given: Arrays) -> Work:
-    """One thread, its default parameters; it says how long it took."""
+    """Fill with one thread and default parameters. The program reports its time."""
     from fillers import by_program
 
     fill = by_program(Path(os.environ["RESYNTHESIZER"]).resolve())
@@ -74,7 +78,7 @@ def fill_by_program(given: Arrays) -> Work:
 
 
 def measure_patches(truth: np.ndarray, made: np.ndarray, hole: np.ndarray) -> float:
-    """Return how far patches that touch the hole are from the likest known one: 1 - their correlation, in the mean."""
+    """Return the mean of 1 - correlation between patches that touch the hole and the most similar known ones."""
     from numpy.lib.stride_tricks import sliding_window_view
 
     touched = sliding_window_view(hole, (PATCH, PATCH)).any((2, 3))
@@ -84,7 +88,7 @@ def measure_patches(truth: np.ndarray, made: np.ndarray, hole: np.ndarray) -> fl
         patches = sliding_window_view(picture.mean(-1, dtype=np.float32), (PATCH, PATCH))[at[:, 0], at[:, 1]]
         patches = patches.reshape(len(at), -1)
         patches = patches - patches.mean(1, keepdims=True)
-        # Of what is even, its noise is not to be compared.
+        # Do not compare the noise of plain patches.
         return patches / np.maximum(np.linalg.norm(patches, axis=1, keepdims=True), EVEN * PATCH)
 
     wanted, best = cut(made, new), np.zeros(len(new))

@@ -8,11 +8,11 @@ import numpy as np
 from frame import Arrays, Row, Side, Work, is_near, keep_some
 
 BORDER = 2
-"""Pixels along the border of an exemplar whose windows do not lie inside."""
+"""Pixels along the border of an exemplar whose windows are not inside."""
 
 
 def make_vectors(side: int, numbers: int) -> dict[str, Any]:
-    """Appearance vectors of a texture: what similarity sets are made of."""
+    """Compute appearance vectors of a texture, as for similarity sets."""
     from skimage import data
 
     from texrs._engine.appearance import Appearance
@@ -25,7 +25,7 @@ def make_vectors(side: int, numbers: int) -> dict[str, Any]:
 
 
 def find_by_texrs(given: Arrays) -> Work:
-    """For each pixel the nearest other one; distances from where these lie, when results are compared."""
+    """Find for each pixel the nearest other one. Compute distances when results are compared."""
     from texrs._engine.appearance import Appearance
     from texrs._engine.coherence import find_similar
 
@@ -43,7 +43,7 @@ def find_by_texrs(given: Arrays) -> Work:
 
 
 def find_by_scipy(given: Arrays) -> Work:
-    """A k-d tree, built and asked."""
+    """Build and query a k-d tree."""
     from scipy.spatial import cKDTree
 
     doubles = given["vectors"].astype(np.float64)
@@ -51,7 +51,7 @@ def find_by_scipy(given: Arrays) -> Work:
 
 
 def find_by_faiss(given: Arrays) -> Work:
-    """All pairs."""
+    """Compare all pairs."""
     import faiss
 
     faiss.omp_set_num_threads(1)
@@ -75,7 +75,7 @@ def _distances(result: Any) -> list[float]:
 
 
 def make_patch() -> dict[str, Any]:
-    """A picture, and a patch that is nearly one of it, of which three quarters count."""
+    """Return an image, and a patch that is nearly one of its patches, with 3/4 of its pixels counting."""
     from skimage import data
 
     source = data.retina()[200:1200, 200:1200].astype(np.float32)
@@ -87,7 +87,7 @@ def make_patch() -> dict[str, Any]:
 
 
 def match_by_texrs(given: Arrays) -> Work:
-    """Spectra of the picture are kept."""
+    """Match with cached spectra of the image."""
     from texrs.kernels.patch_search import PatchIndex
 
     index = PatchIndex([given["image"]], max_patch=32)
@@ -104,7 +104,7 @@ def _least(costs: np.ndarray) -> tuple[int, ...]:
 
 
 def match_by_scipy(given: Arrays) -> Work:
-    """The same correlation in one piece, spectra of the picture kept."""
+    """Compute the same correlation in one piece, with cached spectra of the image."""
     from scipy import fft
 
     image, patch, weight = given["image"], given["patch"], given["weight"]
@@ -122,7 +122,7 @@ def match_by_scipy(given: Arrays) -> Work:
 
 
 def match_by_opencv(given: Arrays) -> Work:
-    """matchTemplate with a mask."""
+    """Match by matchTemplate with a mask."""
     import cv2
 
     cv2.setNumThreads(1)

@@ -1,4 +1,4 @@
-"""Row 7: pictures from their differences."""
+"""Row 7: images from their differences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from frame import Arrays, Row, Work, is_mostly_near, is_near, keep_some
 
 
 def make_scene(side: int) -> dict[str, Any]:
-    """Two pictures, of which one is to take on the other's differences."""
+    """Return two images. The first takes the differences of the second."""
     from skimage import data
     from skimage.transform import resize
 
@@ -23,7 +23,7 @@ def _differences(given: Arrays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def solve_by_texrs(given: Arrays) -> Work:
-    """The borders stay."""
+    """Solve with fixed borders."""
     from texrs.kernels import poisson
 
     image, rows, columns = _differences(given)
@@ -31,7 +31,7 @@ def solve_by_texrs(given: Arrays) -> Work:
 
 
 def solve_by_scipy(given: Arrays) -> Work:
-    """Sine transforms, channel by channel, float32."""
+    """Solve by sine transforms, channel by channel, in float32."""
     from scipy import fft
 
     image, rows, columns = _differences(given)
@@ -60,7 +60,7 @@ def _cloning(given: Arrays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def clone_by_texrs(given: Arrays) -> Work:
-    """All but a rim."""
+    """Clone all except a rim."""
     from texrs.kernels import poisson
 
     other, image, inside = _cloning(given)
@@ -68,7 +68,7 @@ def clone_by_texrs(given: Arrays) -> Work:
 
 
 def clone_by_opencv(given: Arrays) -> Work:
-    """The same by seamlessClone."""
+    """Do the same by seamlessClone."""
     import cv2
 
     cv2.setNumThreads(1)

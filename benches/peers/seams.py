@@ -1,6 +1,6 @@
 """Rows 5 and 6: minimum cuts on grids.
 
-Peers solve the very integers that texrs solves, and are given the costs of the graph ready.
+Peers solve the same integer problem as texrs, and get the costs of the graph in advance.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from frame import Arrays, Row, Work
 
 SCALE = 65536
 STEPS = 1024
-"""Energies of labels are multiples of 2^-10, so that texrs' finer integers and the peers' are the same."""
+"""Energies of labels are multiples of 1 / STEPS, so that the finer integers of texrs equal the peers' integers.
+"""
 
 
 def texture(name: str, side: int) -> np.ndarray:
@@ -24,7 +25,7 @@ def texture(name: str, side: int) -> np.ndarray:
 
 
 def cost_edges(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return gradient costs as integers, an axis each, in the order of operations of the kernel."""
+    """Return gradient costs as integers for each axis, in the order of operations of the kernel."""
 
     def l1(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         total = np.zeros(x.shape[:-1], np.float32)
@@ -44,7 +45,7 @@ def cost_edges(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def value_cut(given: Arrays, mask: np.ndarray) -> int:
-    """Return what a mask cuts, and what its terminals cost where they are no walls."""
+    """Return the cost of a cut, and of its terminals without fixed labels."""
     total = sum(cost[mask != np.roll(mask, -1, axis)].sum() for axis, cost in enumerate(given["costs"]))
     if "unary" in given:
         total += given["source"][mask].sum() + given["sink"][~mask].sum()
@@ -52,7 +53,7 @@ def value_cut(given: Arrays, mask: np.ndarray) -> int:
 
 
 def make_strip(side: int) -> dict[str, Any]:
-    """From the left border to the right one."""
+    """Prepare a cut from the left border to the right one."""
     a, b = texture("brick", side), texture("gravel", side)
     source, sink = np.zeros((2, side, side), np.int64)
     source[:, 0] = sink[:, -1] = 2**31
@@ -60,7 +61,7 @@ def make_strip(side: int) -> dict[str, Any]:
 
 
 def make_ring(side: int) -> dict[str, Any]:
-    """A patch whose core must stay and whose ring is free, on an image."""
+    """Prepare a patch on an image, with a fixed core and a free ring."""
     from scipy.ndimage import binary_erosion
 
     a, b = texture("brick", side), texture("gravel", side)
@@ -68,7 +69,7 @@ def make_ring(side: int) -> dict[str, Any]:
     core, patch = binary_erosion(everywhere, iterations=side // 3), binary_erosion(everywhere)
     rim = patch & ~binary_erosion(patch)
     costs = cost_edges(a, b)
-    # Pairs that leave the patch are no edges of the overlap.
+    # Pairs that leave the patch are not edges of the overlap.
     for axis, cost in enumerate(costs):
         cost[~(patch & np.roll(patch, -1, axis))] = 0
     source, sink = np.where(rim, 2**31, 0), np.where(core, 2**31, 0)
@@ -76,7 +77,7 @@ def make_ring(side: int) -> dict[str, Any]:
 
 
 def make_labels(side: int) -> dict[str, Any]:
-    """Foreground and background by grey values, smoothed by contrast."""
+    """Prepare foreground and background by grey values, smoothed by contrast."""
     image = texture("brick", side)[..., 0]
     terminal = np.round((image - np.median(image)) * 2 * STEPS)
     costs = []
@@ -90,7 +91,7 @@ def make_labels(side: int) -> dict[str, Any]:
 
 
 def cut_by_texrs(given: Arrays) -> Work:
-    """From pictures or costs to a mask, and the value of what it cuts."""
+    """Return the mask from images or costs, and the cost of its cut."""
     from texrs.kernels import seam
 
     if "unary" in given:
@@ -103,7 +104,7 @@ def cut_by_texrs(given: Arrays) -> Work:
 
 
 def cut_by_pymaxflow(given: Arrays) -> Work:
-    """Graph, solution and labels; a node of the sink's side is True."""
+    """Build the graph, solve it and read the labels. A node on the sink's side is True."""
     import maxflow
 
     source, sink = given["source"], given["sink"]
@@ -123,7 +124,7 @@ def cut_by_pymaxflow(given: Arrays) -> Work:
 
 
 def cut_by_scipy(given: Arrays) -> Work:
-    """Dinic's algorithm; from the flow on a node is on the source's side where a residual path leads to it."""
+    """Use Dinic's algorithm. A node is on the source's side if a residual path leads to it."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
@@ -153,7 +154,7 @@ def cut_by_scipy(given: Arrays) -> Work:
 
 
 def _valued(side: Any) -> Any:
-    """The value of the cut is worked out once, when results are compared."""
+    """Compute the cost of the cut once, when results are compared."""
 
     def ready(given: Arrays) -> Work:
         work = side(given)

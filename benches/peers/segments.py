@@ -1,4 +1,4 @@
-"""Row 14: pictures in pieces."""
+"""Row 14: segmented images."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SCALE, BLUR, LEAST = 60, 0.4, 24
 
 
 def make_picture() -> dict[str, Any]:
-    """A photograph, 512²."""
+    """Return a photograph of 512 x 512 pixels."""
     from skimage import data
     from skimage.transform import resize
 
@@ -20,14 +20,14 @@ def make_picture() -> dict[str, Any]:
 
 
 def shift_by_texrs(given: Arrays) -> Work:
-    """Every pixel to the mode of its surroundings."""
+    """Move every pixel to the mode of its neighbourhood."""
     from texrs.kernels.mean_shift import mean_shift
 
     return lambda: mean_shift(given["image"], RADIUS, RANGE)
 
 
 def shift_by_opencv(given: Arrays) -> Work:
-    """The same radius and range, no pyramid."""
+    """Do the same with equal radius and range, without a pyramid."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -35,7 +35,7 @@ def shift_by_opencv(given: Arrays) -> Work:
 
 
 def segment_by_texrs(given: Arrays) -> Work:
-    """Layers and elements: mean shift, the merge, clusters and components."""
+    """Find layers and elements: mean shift, the merge, clusters and components."""
     import texrs
     from texrs.exemplar._exemplar import _FACTS
 
@@ -47,21 +47,21 @@ def segment_by_texrs(given: Arrays) -> Work:
 
 
 def merge_by_texrs(given: Arrays) -> Work:
-    """The merge of Felzenszwalb and Huttenlocher, smoothing included."""
+    """Run the merge of Felzenszwalb and Huttenlocher, including smoothing."""
     from texrs.kernels.regions import felzenszwalb
 
     return lambda: felzenszwalb(given["image"], SCALE, blur=BLUR, least=LEAST)
 
 
 def merge_by_skimage(given: Arrays) -> Work:
-    """The same merge."""
+    """Run the same merge."""
     from skimage.segmentation import felzenszwalb
 
     return lambda: felzenszwalb(given["image"], SCALE, BLUR, LEAST)
 
 
 def merge_by_opencv(given: Arrays) -> Work:
-    """The same merge by its contributed module."""
+    """Run the same merge of the contributed module."""
     import cv2
     import cv2.ximgproc
 

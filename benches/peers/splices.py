@@ -1,6 +1,6 @@
-"""Rows 1 to 3: SPLICE beside what the paper says, and its linear systems.
+"""Rows 1 to 3: SPLICE compared with the numbers of the paper, and its linear systems.
 
-CHOLMOD, of CVXOPT, is under the GPL: it never is where texrs is.
+CHOLMOD, of CVXOPT, is under the GPL, so it is never in the same process as texrs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from frame import Arrays, Row, Side, Work, is_worse
 
 
 def make_system(side: int, printed: bool) -> dict[str, Any]:
-    """Eq. 5's normal matrix: as texrs solves it, or as printed, where nothing but discs is held together."""
+    """Return the normal matrix of Eq. 5, as texrs solves it or as printed, where only discs are kept together."""
     from scipy.sparse import tril
 
     from texrs import samples
@@ -28,7 +28,7 @@ def make_system(side: int, printed: bool) -> dict[str, Any]:
 
 
 def print_matrix(rigid: np.ndarray, pins: np.ndarray) -> Any:
-    """lambda_G P + lambda_R (I - U)' M (I - U), U the mean of four neighbours, and what makes it definite."""
+    """Return lambda_G P + lambda_R (I - U)' M (I - U), with the mean U of four neighbours, made definite."""
     from scipy.sparse import diags_array, eye_array, kron
 
     side = len(rigid)
@@ -49,7 +49,7 @@ def _matrix(given: Arrays) -> Any:
 
 
 def solve_by_texrs(given: Arrays) -> Work:
-    """Factored, and solved for two right sides."""
+    """Factor, and solve for two right sides."""
     from texrs.kernels.sparse import Cholesky
 
     matrix = _matrix(given)
@@ -57,7 +57,7 @@ def solve_by_texrs(given: Arrays) -> Work:
 
 
 def solve_by_scipy(given: Arrays) -> Work:
-    """SuperLU, told that the matrix is symmetric."""
+    """Use SuperLU with the option for symmetric matrices."""
     from scipy.sparse.linalg import splu
 
     matrix, options = _matrix(given), {"SymmetricMode": True}
@@ -66,7 +66,7 @@ def solve_by_scipy(given: Arrays) -> Work:
 
 
 def solve_by_cholmod(given: Arrays) -> Work:
-    """CHOLMOD, as CVXOPT has it: symbolic and numeric factor, and two right sides."""
+    """Use CHOLMOD of CVXOPT: symbolic and numeric factor, and two right sides."""
     import cvxopt
     from cvxopt import cholmod
 
@@ -85,7 +85,7 @@ def solve_by_cholmod(given: Arrays) -> Work:
 
 
 def _with(side: Side) -> Side:
-    """How right a solution is is worked out once, when results are compared."""
+    """Compute the error of a solution once, when results are compared."""
 
     def ready(given: Arrays) -> Work:
         work = side(given)
@@ -95,7 +95,7 @@ def _with(side: Side) -> Side:
 
 
 def measure_error(result: Any) -> list[float]:
-    """Return how much the system would have to change for the solution to be exact, as a share of it."""
+    """Return the relative change of the system for which the solution would be exact."""
     given, solution = result
     matrix, right = _matrix(given), given["right"]
     size = abs(matrix).sum(axis=1).max() * np.abs(solution).max() + np.abs(right).max()
@@ -103,12 +103,12 @@ def measure_error(result: Any) -> list[float]:
 
 
 def make_nothing() -> dict[str, Any]:
-    """Samples are made by name."""
+    """Return no arrays, because samples are loaded by name."""
     return {}
 
 
 def splice_by_texrs(side: int, cold: bool, method: str | None) -> Side:
-    """Elements of one texture laid out as those of another; similarity sets are made beforehand, as in the paper."""
+    """Splice elements of one texture into the layout of another. Compute similarity sets in advance, as in the paper."""
 
     def ready(given: Arrays) -> Work:
         import texrs

@@ -2,15 +2,16 @@
 
 The results are different textures, so only their size is checked.
 
-Three programs of others take part where a variable names them. Their sources have no licence, so they are neither part of texrs
-nor linked to it, and whoever builds them does that for themselves:
+Three programs of others take part if a variable names them. Their sources have no licence, so they are neither part of
+texrs nor linked to it. Users must build them themselves:
 
-- QUILTING IN.ppm OUT.png BLOCK OVERLAP COUNT makes COUNT x COUNT blocks and prints the processor seconds that `image_quilting`
-  of github.com/MarH19/fast-image-quilting-for-texture-synthesis took, with a tolerance of 3/10: a `main` of ten lines,
-  compiled with all of its folder src, `gcc -O3 -mfma -fno-tree-vectorize -march=native -Iinclude`.
-- LEFEBVRE IN.ppm OUT.ppm makes a texture of twice the side and prints the processor seconds that `synthesize` of
-  github.com/Nanored4498/Texture-Synthesis took, without its `-c`, two passes: its `main` less what it writes, compiled without
-  OpenMP and with `stbi_write_png` replaced by nothing.
+- QUILTING IN.ppm OUT.png BLOCK OVERLAP COUNT makes COUNT x COUNT blocks. It prints the processor seconds of
+  `image_quilting` of github.com/MarH19/fast-image-quilting-for-texture-synthesis, with a tolerance of 3/10. Write a
+  `main` of ten lines, and compile it with all of its folder src: `gcc -O3 -mfma -fno-tree-vectorize -march=native
+  -Iinclude`.
+- LEFEBVRE IN.ppm OUT.ppm makes a texture of twice the side, in two passes. It prints the processor seconds of
+  `synthesize` of github.com/Nanored4498/Texture-Synthesis, without its `-c`. Use its `main` without the writing,
+  compiled without OpenMP and with an empty `stbi_write_png`.
 - APPEARANCE is the folder `code` of github.com/anikabahl76/appearance-space-texture-synthesis, in Python.
 """
 
@@ -31,7 +32,7 @@ BLOCK, OVERLAP, COUNT = 32, 8, 21
 
 
 def make_bricks() -> dict[str, Any]:
-    """A picture, 128²."""
+    """Return an image of 128 x 128 pixels."""
     from skimage import data
 
     grey = data.brick()[:128, :128]
@@ -39,7 +40,7 @@ def make_bricks() -> dict[str, Any]:
 
 
 def run_program(variable: str, given: Arrays, ending: str, *words: object) -> Timed:
-    """Let a program make a picture; it says how long that took."""
+    """Run a program that makes an image and reports its time."""
     from skimage import io
 
     image = given["image"]
@@ -52,7 +53,7 @@ def run_program(variable: str, given: Arrays, ending: str, *words: object) -> Ti
 
 
 def quilt_by_texrs(given: Arrays) -> Work:
-    """The same blocks, each cut in by a minimum cut, of several that fit."""
+    """Make the same blocks, each cut in by a minimum cut, chosen among several that fit."""
     from texrs.quilting import Picture, quilt
     from texrs.source_map import SourceMap
 
@@ -65,12 +66,12 @@ def quilt_by_texrs(given: Arrays) -> Work:
 
 
 def quilt_by_program(given: Arrays) -> Work:
-    """Blocks in raster order, cut by dynamic programming."""
+    """Make blocks in raster order, cut by dynamic programming."""
     return lambda: run_program("QUILTING", given, "png", BLOCK, OVERLAP, COUNT)
 
 
 def correct_by_texrs(given: Arrays) -> Work:
-    """Similarity sets are made beforehand, by the first time."""
+    """Correct coordinates. Similarity sets are computed in advance, by the first run."""
     import texrs
 
     exemplar = texrs.Exemplar(given["image"])
@@ -79,24 +80,24 @@ def correct_by_texrs(given: Arrays) -> Work:
 
 
 def correct_by_program(given: Arrays) -> Work:
-    """Windows of colours, each candidate the neighbours' alone (k = 1)."""
+    """Correct windows of colours, with only the neighbours' candidates (k = 1)."""
     return lambda: run_program("LEFEBVRE", given, "ppm")
 
 
 def make_small_bricks() -> dict[str, Any]:
-    """A picture, 64²."""
+    """Return an image of 64 x 64 pixels."""
     return {"image": make_bricks()["image"][:64, :64]}
 
 
 def run_process(given: Arrays, command: list[str], made: str, where: str | None = None) -> Timed:
-    """Let a command make a picture of one that it finds in a folder; all of its process counts."""
+    """Run a command on an image in a folder. The whole process counts."""
     from skimage import io
 
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with tempfile.TemporaryDirectory() as folder:
         io.imsave(f"{folder}/in.png", given["image"], check_contrast=False)
         single = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-        # Byte code is kept, as it is wherever a program is installed: the first time, which is not counted, writes it.
+        # Keep byte code, as for any installed program. The first run, which does not count, writes it.
         single["PYTHONDONTWRITEBYTECODE"] = ""
         words = [word.format(folder=folder) for word in command]
         subprocess.run(
@@ -108,34 +109,34 @@ def run_process(given: Arrays, command: list[str], made: str, where: str | None 
 
 
 def start_texrs(given: Arrays) -> Work:
-    """The command, from its start to its end: imports and the analysis of the exemplar take most of it."""
+    """Run the whole command. Imports and the analysis of the exemplar take most of the time."""
     words = ["synthesize", "in.png", "-o", "out.png", "--size", "512", "--method", "paper-compensated", "--quiet"]
     return lambda: run_process(given, [sys.executable, "-m", "texrs", *words], "{folder}/out.png")
 
 
 def start_program(given: Arrays) -> Work:
-    """The same of the program, eight times the side of its example: its scale is twice that."""
+    """Run the same with the program, with eight times the side of its example, because its scale is twice as large."""
     where = os.environ["APPEARANCE"]
     words = ["lefebvre_hoppe_synthesis.py", "--data", "{folder}", "--image_path", "in.png", "--scale", "16"]
     return lambda: run_process(given, [sys.executable, *words], f"{where}/../out/lefebvre_hoppe_in.png", where)
 
 
 def make_floor() -> dict[str, Any]:
-    """Discs on a floor seen aslant."""
+    """Return discs on an oblique floor."""
     from texrs import samples
 
     return {"image": samples.tilted_discs((128, 128)).image}
 
 
 def slope_by_texrs(given: Arrays) -> Work:
-    """All of the verb; what is known of the exemplar is kept from the first time."""
+    """Run the whole verb. Facts about the exemplar are cached by the first run."""
     import texrs
 
     return lambda: texrs.perspective(given["image"], size=256).image
 
 
 def compare_by_texrs(given: Arrays) -> Work:
-    """Of every sample, the two likest ones that lie more than three samples off, of all of the volume."""
+    """Find for every sample of the volume the two most similar ones that are more than three samples away."""
     import texrs
     from texrs._engine.coherence import find_similar
 
@@ -144,14 +145,14 @@ def compare_by_texrs(given: Arrays) -> Work:
 
 
 def make_particles() -> dict[str, Any]:
-    """A volume, 64³."""
+    """Return a volume of 64^3 voxels."""
     from texrs import samples
 
     return {"image": samples.particles().image}
 
 
 def grow_by_texrs(given: Arrays) -> Work:
-    """Wound around an axis; analysis and similarity sets are made beforehand."""
+    """Grow a volume around an axis. Analysis and similarity sets are computed in advance."""
     import texrs
     from texrs import fields
 
@@ -163,7 +164,7 @@ def grow_by_texrs(given: Arrays) -> Work:
 
 
 def make_small_particles() -> dict[str, Any]:
-    """What the slow twin can do: a pass over 12³ voxels from 64³."""
+    """Return the input for the slow twin: a pass over 12^3 voxels from 64^3."""
     return make_particles()
 
 
@@ -179,13 +180,13 @@ def _ready(given: Arrays) -> tuple[Any, Any, Any, Any]:
 
 
 def correct_small_by_texrs(given: Arrays) -> Work:
-    """The kernel."""
+    """Run the kernel."""
     level, region, frames, start = _ready(given)
     return lambda: level.correct(start, region, frames, passes=2, coherence=0.2).places
 
 
 def correct_small_by_twin(given: Arrays) -> Work:
-    """The tests' slow twin, in NumPy."""
+    """Run the slow NumPy twin of the tests."""
     import sys
 
     sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "reference"))
