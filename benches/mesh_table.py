@@ -1,9 +1,9 @@
 """Measure the visibility of atlas cuts: painted meshes with interpolated texels, compared with the texture itself.
 
-Run ``python benches/mesh_table.py MESH... [--sample particles] [--atlas 1024]``. The table has two differences: between the two sides of an edge, and between a side and
-the texture. Cut edges and all others are separate rows. They are in
-levels of 8 bit (median, 90 % and 99 % of 1500 points). Cuts are invisible if their edges are as near to the texture as
-the others.
+Run ``python benches/mesh_table.py MESH... [--sample particles] [--atlas 1024]``. The table has two differences:
+between the two sides of an edge, and between a side and the texture. Cut edges and all others are separate rows. They
+are in levels of 8 bit (median, 90 % and 99 % of 1500 points). Cuts are invisible if their edges are as near to the
+texture as the others.
 """
 
 import argparse

@@ -3,8 +3,9 @@
     [TEXRS_TEXTURES=FOLDER] python benches/planes_table.py [--rounds 4] [--pictures DIR]
 
 Floors are flat samples seen by a pinhole camera: slants of 20 to 65 degrees, all tilts, four angles of view, with and
-without noise, half as JPEG. FOLDER contains images and ``ground-truth.json``, which specifies slant,
-tilt, focal length and a scale map of some. With `--pictures`, each is drawn next to its flat texture. After the errors of each texture, four results follow:
+without noise, half as JPEG. FOLDER contains images and ``ground-truth.json``, which specifies slant, tilt, focal
+length and a scale map of some. With `--pictures`, each is drawn next to its flat texture. After the errors of each
+texture, four results follow:
 
 - the share of correct planes among those with high confidence;
 - the fit of automatic scale maps to the folder's maps;

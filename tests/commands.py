@@ -1,4 +1,4 @@
-"""What tests of the command line share."""
+"""Helpers of the tests of the command line."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def replace_design(monkeypatch: pytest.MonkeyPatch, error: BaseException | None) -> None:
-    """Let the work of texrs design fail; its options are those of the function."""
+    """Replace the work of texrs design by a failure. Its options stay the same."""
     module = importlib.import_module("texrs.papers.design")
 
     @functools.wraps(module.design)
@@ -61,7 +61,7 @@ def start(*arguments: str, **options: object) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "texrs", *arguments]
 
     def heed() -> None:
-        """Take interrupts, which a shell lets its background jobs ignore."""
+        """Accept interrupts, which a shell lets its background jobs ignore."""
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     return subprocess.Popen(command, stderr=subprocess.PIPE, preexec_fn=heed, **options)  # type: ignore[call-overload, no-any-return]

@@ -1,4 +1,4 @@
-"""What all tests share."""
+"""Settings and fixtures of all tests."""
 
 import functools
 import os
@@ -16,17 +16,17 @@ from texrs import samples
 
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("fuzz", deadline=None, print_blob=True)
-# The same cases each time; `make fuzz` asks for the other profile, with a seed of its own.
+# Use the same cases each time. `make fuzz` requests the other profile, with its own seed.
 settings.load_profile("fixed")
 
 
 def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Sample]:
-    """Return a generator that draws a sample once, and gives a copy of it each time: dozens of modules use the same."""
+    """Return a generator that draws a sample once and returns copies, because dozens of modules use the same samples."""
     kept: dict[str, samples.Sample] = {}
 
     @functools.wraps(make)
     def draw(*given: Any, **options: Any) -> samples.Sample:
-        # As it is written, not what it equals: 64.0 is 64, and is refused.
+        # Use the text of the arguments, not their values: 64.0 equals 64, and must be refused.
         asked = repr((given, options))
         if asked not in kept:
             kept[asked] = make(*given, **options)
@@ -37,7 +37,7 @@ def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Samp
     return draw
 
 
-# The generators themselves are tested through `inspect.unwrap`.
+# Tests reach the original generators through `inspect.unwrap`.
 for name, generator in samples._GENERATORS.items():
     samples._GENERATORS[name] = draw_once(generator)
     setattr(samples, name, samples._GENERATORS[name])
@@ -45,7 +45,7 @@ for name, generator in samples._GENERATORS.items():
 
 @pytest.fixture(scope="session", autouse=True)
 def _no_waiting_for_a_disk() -> Iterator[None]:
-    """Sync nothing in this process: on a slow disk tests would take minutes longer. In what order is tested by itself."""
+    """Do not sync in this process, because tests would take minutes longer on a slow disk. One test checks the order."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda number: None)
         yield
@@ -53,7 +53,7 @@ def _no_waiting_for_a_disk() -> Iterator[None]:
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder that holds an exemplar, and an empty file, which any command may replace."""
+    """Work in a folder with an exemplar, and an empty file, which any command may replace."""
     monkeypatch.chdir(tmp_path)
     iio.imwrite("in.png", samples.load("dots", size=(64, 64)).image)
     Path("out.png").touch()

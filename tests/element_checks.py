@@ -1,4 +1,4 @@
-"""What is measured of an analysis: how many elements were found, and how many of those that were found are some (S1)."""
+"""Measures of an analysis: the share of true elements that were found, and of found elements that are true (S1)."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ TOLERANCE = 0.2
 
 @dataclass(frozen=True)
 class Score:
-    """Of points against true centres."""
+    """Score of points compared with true centres."""
 
     recall: float
-    """Of all true centres."""
+    """Share of all true centres that were found."""
     inner: float
-    """Of those no nearer to the border than half a box."""
+    """Share of the true centres at least half a box away from the border that were found."""
     precision: float
-    """Of the points no nearer to the border than half a box."""
+    """Share of the points at least half a box away from the border that are true."""
     error: float
     """Mean distance of the pairs, in pixels."""
 
 
 def pair(points: Any, centres: Any, box: Any, tolerance: float = TOLERANCE) -> tuple[Any, Any]:
-    """Pair points with centres, each with one at most, so that most are paired, and the nearest ones: which of either."""
+    """Pair points and centres one to one, with as many and as near pairs as possible. Return the indices of both."""
     from scipy.optimize import linear_sum_assignment
 
     away = np.sqrt((((points[:, None] - centres[None]) / np.asarray(box, float)) ** 2).sum(axis=-1))
@@ -40,7 +40,7 @@ def pair(points: Any, centres: Any, box: Any, tolerance: float = TOLERANCE) -> t
 
 
 def score(points: Any, centres: Any, box: Any, shape: Any, tolerance: float = TOLERANCE) -> Score:
-    """Score points against true centres, each of which is of one point at most."""
+    """Score points against true centres. Each centre matches at most one point."""
     box = np.asarray(box, float)
     i, j = pair(points, centres, box, tolerance)
     hit, got = np.zeros(len(points), bool), np.zeros(len(centres), bool)
@@ -65,7 +65,7 @@ def passes(found: Score, *, recall_only: bool = False) -> bool:
 
 @dataclass(frozen=True)
 class Annotated:
-    """A texture with what its annotation says, all of it (row, column)."""
+    """A texture with its annotation, all in (row, column)."""
 
     name: str
     image: Path

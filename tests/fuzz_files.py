@@ -1,9 +1,9 @@
-"""Files that are damaged at random, of every format that is read: an array, an entry, or a sentence comes out, and soon.
+"""Damage files of every readable format at random: each read must give an array, an entry or an error message, soon.
 
     python tests/fuzz_files.py [--count 100000] [--seed 1] [--seconds 600]
 
-Prints how many were read, refused, and what else came out; what did is kept beside, named after seed and number. All in this
-process, of which the memory is limited, so that what would take all there is fails here.
+Prints the numbers of read and refused files, and all other outcomes. Their files are kept next to it, named after seed
+and number. Everything runs in this process with limited memory, so excessive allocations fail here.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from texrs.errors import TexrsError
 
 Reader = Callable[[Path], object]
 MOST = 100_000
-"""Pixels that a file may have here."""
+"""Maximum pixels of a file."""
 SLOW = 5.0
-"""Seconds of this process after which a file took too long."""
+"""Seconds of processor time that count as too long."""
 MEMORY = 2 << 30
-"""Bytes beside what there is at the beginning."""
+"""Bytes in addition to the memory at the beginning."""
 WRITABLE = (".png", ".tif", ".webp", ".bmp", ".tga", ".dds", ".npy", ".npz", ".exr", ".hdr")
 VOLUMES = (".tif", ".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".vti")
 RECIPE = 'verb = "design"\ninputs = ["*.png"]\nout = "out"\nseeds = "0-3"\n[presets.one]\nrotate = 0\nsize = "64x64"\n'
@@ -49,12 +49,12 @@ class Late(BaseException):
 
 
 def limited(read: Callable[..., object]) -> Reader:
-    """Return a reader that allows few pixels."""
+    """Return a reader with a small limit of pixels."""
     return lambda path: read(path, limit=MOST)
 
 
 def make_files(folder: Path) -> Iterator[tuple[Path, list[Reader]]]:
-    """Write a small file of every kind, and yield how each is read."""
+    """Write a small file of every kind, and yield it with its readers."""
     image, floats = make.picture((24, 20, 3)), np.abs(make.picture((24, 20, 3), "float32"))
     either = [limited(tio.read), limited(tio.read_volume), tio.read_metadata]
     for suffix in WRITABLE:
@@ -97,7 +97,7 @@ def make_files(folder: Path) -> Iterator[tuple[Path, list[Reader]]]:
 
 
 def make_folders(folder: Path) -> Iterator[tuple[Path, Path, list[Reader]]]:
-    """Make a database, a material and a store, and yield which of their files are damaged, and how they are read."""
+    """Write a database, a material and a store, and yield the files to damage with their readers."""
     sample = texrs.samples.dots((64, 64))
     database = folder / "database"
     texrs.TextureDatabase(database).add(sample.image, "dots", mask=sample.mask, layout="disjoint")
@@ -119,7 +119,7 @@ def make_folders(folder: Path) -> Iterator[tuple[Path, Path, list[Reader]]]:
 
 
 def limit_memory() -> None:
-    """Let this process take little more than it has."""
+    """Limit the memory of this process to little more than its current size."""
     if sys.platform == "linux":
         import resource
 
@@ -128,7 +128,7 @@ def limit_memory() -> None:
 
 
 def try_one(readers: list[Reader], path: Path, counts: collections.Counter[str]) -> str:
-    """Read a damaged file by all its readers, and return what went wrong."""
+    """Read a damaged file by all its readers, and return the errors."""
     wrong = ""
     for read in readers:
         start = time.process_time()
@@ -155,7 +155,7 @@ def try_one(readers: list[Reader], path: Path, counts: collections.Counter[str])
 
 
 def main() -> int:
-    """Damage files until there are enough of them, or the time is up."""
+    """Damage files until the requested number or time is reached."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,4 +1,4 @@
-"""Values that no argument is meant to be, and calls that are right, as the examples of the documentation make them."""
+"""Unsuitable values for arguments, and valid calls, taken from the examples of the documentation."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ MORE: tuple[object, ...] = (
 
 
 def lay_out(array: np.ndarray[Any, Any], layout: str) -> np.ndarray[Any, Any]:
-    """Return the same values, lying otherwise in memory."""
+    """Return the same values in another memory layout."""
     if layout == "fortran":
         return np.asfortranarray(array)
     if layout == "strided":
@@ -119,7 +119,7 @@ def lay_out(array: np.ndarray[Any, Any], layout: str) -> np.ndarray[Any, Any]:
 
 
 def distort(array: np.ndarray[Any, Any]) -> Iterator[object]:
-    """Yield what comes near to an array that is right: its values in every dtype and layout, other shapes, other values."""
+    """Yield variants of a valid array: its values in every dtype and layout, other shapes, other values."""
     for dtype in map(np.dtype, DTYPES):
         with np.errstate(all="ignore"):
             yield array.astype(dtype) if dtype.kind in "buifcO" else np.zeros(array.shape, dtype)
@@ -152,11 +152,11 @@ EXTREMES = (
     1.7e308,
     -1.7e308,
 )
-"""Numbers whose sums, products or powers are none, in one dtype or another."""
+"""Numbers whose sums, products or powers are not finite in some dtype."""
 
 
 def exaggerate(valid: object, rng: np.random.Generator) -> object:
-    """Return floats of some dtype in place of values that are right: a few of them, half or all are extreme."""
+    """Return floats of some dtype in place of valid values: a few, half or all of them are extreme."""
     if isinstance(valid, list | tuple) and valid and all(isinstance(each, np.ndarray) for each in valid):
         return type(valid)(exaggerate(each, rng) for each in valid)
     if not isinstance(valid, np.ndarray) or valid.dtype.kind not in "fu" or not valid.size:
@@ -168,7 +168,7 @@ def exaggerate(valid: object, rng: np.random.Generator) -> object:
 
 
 def list_floats(made: object) -> Iterator[np.ndarray[Any, Any]]:
-    """Yield the floats that a result holds."""
+    """Yield the floats in a result."""
     if isinstance(made, np.ndarray | float):
         if np.asarray(made).dtype.kind == "f":
             yield np.asarray(made)
@@ -182,7 +182,7 @@ def list_floats(made: object) -> Iterator[np.ndarray[Any, Any]]:
 
 
 def list_hostile(valid: object) -> Iterator[object]:
-    """Yield what is given in place of a value that is right."""
+    """Yield the replacements of a valid value."""
     yield from NUMBERS
     yield from OTHERS
     yield from MORE
@@ -218,11 +218,11 @@ EXAMPLES = {
     "texrs.TextureDatabase.__contains__": "'rock' in texrs.TextureDatabase('base')",
     "texrs.exemplar.Analysis": "texrs.exemplar.Analysis(texrs.Exemplar(texrs.samples.dots((32, 32)).image).analyse().levels)",
 }
-"""Calls that no example of the documentation makes: most are of methods that classes share, shown of another one."""
+"""Calls that are not in the examples of the documentation, mostly of methods that classes share."""
 
 
 def public_modules() -> list[ModuleType]:
-    """Return all modules that are public."""
+    """Return all public modules."""
     found, left = [], [texrs]
     while left:
         module = left.pop()
@@ -232,12 +232,12 @@ def public_modules() -> list[ModuleType]:
 
 
 OPERATORS = ("__getitem__", "__contains__", "__call__")
-"""Methods that have no other name."""
+"""Special methods without another name."""
 
 
 @cache
 def public_calls() -> dict[str, tuple[Callable[..., Any], Callable[..., Any]]]:
-    """Return what can be called by name, and the function of it that has the code: functions, classes and their methods."""
+    """Return all public functions, classes and methods by name, each with the function that has its code."""
     found: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {}
     seen = set()
     for module in public_modules():
@@ -267,7 +267,7 @@ def public_calls() -> dict[str, tuple[Callable[..., Any], Callable[..., Any]]]:
 
 @contextlib.contextmanager
 def keep_folders(place: Path) -> Iterator[None]:
-    """Let temporary folders stay, in another place."""
+    """Keep temporary folders, in another place."""
 
     class Folder:
         def __init__(self, *args: object, **options: object) -> None:
@@ -291,18 +291,18 @@ def keep_folders(place: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Call:
-    """A call that is right."""
+    """A valid call."""
 
     name: str
     function: Callable[..., Any]
     arguments: dict[str, Any]
 
     def change(self, name: str, value: object) -> object:
-        """Call it with another value of one argument."""
+        """Call with another value of one argument."""
         return self.call(self.arguments | {name: value})
 
     def call(self, given: dict[str, Any]) -> object:
-        """Call it with these arguments."""
+        """Call with these arguments."""
         positional, named = [], {}
         for p in inspect.signature(self.function).parameters.values():
             if p.name not in given:
@@ -317,7 +317,7 @@ class Call:
                 positional.append(given[p.name])
         made = self.function(*positional, **named)
         if inspect.isgenerator(made):
-            # What is made one by one is made when it is asked for.
+            # Generators compute their values on request.
             made = next(made, None)
         if isinstance(made, contextlib.AbstractContextManager) and hasattr(made, "gen"):
             with made:
@@ -326,23 +326,23 @@ class Call:
 
 
 def record(name: str, place: Path) -> Call | None:
-    """Run the examples of a function, and return their last call of it; None where it takes nothing that could be wrong."""
+    """Run the examples of a function, and return the last call of it, or None without arguments."""
     thing, function = public_calls()[name]
     found: dict[str, Any] = {}
-    # Those of a method may stand where its class is described.
+    # Examples of a method may be in the docstring of its class.
     owner = public_calls().get(name.rpartition(".")[0], (None, None))[0]
 
     def note(frame: Any, event: str, argument: object) -> None:
         if event == "call" and frame.f_code is function.__code__:
             me = frame.f_locals.get("self")
             if me is None or not inspect.isclass(owner) or isinstance(me, owner):
-                # A method that is inherited is called for others too, as `Mapping.get` for the environment.
+                # An inherited method is also called for other objects, such as `Mapping.get` for the environment.
                 found.clear()
                 found.update(frame.f_locals)
 
     if not set(inspect.signature(thing).parameters) - {"self"}:
         return None
-    # What is known of an exemplar is kept: what measures it would not be called again.
+    # Clear the cache of facts about exemplars. Otherwise the measuring functions would not be called again.
     _FACTS.clear()
     space: dict[str, Any] = {**function.__globals__, "__name__": "__main__"}
     own = f">>> import numpy, texrs\n>>> made = {EXAMPLES[name]}\n" if name in EXAMPLES else None

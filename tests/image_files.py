@@ -10,7 +10,7 @@ from PIL import Image
 
 
 def picture(shape, dtype="uint8", seed=0):
-    """Smooth stripes and some noise: what compresses, but not to nothing."""
+    """Return smooth stripes with some noise, which compress only partly."""
     dtype = np.dtype(dtype)
     rng = np.random.default_rng(seed)
     values = 0.5 + 0.4 * np.sin(np.arange(np.prod(shape)) * 0.07).reshape(shape)
@@ -25,7 +25,7 @@ def picture(shape, dtype="uint8", seed=0):
 
 
 def png(width, height, bits, colour, rows, chunks=(), behind=()):
-    """A PNG file by hand (any header over any stream)."""
+    """Return a PNG file with any header and any stream."""
 
     def chunk(name, data):
         body = name + data
@@ -37,7 +37,7 @@ def png(width, height, bits, colour, rows, chunks=(), behind=()):
 
 
 def png_bomb(side=50_000):
-    """Two and a half gigapixels in 300 kB."""
+    """Return 2.5 gigapixels in 300 kB."""
     packer = zlib.compressobj(9)
     row = bytes((side + 7) // 8 + 1)
     rows = b"".join(packer.compress(row * 1000) for _ in range(side // 1000)) + packer.flush()
@@ -45,14 +45,14 @@ def png_bomb(side=50_000):
 
 
 def exif(orientation, order="<"):
-    """An Exif block that says nothing but how the picture is turned."""
+    """Return an Exif block that contains only the orientation."""
     mark = b"II*\0" if order == "<" else b"MM\0*"
     entry = struct.pack(order + "HHIHH", 274, 3, 1, orientation, 0)
     return mark + struct.pack(order + "IH", 8, 1) + entry + struct.pack(order + "I", 0)
 
 
 def pillow(array, kind, mode=None, **options):
-    """Encode by Pillow; as a mode whose channels have other names, if one is given."""
+    """Encode by Pillow, optionally as a mode with other channel names."""
     file = io.BytesIO()
     image = Image.fromarray(array)
     if mode is not None:
@@ -62,7 +62,7 @@ def pillow(array, kind, mode=None, **options):
 
 
 def psd(array, bits=8, mode=3, resources=b""):
-    """A PSD file by hand: a header, resources, no layers, and the flattened picture."""
+    """Return a PSD file: a header, resources, no layers, and the flattened image."""
     rows, columns, channels = array.shape
     head = b"8BPS" + struct.pack(">H6xHIIHH", 1, channels, rows, columns, bits, mode)
     sections = struct.pack(">II", 0, len(resources)) + resources + struct.pack(">I", 0)
@@ -70,7 +70,7 @@ def psd(array, bits=8, mode=3, resources=b""):
 
 
 def palette_png(indices, colours, transparent=None):
-    """A PNG file with a palette of (n, 3) uint8."""
+    """Return a PNG file with a palette of (n, 3) uint8."""
     rows = b"".join(b"\0" + row.tobytes() for row in indices.astype(np.uint8))
     chunks = [(b"PLTE", colours.astype(np.uint8).tobytes())]
     if transparent is not None:
@@ -79,13 +79,13 @@ def palette_png(indices, colours, transparent=None):
 
 
 def npy(header, data=b""):
-    """An .npy file with any header."""
+    """Return an .npy file with any header."""
     text = header.encode() + b"\n"
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + data
 
 
 def npz(members):
-    """A deflated archive of any members."""
+    """Return a deflated archive of any members."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():
@@ -94,7 +94,7 @@ def npz(members):
 
 
 def zeros(count, step=2**20):
-    """So many zeros, deflated, for they are the same piece again and again."""
+    """Return deflated zeros of this length, as repetitions of one piece."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     packer.compress(bytes(step)), packer.flush(zlib.Z_FULL_FLUSH)
     piece = packer.compress(bytes(step)) + packer.flush(zlib.Z_FULL_FLUSH)
@@ -102,20 +102,20 @@ def zeros(count, step=2**20):
 
 
 def npz_bomb(members, packing=zipfile.ZIP_DEFLATED):
-    """An archive of zeros, of shape and dtype by name, that unfold to whatever these say; its checksums are wrong."""
+    """Return an archive of zeros, of shape and dtype by name. Its checksums are wrong."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for name, (shape, dtype) in members.items():
             head = npy(f"{{'descr': {np.dtype(dtype).str!r}, 'fortran_order': False, 'shape': {shape}}}")
             size = int(np.prod(shape, dtype=object)) * np.dtype(dtype).itemsize
-            # The first bytes lie in a block of deflate of their own that is not compressed.
+            # The first bytes are in an uncompressed deflate block of their own.
             stored = b"\0" + struct.pack("<HH", len(head), len(head) ^ 0xFFFF) + head
             data = stored + zeros(size)
             info = zipfile.ZipInfo(f"{name}.npy")
             at = file.tell()
             archive.writestr(info, data)
             info.compress_type, info.file_size = packing, len(head) + size
-            # What the archive says of it before it, too.
+            # Also include the local header in the archive.
             end = file.tell()
             file.seek(at)
             file.write(info.FileHeader(False))
@@ -124,7 +124,7 @@ def npz_bomb(members, packing=zipfile.ZIP_DEFLATED):
 
 
 def mutations(file, count, rng):
-    """Return corrupt versions of a file: changed, cut, doubled, blanked; half in the header."""
+    """Return damaged versions of a file: changed, cut, doubled, blanked. Half of the damage is in the header."""
     for _ in range(count):
         data = bytearray(file)
         for _ in range(rng.integers(1, 4)):
@@ -149,7 +149,7 @@ def mutations(file, count, rng):
 
 
 def exr_with_chroma(luminance, red, blue):
-    """An EXR file of floats by hand, uncompressed: luminance, and chroma of every second row and column."""
+    """Return an uncompressed EXR file of floats: luminance, and chroma of every second row and column."""
     rows, columns = luminance.shape
 
     def attribute(name, kind, data):
@@ -179,7 +179,7 @@ def exr_with_chroma(luminance, red, blue):
 
 
 def ink_profile(corners):
-    """An ICC profile of CMYK by hand: CIELAB at the 16 corners of the cube of inks, and linear between them."""
+    """Return an ICC profile of CMYK: CIELAB at the 16 corners of the cube of inks, and linear between them."""
     table = np.asarray(corners, float).reshape(16, 3)
     codes = np.rint(np.column_stack([table[:, 0] * 2.55, table[:, 1:] + 128])).astype(np.uint8)
     lut = b"mft1" + bytes(4) + bytes((4, 3, 2, 0)) + struct.pack(">9i", *(65536 if i % 4 == 0 else 0 for i in range(9)))

@@ -1,10 +1,10 @@
-"""Commands that are killed at random moments, and several that write to one place at once: nothing half-written is found.
+"""Kill commands at random moments, and let several write to one place at once: no file may be half-written.
 
     python tests/kill_commands.py [--count 200] [--seed 1] [--seconds 600]
 
-After each kill an output is not there, or it is whole; every few kills the command is run to its end: it makes what it would
-have made, and what the killed ones left is gone. Then six processes at a time write to one database, one store and one file.
-POSIX only.
+After each kill an output must be absent or complete. Every few kills the command runs to its end: its output must be
+correct, and the remains of killed commands must be gone. Then six processes at a time write to one database, one store
+and one file. POSIX only.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from texrs import io
 TOGETHER = 6
 """Processes that write to one place."""
 AGAIN = 10
-"""Kills after which a command is run to its end."""
+"""Number of kills before a command is run to its end."""
 COMMANDS: dict[str, tuple[str, str]] = {
     "tile": ("tile in.png -o out.png --source-map map.npz --stages stages", "out.png map.npz"),
     "design": ("design in.png -o out.png --size 96 --motion keep --source-map map.npz", "out.png map.npz"),
@@ -38,7 +38,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "database": ("database base add in.png --box 78,41,23,21 --layout disjoint", ""),
     "batch": ("batch recipe.toml", ""),
 }
-"""What is run, and which of its outputs are files that are whole or not there."""
+"""Commands, and those of their outputs that are single files."""
 RECIPE = 'verb = "tile"\ninputs = ["in.png", "other.png"]\nout = "made"\n'
 RACES = {
     "one name in a database": "database base add in.png --box 78,41,23,21 --layout disjoint --replace",
@@ -48,7 +48,7 @@ RACES = {
 
 
 def start(words: str, place: Path) -> subprocess.Popen[bytes]:
-    """Begin a command in a folder."""
+    """Start a command in a folder."""
     environment = {**os.environ, "RAYON_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.Popen(
         [sys.executable, "-m", "texrs", *words.split(), "--quiet"],
@@ -67,19 +67,19 @@ def prepare(place: Path) -> None:
 
 
 def read_all(place: Path) -> dict[str, bytes]:
-    """Return what lies in a folder, but for locks."""
+    """Return the contents of a folder, without locks."""
     return {
         str(p.relative_to(place)): p.read_bytes() for p in sorted(place.rglob("*")) if p.is_file() and p.name != ".lock"
     }
 
 
 def is_temporary(name: str) -> bool:
-    """Return whether a name is that of something half-written."""
+    """Return whether a name belongs to a half-written file."""
     return any(part.startswith(".") and ".texrs-" in part for part in Path(name).parts)
 
 
 def kill_often(name: str, count: int, rng: random.Random, end: float, counts: collections.Counter[str]) -> list[str]:
-    """Kill a command at random moments, and return what was found wrong."""
+    """Kill a command at random moments, and return the errors."""
     words, _ = COMMANDS[name]
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as first:
@@ -103,7 +103,7 @@ def kill_often(name: str, count: int, rng: random.Random, end: float, counts: co
             process.wait()
             for file, data in read_all(place).items():
                 if is_temporary(file) or ".zarr" in file or file.endswith((".json", ".npz")):
-                    # Times and manifests differ; stores say themselves what is missing.
+                    # Times and manifests differ. Stores list their own missing chunks.
                     continue
                 if data != reference.get(file):
                     wrong.append(f"{name}: {file} is half-written, or another, after kill {number}")

@@ -1,4 +1,4 @@
-"""Measures of textures in perspective, from pictures and maps alone: they share no code with the synthesis."""
+"""Measures of textures in perspective, from images and maps only: they share no code with the synthesis."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage, stats
 
 INNER = 12
-"""Pixels along the borders that are not measured: windows reach beyond."""
+"""Pixels along the borders that are not measured, because windows would reach beyond."""
 
 
 def targets(scale, shape):
@@ -21,14 +21,14 @@ def targets(scale, shape):
 
 
 def floor(shape=(224, 224), seed=0, span=(0.6, 1.7), radius=6.0):
-    """Return a dark floor of coloured discs that grow downwards, and its scale map: a disc's radius is that of its middle."""
+    """Return a dark floor of coloured discs that grow downwards, and its scale map at the middle of each disc."""
     logs = np.linspace(*np.log(span), shape[0])
     scale = np.exp(logs)[:, np.newaxis].repeat(shape[1], axis=1).astype(np.float32)
     return drawn(scale, seed, radius), scale
 
 
 def drawn(scale, seed=0, radius=6.0):
-    """Return a dark floor of coloured discs whose sizes are those of a scale map, without any synthesis."""
+    """Return a dark floor of coloured discs with the sizes of a scale map, without synthesis."""
     rng = np.random.default_rng(seed)
     shape = scale.shape
     image = np.full((*shape, 3), 40.0) + rng.normal(0, 2, (*shape, 1))
@@ -60,16 +60,16 @@ def wavelength(image):
 
 
 def fidelity(image, target):
-    """Return the rank correlation of measured and wanted sizes, and the slope of their logarithms."""
+    """Return the rank correlation of measured and requested sizes, and the slope of their logarithms."""
     inner = (slice(INNER, -INNER, 4),) * 2
     seen, wanted = np.log(wavelength(image))[inner].ravel(), np.log(target)[inner].ravel()
     return float(stats.spearmanr(seen, wanted).statistic), float(np.polyfit(wanted, seen, 1)[0])
 
 
 def discs(image, target):
-    """Return rank correlation and slope of the logarithms of discs' diameters and the wanted scales, and their solidity.
+    """Return rank correlation and slope of the logarithms of disc diameters and requested scales, and the solidity.
 
-    Solidity is the share of a disc's bounding ellipse that it fills.
+    Solidity is the share of its bounding ellipse that a disc fills.
     """
     bright = image[..., :3].astype(int)
     label, _count = ndimage.label(bright.max(-1) - bright.min(-1) > 60)
@@ -95,7 +95,7 @@ def gradient(image):
 
 
 def weights(scale, target, bins=12):
-    """Return each exemplar pixel's weight, so that together they have the target's scales."""
+    """Return weights of the exemplar pixels, so that together they have the target's scales."""
     mine, theirs = np.log(scale).ravel(), np.log(target).ravel()
     edges = np.linspace(min(mine.min(), theirs.min()) - 1e-6, max(mine.max(), theirs.max()) + 1e-6, bins + 1)
     there, asked = (np.histogram(v, edges)[0] for v in (mine, theirs))
@@ -105,7 +105,7 @@ def weights(scale, target, bins=12):
 
 
 def sharpness(exemplar, scale, image, target):
-    """Return the mean gradient, as a share of the exemplar's at the target's scales."""
+    """Return the mean gradient divided by the exemplar's at the target's scales."""
     return float(gradient(image).mean() / (gradient(exemplar).ravel() @ weights(scale, target)))
 
 
@@ -122,7 +122,7 @@ def colour_distance(exemplar, scale, image, target):
 
 
 def repetition(image, band=8, least=20):
-    """Return the largest autocorrelation along rows at lags from 20 pixels on, a mean over bands of rows."""
+    """Return the maximum autocorrelation along rows at lags from 20 pixels on, as a mean over bands of rows."""
     g = luma(image) - ndimage.gaussian_filter(luma(image), 14)
     found = []
     for top in range(0, g.shape[0] - band + 1, band):
@@ -135,7 +135,7 @@ def repetition(image, band=8, least=20):
 
 
 def seam(image, hole, width=2):
-    """Return the mean gradient across a hole's boundary, as a share of that inside it."""
+    """Return the mean gradient across a hole's boundary, divided by the mean gradient inside."""
     inside = ndimage.binary_erosion(hole, iterations=3 * width)
     boundary = ndimage.binary_dilation(hole, iterations=width) & ~ndimage.binary_erosion(hole, iterations=width)
     return float(gradient(image)[boundary].mean() / gradient(image)[inside].mean())

@@ -1,4 +1,4 @@
-"""Floors whose planes are known: flat samples, seen by a pinhole camera."""
+"""Floors with known planes: flat samples, seen by a pinhole camera."""
 
 from collections.abc import Callable
 from functools import cache
@@ -13,7 +13,7 @@ from texrs import Plane, SourceMap, samples
 
 Points = NDArray[np.float64]
 SIDE, OVER = 512, 2
-"""Of the flat texture, in pixels of the picture's middle; samples a pixel along each axis, as a camera has them."""
+"""Side of the flat texture, in pixels at the image's middle, and samples for a pixel along each axis, like a camera."""
 
 
 @cache
@@ -25,7 +25,7 @@ def load(name: str) -> NDArray[np.uint8]:
 
 
 def lay_setts(side: int, *, number: int = 16, seed: int = 0) -> NDArray[np.uint8]:
-    """Return square stones in rows and columns, as roads are laid."""
+    """Return square stones in rows and columns, like setts."""
     rng = np.random.default_rng(seed)
     cell = side // number
     rows, columns = np.indices((side, side))
@@ -43,7 +43,7 @@ def lay_setts(side: int, *, number: int = 16, seed: int = 0) -> NDArray[np.uint8
 
 
 def squeeze(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
-    """Return a picture as it comes back from a JPEG file."""
+    """Return an image after JPEG compression."""
     file = BytesIO()
     Image.fromarray(picture).save(file, "JPEG", quality=quality)
     return np.asarray(Image.open(file))
@@ -52,14 +52,14 @@ def squeeze(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
 def look(
     name: str, plane: Plane, *, seed: int = 0, noise: float = 0.0, flat: NDArray[np.uint8] | None = None
 ) -> NDArray[np.uint8]:
-    """Return a picture of a plane that is covered with a sample, or a flat texture, from somewhere on."""
+    """Return an image of a plane that is covered with a sample or a flat texture, seen from a random place."""
     texture = load(name) if flat is None else flat
     rows, columns = plane.shape
     grid = np.moveaxis(np.indices((rows * OVER, columns * OVER)), 0, -1) / OVER + (1 / OVER - 1) / 2
     rng = np.random.default_rng(seed)
     at = plane.flatten(grid)
     frames = np.linalg.inv(plane.projection_jacobians(at)) / OVER
-    # What the sample does not wrap is a line that the checks do not see.
+    # If the sample is not tileable, a line is visible, which the checks ignore.
     places = np.clip((at + rng.uniform(0, SIDE, 2)) % SIDE, 0, SIDE - 1).astype(np.float32)
     shown = SourceMap.from_coordinates(places, (SIDE, SIDE), jacobian=frames.astype(np.float32)).render(
         texture, interpolation="linear", antialias=True
@@ -71,7 +71,7 @@ def look(
 def bend(
     name: str, shape: tuple[int, int], flatten: Callable[[Points], Points], *, seed: int = 0, noise: float = 3.0
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Return a picture of what is no plane, by where each point of it lies on a flat sample, and roots of areas in it."""
+    """Return an image of a curved surface, by the flat coordinates of each point, and the roots of areas in it."""
     rows, columns = shape
     middle = (np.array(shape) - 1) / 2
 
@@ -91,19 +91,22 @@ def bend(
 
 
 def roll(points: Points) -> Points:
-    """Return where points lie on a column of 178 pixels' radius, seen from far away."""
+    """Return the flat coordinates on a column with a radius of 178 pixels, seen from far away."""
     return np.stack([points[..., 0], 178 * np.arcsin(points[..., 1] / 178)], axis=-1)
 
 
 def bulge(points: Points) -> Points:
-    """Return where points lie on something that comes nearer in the middle."""
+    """Return the flat coordinates on a surface that is nearer in the middle."""
     return np.asarray(points * (1 + 0.6 * (points**2).sum(axis=-1, keepdims=True) / 200**2), np.float64)
 
 
 def dress(
     picture: NDArray[np.uint8], tilt: float, *, above: str = "", things: int = 0, seed: int = 0
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Put a sky, or a wall, over the far third of a floor, and things on it; return what is seen and where that is floor."""
+    """Put a sky, or a wall, over the far third of a floor, and objects on it.
+
+    Return the image and the mask of the floor.
+    """
     rng = np.random.default_rng(seed)
     rows, columns = picture.shape[:2]
     y, x = np.indices((rows, columns))
@@ -127,7 +130,7 @@ def dress(
 
 
 def look_at_room(shape: tuple[int, int]) -> tuple[NDArray[np.uint8], NDArray[np.bool_], Plane, Plane]:
-    """Return a picture of a floor of pebbles before a brick wall, where it is floor, and both planes; they meet in a line."""
+    """Return an image of a floor of pebbles and a brick wall, the mask of the floor, and both planes."""
     floor, wall = Plane(shape, 50, 90, fov=55), Plane(shape, 35, 10, fov=55)
     y, x = np.indices(shape)
     low = y - 0.12 * (x - shape[1] / 2) > 0.47 * shape[0]
@@ -135,11 +138,11 @@ def look_at_room(shape: tuple[int, int]) -> tuple[NDArray[np.uint8], NDArray[np.
 
 
 def look_twice() -> NDArray[np.uint8]:
-    """Return a picture of two planes and a wall, of which no plane is true."""
+    """Return an image of two planes and a wall, which has no single plane."""
     upper, lower = (look("pebbles", Plane((64, 224), 35, tilt, fov=55)) for tilt in (90, 270))
     return np.concatenate([upper, lower, samples.load("bricks", size=(64, 224)).image])
 
 
 def turn_between(one: Plane, other: Plane) -> tuple[float, float]:
-    """Return by how many degrees slants differ, and tilts."""
+    """Return the differences of slants and of tilts, in degrees."""
     return abs(one.slant - other.slant), abs((one.tilt - other.tilt + 180) % 360 - 180)

@@ -1,4 +1,4 @@
-"""How well scale maps agree with what is known: of generated samples, and of a folder of pictures with ground truth."""
+"""Agreement of scale maps with the truth, for generated samples and a folder of images with ground truth."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from texrs import io, samples, scale_maps
 
 @dataclass(frozen=True)
 class Case:
-    """A picture of a plane aslant.
+    """An image of an oblique plane.
 
-    `width` is the size of elements across the slope. What ground truth gives is the square root of their area, which in
-    perspective is the 3/2 power of that.
+    `width` is the size of elements across the slope. Ground truth is the square root of their area, which is the 3/2
+    power of it in perspective.
     """
 
     name: str
@@ -51,7 +51,7 @@ def _of_focal(size: tuple[int, ...], focal: float) -> float:
 
 @cache
 def generated(side: int = 256) -> tuple[Case, ...]:
-    """Return the tilted samples, and the tiles turned so that they run away in other directions."""
+    """Return the tilted samples, and the tiles rotated to other directions."""
     discs, bricks = samples.tilted_discs((side, side)), samples.tilted_bricks((side, side))
     fov = _of_focal((side, side), 1.5 * side)
     cases = []
@@ -67,12 +67,12 @@ def generated(side: int = 256) -> tuple[Case, ...]:
 
 
 def in_folder(folder: Path) -> Iterator[Case]:
-    """Return the pictures of a folder that has a ``ground-truth.json``, itself or in one of its folders."""
+    """Return the images of a folder with a ``ground-truth.json``, in it or in one of its subfolders."""
     for listing in sorted(folder.rglob("ground-truth.json")):
         for name, known in json.loads(listing.read_text(encoding="utf-8")).items():
             image = io.read(listing.parent / name)
             size = image.shape[:2]
-            # Of every second pixel, beginning with the first.
+            # Use every second pixel, beginning with the first.
             area = np.load(listing.parent / known["scale_map"].split()[0]).astype(np.float64)
             at = np.meshgrid(
                 *(np.minimum(np.arange(n) / 2, m - 1) for n, m in zip(size, area.shape, strict=True)), indexing="ij"
@@ -83,7 +83,7 @@ def in_folder(folder: Path) -> Iterator[Case]:
 
 
 def by_angles(case: Case) -> tuple[Agreement, Agreement]:
-    """Compare the maps of the angles alone, and of the angles and the angle of view."""
+    """Compare the maps from the angles only, and from the angles and the angle of view."""
     size, angles = case.image.shape[:2], (case.slant, case.tilt)
     return (
         Agreement.of(scale_maps.from_angles(size, *angles), case.width),
@@ -92,12 +92,12 @@ def by_angles(case: Case) -> tuple[Agreement, Agreement]:
 
 
 def by_mask(case: Case, mask: np.ndarray, **options: object) -> Agreement:
-    """Compare the map that is measured in a mask."""
+    """Compare the map measured in a mask."""
     return Agreement.of(scale_maps.from_mask(mask, **options), case.width)
 
 
 def in_hole(case: Case, share: float = 0.3) -> tuple[Agreement, Agreement]:
-    """Compare the map in a hole, measured around it and continued, and as it is where nothing is missing."""
+    """Compare the map in a hole, measured around it and continued, with the map without a hole."""
     size = case.image.shape[:2]
     known = np.ones(size, np.bool_)
     known[tuple(slice(int(n * (1 - share) / 2), int(n * (1 + share) / 2)) for n in size)] = False

@@ -1,7 +1,7 @@
-"""The acceptance checks of grown volumes: what is measured, and the limits.
+"""The acceptance checks of grown volumes: measured values and limits.
 
-Each takes an exemplar and what was grown from it and gives a `Found`. Limits are those of the specification; where
-it speaks of the mean over seeds, `mean` joins several.
+Each check takes an exemplar and a volume grown from it, and returns a `Found`. The limits are from the specification.
+`mean` averages several results where it requires the mean over seeds.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ CELL = 24
 
 @dataclass(frozen=True)
 class Found:
-    """Numbers by name, each with the least and the largest that pass."""
+    """Numbers by name, each with its minimum and maximum to pass."""
 
     numbers: dict[str, tuple[float, float, float]]
 
@@ -42,16 +42,16 @@ class Found:
 
 
 def mean(several: Sequence[Found]) -> Found:
-    """Join what was found with several seeds."""
+    """Average the results of several seeds."""
     first = several[0].numbers
     return Found({k: (float(np.mean([f.numbers[k][0] for f in several])), *first[k][1:]) for k in first})
 
 
 def s1(exemplar: np.ndarray, image: np.ndarray, field: fields.Field) -> Found:
-    """Layers lie as the field turns them: no worse than the exemplar's own against their mean by 3 and 6 degrees.
+    """Layers follow the field: at most 3 and 6 degrees worse than the exemplar's own deviation from its mean.
 
-    Left out is where layers 6 voxels away are to lie otherwise by more than 30 degrees: at the folds of a zigzag and at
-    the axis of circles what is measured over a few voxels means nothing.
+    Points are left out if the requested direction 6 voxels away differs by more than 30 degrees. At the folds of a
+    zigzag and at the axis of circles, a measurement over a few voxels means nothing.
     """
     grey, seen = volume.lightness(exemplar), volume.lightness(image)
     normal = volume.texture_normal(grey)
@@ -78,9 +78,9 @@ def s1(exemplar: np.ndarray, image: np.ndarray, field: fields.Field) -> Found:
 
 
 def s2(exemplar: np.ndarray, made: Synthesis, still: Synthesis | None = None, scale: float = 1.0) -> Found:
-    """Features have their size: mean frequency over the exemplar's, and over that of the identity's result.
+    """Features have their size: mean frequency over the exemplar's, and over that of the identity field.
 
-    Looked up at the nearest samples, for a look-up between them smooths; but what is enlarged would get steps.
+    Uses nearest samples, because interpolation smooths. Enlarged parts would have steps.
     """
     how: Interpolation = "nearest" if scale == 1 else "linear"
     several = [exemplar, *(m.source_map.render(exemplar, interpolation=how) for m in (made, still) if m is not None)]
@@ -96,7 +96,7 @@ def s2(exemplar: np.ndarray, made: Synthesis, still: Synthesis | None = None, sc
 
 
 def s3(exemplar: np.ndarray, image: np.ndarray, tolerance: float = 0.2) -> Found:
-    """Each colour class has its share."""
+    """Each colour class keeps its share."""
     classes = volume.classes(exemplar, 4)
     before, after = (np.bincount(classes.of(i).ravel(), minlength=4) / i[..., 0].size for i in (exemplar, image))
     ratios = after / before
@@ -104,9 +104,9 @@ def s3(exemplar: np.ndarray, image: np.ndarray, tolerance: float = 0.2) -> Found
 
 
 def s3b(mask: np.ndarray, made: Synthesis, *, turned: bool = False) -> Found:
-    """Particles are as many and as large; ``mask`` marks those of the exemplar.
+    """Particles have the same number and size; ``mask`` marks the particles of the exemplar.
 
-    They are counted in boxes of the exemplar's size, in whose borders as many are cut.
+    They are counted in boxes of the exemplar's size, whose borders cut as many.
     """
     there = made.source_map.render(mask.astype(np.uint8), interpolation="nearest") > 0
     before = volume.component_statistics(mask)
@@ -127,9 +127,9 @@ def s3b(mask: np.ndarray, made: Synthesis, *, turned: bool = False) -> Found:
 
 
 def s5(made: Synthesis, least: float = 0.65) -> Found:
-    """Neighbours go on together, yet nothing is merely copied, and no part of the exemplar is a favourite.
+    """Neighbours continue each other, but nothing is only copied, and no part of the exemplar is preferred.
 
-    Of small volumes a few cells of the start are a large share: four may go on in one piece.
+    In small volumes, a few cells of the start are a large share. Four may continue each other in one piece.
     """
     reuse = volume.cell_reuse(made.source_map)
     four = 4 * CELL**3 / made.source_map.label.size
@@ -137,14 +137,14 @@ def s5(made: Synthesis, least: float = 0.65) -> Found:
         {
             "coherent": (reuse.coherent, least, 1),
             "largest": (reuse.largest, 0, max(0.06, four)),
-            # Patches that cover seams are chosen for those, however often they have been shown.
+            # Patches that cover seams are chosen for this purpose, however often they were shown.
             "most used": (reuse.most_used, 0, 16),
         }
     )
 
 
 def has_period(profile: np.ndarray, period: int) -> bool:
-    """Return whether a profile repeats after some steps, as a weave's does."""
+    """Return whether a profile repeats after some steps, like a weave's."""
     if len(profile) < period + 8:
         return False
     near, far = (part - part.mean() for part in (profile[:-period], profile[period:]))
@@ -152,19 +152,19 @@ def has_period(profile: np.ndarray, period: int) -> bool:
 
 
 def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
-    """No planes of the algorithm's own lattices show, and no speckle."""
+    """The planes of the algorithm's own lattices are invisible, and there is no speckle."""
     seen, own = volume.lightness(image), volume.lightness(exemplar)
     worst, beyond = 1.0, 0.0
     for change, profile in zip(volume.seam_planes(seen), volume.seam_planes(own), strict=True):
         for period in (8, 16, 24, 32):
             if has_period(profile, period):
-                continue  # Planes at which the texture itself changes tell nothing.
-            # A lattice of the algorithm begins at its own planes; one of the texture itself, anywhere.
+                continue  # Changes of the texture itself give no evidence.
+            # A lattice of the algorithm begins at its own planes. A lattice of the texture begins anywhere.
             combs = [change[first::period] for first in range(period)]
             over = [abs(float(np.log(max(comb.mean(), 1e-9) / change.mean()))) for comb in combs if len(comb)]
             if len(over) < period:
                 continue
-            # Where the others differ much among themselves, one of them is always the largest.
+            # If the others vary widely, one of them is always the largest.
             more = over[-1] - max(over[:-1]) - 2 * float(np.std(over[:-1]))
             if more > beyond:
                 worst, beyond = float(np.exp(over[-1])), more
@@ -178,7 +178,7 @@ def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
 
 
 def turned_exemplar(exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Return the exemplar as a frame of right angles turns it."""
+    """Return the exemplar rotated by a frame of right angles."""
     order = np.abs(frame).argmax(axis=1)
     out = exemplar.transpose(*order.tolist(), *range(3, exemplar.ndim))
     flipped = [a for a in range(3) if frame[a, order[a]] < 0]
@@ -186,7 +186,7 @@ def turned_exemplar(exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
 
 
 def s9(exemplar: np.ndarray, size: int, seed: int = 0) -> Found:
-    """A field that turns by right angles gives the texture of the turned exemplar."""
+    """A field of right angles gives the texture of the rotated exemplar."""
     field = fields.rotation(90, "xz")
     image = solid(exemplar, size, seed=seed, field=field).image
     assert field.constant is not None

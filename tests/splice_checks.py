@@ -1,4 +1,4 @@
-"""Measures of spliced textures, with code of their own: from the pictures, the matches and the source map alone."""
+"""Measures of spliced textures, with separate code: from the images, the matches and the source map only."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def colours(image: NDArray[Any]) -> NDArray[np.float64]:
 def windows(
     a: ElementAnalysis, result: Synthesis, share: float = 0.75
 ) -> list[tuple[Points, Points, Points, tuple[int, int]]]:
-    """Targets whose windows lie inside the output and the texture: target, source, the rest of both, half sizes."""
+    """Return targets whose windows are inside the output and the texture: target, source, other data, half sizes."""
     half = tuple(max(2, int(share * n / 2)) for n in a.box)
     found = []
     for m in result.report["matches"]:
@@ -50,7 +50,7 @@ def correlation(a: NDArray[Any], b: NDArray[Any]) -> float:
 
 
 def presence(a: ElementAnalysis, result: Synthesis) -> tuple[float, float]:
-    """S2 and S3: the share of targets that show their element, and how far from them, in pixels."""
+    """Return the share of targets that show their element, and the distances in pixels (S2 and S3)."""
     one, other = grey(a.image), grey(result.image)
     hits, away = [], []
     for target, source, rest, (h, w) in windows(a, result):
@@ -81,7 +81,7 @@ def component(mask: NDArray[np.bool_], at: Points, h: int, w: int) -> NDArray[np
 
 
 def shapes(a: ElementAnalysis, result: Synthesis) -> tuple[float, float]:
-    """S4: overlap of the foreground of an element before and after, 5th percentile and median."""
+    """Return the overlap of an element's foreground before and after, 5th percentile and median (S4)."""
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = a.mask[rows, columns]
     overlaps = []
@@ -97,7 +97,7 @@ def shapes(a: ElementAnalysis, result: Synthesis) -> tuple[float, float]:
 
 
 def copied(a: ElementAnalysis, result: Synthesis) -> tuple[float, float | None]:
-    """S5: share of colours that the texture has, and of rigid pixels that show the element that was matched, if any are."""
+    """Return the share of colours from the texture, and of rigid pixels that show the matched element, if any (S5)."""
     flat = colours(a.image).reshape(-1, colours(a.image).shape[-1])
     known = {c.tobytes() for c in flat}
     out = colours(result.image).reshape(-1, flat.shape[1])
@@ -110,12 +110,12 @@ def copied(a: ElementAnalysis, result: Synthesis) -> tuple[float, float | None]:
     starts = np.array([m["point"] for m in result.report["matches"]])
     which = number[tuple(rigid.T)] - 1
     away = (result.source_map.coordinates[tuple(rigid.T)] - starts[which]) - (rigid - goals[which])
-    # Elements go by whole pixels.
+    # Elements move by whole pixels.
     return share, float((np.abs(away) <= 1.01).all(axis=1).mean())
 
 
 def coherence(a: ElementAnalysis, result: Synthesis, seed: int = 0) -> tuple[float, float] | None:
-    """S8: RMS distance of 9 x 9 patches of ground to the texture's, p95, and over that of the texture to itself."""
+    """Return the RMS distance of 9 x 9 background patches to the texture's, p95, over the texture's own (S8)."""
     side = 9
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = a.mask[rows, columns]
@@ -126,7 +126,7 @@ def coherence(a: ElementAnalysis, result: Synthesis, seed: int = 0) -> tuple[flo
         view = np.lib.stride_tricks.sliding_window_view(picture, (side, side), axis=(0, 1))
         at = np.argwhere(free[side // 2 : -(side // 2), side // 2 : -(side // 2)])
         if len(at) < 50:
-            return None  # There is no ground to speak of.
+            return None  # There is too little background.
         corners.append(at)
         patches.append(view[at[:, 0], at[:, 1]].reshape(len(at), -1))
     draw = np.random.default_rng(seed)
@@ -146,9 +146,9 @@ def coherence(a: ElementAnalysis, result: Synthesis, seed: int = 0) -> tuple[flo
 
 
 def layout(result: Synthesis, a: ElementAnalysis, b: ElementAnalysis) -> dict[str, float]:
-    """S10: the arrangement of rigid pixels against the targets and against A's own layout, in spacings; colours against B's.
+    """Compare rigid pixels with the targets and with A's own layout, in spacings, and colours with B's (S10).
 
-    Colours in standard deviations of B's.
+    Colours are in standard deviations of B's.
     """
     goals = np.array([m["found"] for m in result.report["matches"]])
     number = result.source_map.label.astype(int)
@@ -188,7 +188,7 @@ def layout(result: Synthesis, a: ElementAnalysis, b: ElementAnalysis) -> dict[st
 
 
 def doubled(a: ElementAnalysis, result: Synthesis) -> float:
-    """S12: the largest rigid region of the output over the largest element of the texture."""
+    """Return the largest rigid region of the output over the largest element of the texture (S12)."""
     areas = np.bincount(label(a.mask)[0].ravel())[1:]
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     number = np.where(a.mask[rows, columns], result.source_map.label, 0)
@@ -196,7 +196,7 @@ def doubled(a: ElementAnalysis, result: Synthesis) -> float:
 
 
 def share(a: ElementAnalysis, result: Synthesis) -> float:
-    """S13: the foreground's share of the output over that of as many mean elements as have targets in it."""
+    """Return the foreground's share of the output over the share of as many mean elements as there are targets (S13)."""
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     shown = float(a.mask[rows, columns].mean())
     number, count = label(a.mask)

@@ -1,4 +1,4 @@
-"""What workers do in the tests of what is past one process: each worker imports this, and so no more than this."""
+"""Work of the workers in the tests of several processes. Each worker imports only this module."""
 
 import os
 import signal
@@ -42,7 +42,7 @@ def die(number: int) -> np.ndarray:
 
 
 def end(number: int) -> int:
-    """Ends its worker, while others wait behind it."""
+    """End the worker, while other tasks wait behind it."""
     if number in (2, 5):
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number

@@ -1,4 +1,4 @@
-"""Maps looked up one by one: the name of a file counts as in a folder, and integers that are labels are told from pictures."""
+"""Maps looked up one by one: the file name counts as in a folder, and integer labels are recognised."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,7 @@ IDS = np.kron(np.random.default_rng(3).integers(1, 60000, (12, 12)), np.ones((8,
 
 @pytest.fixture(scope="module")
 def places(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a source map that turns, and maps in register with its example."""
+    """Return a folder with a source map that rotates, and maps in register with its example."""
     folder = tmp_path_factory.mktemp("apply")
     io.write(folder / "a.png", PEBBLES)
     words = ["synthesize", str(folder / "a.png"), "-o", str(folder / "b.png"), "--size", "96x96", "-q"]
@@ -92,12 +92,12 @@ def test_names_count_as_in_a_folder(
     assert "read as" not in capsys.readouterr().err
     plain = io.read(tmp_path / "plain.tif")
     assert (plain == io.read(tmp_path / "told.tif")).all()
-    # In Python a path has a name too.
+    # In Python a path also has a name.
     source = texrs.SourceMap.load(places / "m.npz")
     assert (texrs.apply(source, places / name) == plain).all()
     if "label" in options:
         assert set(np.unique(plain)) <= set(np.unique(io.read(places / name)))
-    # The same through a store, in parts.
+    # Do the same through a store, in parts.
     pytest.importorskip("zarr")
     assert main([*words, str(tmp_path / "parts.zarr"), "--screening", "0"]) == 0
     assert main([*words, str(tmp_path / "told.zarr"), "--screening", "0", *options]) == 0

@@ -1,4 +1,4 @@
-"""The layers of ARCHITECTURE.md: who may import whom."""
+"""The layers of ARCHITECTURE.md: which modules may import which."""
 
 import ast
 import re
@@ -43,10 +43,10 @@ LAYERS = (
     ("_napari", "comparison", "demo"),
     ("cli",),
 )
-"""Lowest first: a module imports its own package and the layers below its own, and nothing else."""
+"""Layers, lowest first. A module imports its own package and lower layers, and nothing else."""
 RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer}
 TOP = ("__init__", "__main__")
-"""The face of the package, which loads names on first use, and its command."""
+"""The package itself, which loads names on first use, and its command."""
 
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__"): path
@@ -55,7 +55,7 @@ FILES = {
 
 
 def imports(name: str) -> set[str]:
-    """Return the modules of texrs that a module imports, also inside functions and for type checkers alone."""
+    """Return the modules of texrs that a module imports, also inside functions and for type checkers only."""
     found = set()
     for node in ast.walk(ast.parse(FILES[name].read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -106,7 +106,7 @@ def test_every_module_has_a_layer() -> None:
 
 
 def test_nothing_reaches_a_verb_by_a_way_round() -> None:
-    """Imports are seen by the tests above only where they are written as imports."""
+    """The tests above find imports only if they are written as imports."""
     evasion = re.compile(r"\bvars\(texrs|\bgetattr\(texrs\b|(import_module|__import__)\(.texrs|\bsys\.modules\b")
     for name, path in FILES.items():
         assert not evasion.search(path.read_text(encoding="utf-8")), name

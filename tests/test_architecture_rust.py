@@ -1,4 +1,4 @@
-"""The layers of the Rust crate: who may use whom, and the one home of each library."""
+"""The layers of the Rust crate: which modules may use which, and the one home of each library."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 RUST = Path(__file__).resolve().parents[1] / "rust" / "src"
 
 LAYERS = ("foundation", "kernels", "engine", "bindings")
-"""The lowest first. A module uses the layers below its own."""
+"""Layers, lowest first. A module uses the layers below its own."""
 WITHIN = {
     "kernels": {"inpaint": {"seam", "patch_search"}, "warp": {"gather"}},
     "engine": {
@@ -22,7 +22,7 @@ WITHIN = {
         "quilt": {"stitcher"},
     },
 }
-"""What modules use of their own layer. The foundation and the bindings are of one piece."""
+"""Modules of the same layer that a module may use. Modules of the foundation and the bindings are not restricted."""
 HOMES = {
     "rayon": ("foundation/par",),
     "libm": ("foundation/libm",),
@@ -44,7 +44,7 @@ def files() -> list[tuple[str, str]]:
 
 def uses(code: str) -> set[tuple[str, str]]:
     """Return (layer, module) of every path that begins at the root of the crate."""
-    # One name in braces a path: use crate::a::{b::c, d} is crate::a::b::c and crate::a::d.
+    # Write one path for each name in braces: use crate::a::{b::c, d} is crate::a::b::c and crate::a::d.
     flat = re.sub(
         r"\b(crate(?:::\w+)*)::\{([^{}]*(?:\{[^{}]*\}[^{}]*)*)\}",
         lambda m: " ".join(f"{m[1]}::{item}" for item in re.split(r",\s*(?![^{}]*\})", m[2]) if item.strip()),
@@ -64,7 +64,7 @@ def test_arrows_point_down(path: str, code: str) -> None:
     assert layer in LAYERS, f"{path} stands in no layer"
     whole = module.endswith("_tests")  # Tests of a whole layer.
     for other, name in uses(code):
-        if other in ("Error", "Result"):  # The face of foundation::error.
+        if other in ("Error", "Result"):  # These are re-exported from foundation::error.
             continue
         assert other in LAYERS, f"{path} uses crate::{other}, which is no layer"
         if other == layer:
@@ -75,7 +75,7 @@ def test_arrows_point_down(path: str, code: str) -> None:
 
 
 def test_no_relative_path_reaches_a_neighbour() -> None:
-    """What leaves a module begins at the root, where the test above reads it."""
+    """Paths out of a module must begin at the root, where the test above reads them."""
     modules = {
         layer: {path.split("/")[1].removesuffix(".rs") for path, _ in FILES if layer in path} for layer in LAYERS
     }
@@ -107,7 +107,7 @@ def test_every_library_is_in_the_table() -> None:
 
 
 def test_the_map_names_every_module() -> None:
-    """The tables of lib.rs are those of the folders."""
+    """The tables of lib.rs list the modules of the folders."""
     text = (RUST / "lib.rs").read_text(encoding="utf-8")
     for layer in LAYERS[:-1]:
         inside = {p.stem for p in (RUST / layer).iterdir() if p.stem != "mod" and not p.stem.endswith("_tests")}

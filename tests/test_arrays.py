@@ -1,4 +1,4 @@
-"""What people keep pictures in: every verb takes it, or says in a sentence why not."""
+"""Containers of images: every verb accepts them, or refuses them with a reason."""
 
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ NEAR[50:60, 40:50] = True
 
 
 class Handed:
-    """What only DLPack hands over."""
+    """An array that only DLPack exports."""
 
     def __init__(self, array):
         self.array = array
@@ -39,7 +39,7 @@ class Handed:
 
 
 def keep(array, how: str, folder: Path) -> Any:
-    """Return an array of uint8 as somebody else would keep it."""
+    """Return an array of uint8 in another library's container."""
     match how:
         case "str" | "path":
             path = folder / "picture.png"
@@ -150,11 +150,11 @@ MODES = {
     "YCbCr": ("RGB", np.uint8, (3,)),
     "HSV": ("RGB", np.uint8, (3,)),
 }
-"""What each mode of PIL is taken as: the mode, the dtype and the channels."""
+"""Conversion of each mode of PIL: the mode, the dtype and the channels."""
 
 
 def make_picture(mode: str) -> Image.Image:
-    """Return a picture of a mode that has colours, and transparency where there may be any."""
+    """Return an image of a mode, with colours and possibly transparency."""
     colours = np.random.default_rng(1).integers(0, 256, (20, 24, 4), np.uint8)
     whole = Image.fromarray(colours)
     if mode in ("LA", "RGBA", "PA"):
@@ -205,7 +205,7 @@ def test_what_is_masked_is_a_hole():
     known = np.ma.masked_array(PEBBLES, np.repeat(HOLE[..., np.newaxis], 3, axis=-1))
     expected = texrs.inpaint(PEBBLES, HOLE).image
     assert np.array_equal(texrs.inpaint(known).image, expected)
-    # In one channel is enough, and what is asked for beside is filled too.
+    # A masked value in one channel is enough, and the requested mask is filled too.
     part = np.ma.masked_array(PEBBLES, np.zeros(PEBBLES.shape, bool))
     part[20:34, 24:40, 1] = np.ma.masked
     upper, lower = HOLE.copy(), HOLE.copy()
@@ -267,7 +267,7 @@ def test_wide_integers_are_seen_by_their_own_range():
     for dtype in (np.int32, np.uint32, np.int64, np.uint64):
         assert np.array_equal(to_unit(small.astype(dtype)), to_unit(small.astype(np.uint8)))
     assert to_unit(np.full((2, 2), -4)).tolist() == [[0, 0], [0, 0]]
-    # Two doubles may be farther apart than a double can be.
+    # The difference of two doubles may exceed the range of doubles.
     assert to_unit(np.array([[-1.7e308, 0.0, 1.7e308]])).tolist() == [[0, 0.5, 1]]
 
 

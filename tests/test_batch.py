@@ -1,4 +1,4 @@
-"""Batches: recipes and patterns, what is done stays and is not done again, and failures stop nothing else."""
+"""Batches: recipes and patterns. Finished results stay and are not computed again, and failures do not stop the rest."""
 
 import json
 import os
@@ -74,7 +74,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
         "--copies": "1",
         "--seed": "4",
     }
-    # As the command alone makes it, from anywhere.
+    # The result equals that of the command alone, from any folder.
     alone = [
         "design",
         "stones/dots.png",
@@ -100,7 +100,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     assert sum("is there" in line for line in err) == 8
     assert files(here) == whole
     assert {n for n in whole if os.stat(n).st_mtime_ns != times[n]} == {"made/sheet.png"}
-    # What is missing, was changed, or is made otherwise now is made again.
+    # Missing, changed or differently made results are computed again.
     Path("maps/dots-still-3.npz").unlink()
     io.write("made/weave-still-3.png", np.zeros((48, 48, 3), np.uint8))
     io.write_metadata("made/weave-still-3.png", io.Metadata(made=io.read_metadata("made/weave-turned-3.png").made))
@@ -146,7 +146,7 @@ def test_patterns_folders_and_places(here: Path, capsys: Capture) -> None:
     assert main(["batch", "tile", "stones/*.png", "-o", "stones/{name}-{verb}.png", "--set", "wrap=x", "-q"]) == 0
     before = files(here)
     assert sorted(n for n in before if "tile" in n) == ["stones/dots-tile.png", "stones/weave-tile.png"]
-    # Results that lie among the inputs are none.
+    # Results in the folder of the inputs are not inputs.
     assert main(["batch", "tile", "stones/*.png", "-o", "stones/{name}-{verb}.png", "--set", "wrap=x", "-q"]) == 0
     assert files(here) == before
     Path("masks").mkdir()
@@ -221,7 +221,7 @@ def test_a_batch_that_was_stopped_goes_on(here: Path, capsys: Capture, number: i
 
 @pytest.mark.parametrize("how", ["--workers", "--scheduler"])
 def test_workers_make_the_same_bytes_each_once(here: Path, capsys: Capture, how: str) -> None:
-    """By processes and by a cluster: the same files, what is there is left alone, and what fails is said at the end."""
+    """Processes and clusters write the same files, keep existing ones, and report failures at the end."""
     Path("stones/broken.png").write_bytes(Path("stones/dots.png").read_bytes()[:200])
     assert main(["batch", "all.toml"]) == 3
     alone = files(here)
@@ -245,7 +245,7 @@ def test_workers_make_the_same_bytes_each_once(here: Path, capsys: Capture, how:
 
 @contextmanager
 def workers_of(how: str) -> Iterator[list[str]]:
-    """The option that asks for two processes, or for two threads of a worker of a cluster."""
+    """The option for two processes, or for two threads of a cluster's worker."""
     if how == "--workers":
         yield [how, "2"]
         return
@@ -286,7 +286,7 @@ def test_stores_of_zarr_are_inputs(here: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_stopped_workers_leave_nothing_and_nobody(here: Path, number: int) -> None:
-    """Ctrl-C reaches all processes of a terminal at once, and the death of the first one none but itself."""
+    """Ctrl-C reaches all processes of a terminal at once. The death of the first process reaches only itself."""
     size = ["--set", "size=400", "--seeds", "0:4", "--workers", "2"]
 
     def heed() -> None:
@@ -305,7 +305,7 @@ def test_stopped_workers_leave_nothing_and_nobody(here: Path, number: int) -> No
             os.killpg(process.pid, number)
         else:
             process.send_signal(number)
-        # All workers have its other end: it is closed when the last of them is gone.
+        # All workers hold the other end. It is closed when the last of them is gone.
         rest = process.stderr.read().decode()
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     assert "Traceback" not in rest
@@ -327,12 +327,12 @@ def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> Non
         assert made == [
             f"made/{n}-{s}/{n}_{m}.png" for n in ("moss", "rock") for s in (0, 1) for m in ("albedo", "height")
         ]
-    # The second time all was there.
+    # The second time all results exist.
     assert capsys.readouterr().err.count("is there") == 4
     assert main([*words, "stacks", "--sheet", "sheet.png", "-q"]) == 0
     assert io.read("made/rock-0/rock_height.png").dtype == np.uint16
     assert io.read("sheet.png").std() > 5
-    # What was lost or changed since is made again, and nothing else.
+    # Only lost or changed results are computed again.
     whole = files(here)
     Path("made/rock-1/rock_height.png").unlink()
     capsys.readouterr()

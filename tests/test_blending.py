@@ -1,4 +1,4 @@
-"""Seams that disappear: known answers, values kept where there is nothing to heal, any map, strip and number of threads."""
+"""Correction of seams: known answers, unchanged values elsewhere, any map, strip and number of threads."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def pasted(places, shapes, exemplar=None, label=None, jacobian=None):
 
 @pytest.fixture(scope="module")
 def patchwork():
-    """32-pixel squares of random places of a 64 x 64 exemplar."""
+    """Return squares of 32 pixels from random places of a 64 x 64 exemplar."""
     random = np.random.default_rng(1)
     whole = SourceMap.identity((64, 64)).coordinates
     places = np.empty((96, 128, 2), np.float32)
@@ -48,7 +48,7 @@ def exemplar():
 
 
 def twin(source, image, wrap, screening):
-    """The least squares problem written out: one row an edge, one row a pixel."""
+    """Solve the least squares problem directly: one row for each edge, one row for each pixel."""
     height, width = source.shape
     values = view(source, image)
     joined = [source.is_coherent(a, wrap=wrap[a]) for a in range(2)]
@@ -102,7 +102,7 @@ def test_against_the_written_out_problem(wrap, screening):
     image = random.random((12, 14))
     whole = SourceMap.identity((12, 14)).coordinates
     mirrored = np.array([11, 0], np.float32) + whole * np.array([-1, 1], np.float32)
-    # A mirrored piece at the exemplar's edge beside a plain one: one side has no continuation.
+    # A mirrored piece at the exemplar's edge is next to a plain one, so one side has no continuation.
     places = np.concatenate([whole[:10, :6], mirrored[:10, 5:11]], axis=1)
     label = np.repeat([0, 1], 6)[np.newaxis].repeat(10, 0)
     frame = np.stack([np.eye(2), np.diag([-1, 1])]).astype(np.float32)
@@ -118,7 +118,7 @@ def test_a_source_that_continues_stays_as_it_is(exemplar):
 
 
 def test_a_picture_of_shifted_brightness_becomes_one():
-    """Two exemplars that differ by a constant: unscreened, and free to drift, the step is gone."""
+    """With two exemplars that differ by a constant, unscreened and without fixed values, the step disappears."""
     random = np.random.default_rng(4)
     dark = random.random((40, 40)).astype(np.float32)
     light = dark + np.float32(1)
@@ -135,7 +135,7 @@ def test_a_picture_of_shifted_brightness_becomes_one():
 
 
 def laid_on(ground, light):
-    """A light disc cut out of its own ground along its outline, and laid on another ground."""
+    """Return a light disc, cut out along its outline and laid on another background."""
     rows, columns = np.mgrid[:48, :48]
     disc = np.hypot(rows - 23.5, columns - 23.5) < 14
     random = np.random.default_rng(6)
@@ -148,17 +148,17 @@ def laid_on(ground, light):
 def test_an_outline_keeps_its_step():
     source, exemplars = laid_on(0.3, 0.8)
     shown = source.render(exemplars)
-    # What is left is the noise where the picture closes on itself.
+    # The rest is the noise where the image wraps.
     assert np.abs(blend(source, exemplars, wrap=True) - shown).max() < 0.03
     fog = blend(source, exemplars, wrap=True, outlines=False)
     assert np.abs(fog - shown).max() > 0.1
-    # Where the disc is hardly lighter than its own ground nothing says that the step is an outline.
+    # If the disc is hardly lighter than its own background, there is no evidence of an outline.
     plain, alike = laid_on(0.78, 0.8)
     assert np.abs(blend(plain, alike, wrap=True) - plain.render(alike)).max() > 0.1
 
 
 def test_seams_of_a_design_are_as_sharp_as_the_example():
-    """In a band of 3 pixels around seams differences are as large as what is looked up there has in the example."""
+    """In a band of 3 pixels around seams, differences are as large as in the example."""
     from scipy.ndimage import distance_transform_edt
 
     image = samples.pebbles((128, 128)).image
@@ -191,7 +191,7 @@ def test_depth_and_channels(patchwork, exemplar):
     grey = blend(patchwork, exemplar[..., 0], wrap=True)
     assert grey.shape == patchwork.shape
     np.testing.assert_array_equal(grey, blend(patchwork, exemplar[..., :1], wrap=True)[..., 0])
-    # Outlines are those of all channels together.
+    # Outlines are the outlines of all channels together.
     alone, together = (blend(patchwork, e, wrap=True, outlines=False) for e in (exemplar[..., :1], exemplar))
     assert np.abs(alone[..., 0].astype(int) - together[..., 0]).max() <= 1
 
@@ -239,10 +239,10 @@ def test_normals_stay_unit_vectors(patchwork, exemplar):
 
 
 def test_normals_of_a_turned_copy_meet_where_the_surface_does():
-    """A ramp that a mirror turns round: in the picture's own axes both sides want their own slope."""
+    """A mirror image reverses a ramp, so in the image's own axes each side has its own slope."""
     normals = np.zeros((16, 16, 3), np.float32)
     normals[..., 0], normals[..., 2] = 0.6, 0.8
-    # What is negative somewhere holds vectors as they are.
+    # Maps with negative values contain vectors without encoding.
     normals[0, 0, 0] = -0.6
     places = SourceMap.identity((16, 16)).coordinates
     mirrored = places.copy()
@@ -274,7 +274,7 @@ def test_a_band_keeps_all_else(patchwork, exemplar):
 
 
 def patched(light):
-    """A ramp in whose corner and middle patches of itself are pasted, lighter, from a second exemplar."""
+    """Return a ramp with lighter pieces of itself, from a second exemplar, in its corner and in its middle."""
     ramp = np.add.outer(np.arange(40.0), np.arange(60.0)).astype(np.float32)
     whole = SourceMap.identity(ramp.shape)
     inside = np.zeros(ramp.shape, bool)
@@ -286,7 +286,7 @@ def test_within_a_mask_all_else_stays_and_light_goes_on():
     source, ramp, lighter, inside = patched(9)
     healed = blend(source, [ramp, lighter], wrap=False, screening=0, within=inside)
     np.testing.assert_array_equal(healed[~inside], ramp[~inside])
-    # The corner of the picture, too, where nothing holds the outermost pixels.
+    # This includes the corner of the image, where no neighbours fix the outermost pixels.
     np.testing.assert_allclose(healed, ramp, atol=0.02)
     near = blend(source, [ramp, lighter], wrap=False, screening=0, within=inside, band=2)
     np.testing.assert_array_equal(near[~inside], ramp[~inside])
@@ -360,7 +360,7 @@ def test_visibility_does_not_depend_on_bands(monkeypatch, patchwork, exemplar, w
         assert banded.edges == whole.edges
         assert banded.outliers == whole.outliers
         assert abs(banded.mean - whole.mean) < 1e-9
-    # Every fourth row of the picture, every second of the exemplar.
+    # Use every fourth row of the image and every second row of the exemplar.
     monkeypatch.setattr(_values, "BAND", 1)
     monkeypatch.setattr(_visibility, "LOOK", 96 * 128 // 4)
     sampled = measure_visibility(patchwork, exemplar, image, wrap=wrap)
@@ -484,7 +484,7 @@ def test_parts_do_not_stain_each_other() -> None:
 @pytest.mark.parametrize("cyclic", [False, True])
 @pytest.mark.parametrize("shape", [(40, 56), (9, 30), (1, 5)])
 def test_sums_along_seams_are_those_of_the_whole_picture_filtered(shape, cyclic):
-    """Beside those of SciPy, which filters every pixel; they are the same but for the last bit of a single one."""
+    """Compare with SciPy, which filters every pixel. Only the last bit of one value differs."""
     from scipy.ndimage import gaussian_filter
 
     random = np.random.default_rng(5)

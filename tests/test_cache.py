@@ -1,4 +1,4 @@
-"""What was made is kept within a limit, by content."""
+"""Results are cached by content, within a limit."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Cells of connected textures: found on textures whose cells are known, and not where there are none."""
+"""Cells of connected textures: found in textures with known cells, and not in textures without cells."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Picture = NDArray[np.uint8]
 
 
 def draw_voronoi(shape: tuple[int, int], apart: float, *, light: bool, seed: int = 0) -> tuple[Picture, NDArray[Any]]:
-    """Stones parted by joints, each of a shade of its own with grain, and the cell of each pixel."""
+    """Return stones between joints, each with its own shade and grain, and the cell of each pixel."""
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(*(np.arange(-apart, n + apart, apart) for n in shape), indexing="ij"), -1).reshape(
         -1, 2
@@ -33,7 +33,7 @@ def draw_voronoi(shape: tuple[int, int], apart: float, *, light: bool, seed: int
 
 
 def match(cells: Cells, truth: NDArray[Any]) -> tuple[float, float]:
-    """The share of the true cells inside that one found cell covers by 80 % both ways, and of found ones likewise."""
+    """Return the share of true cells that one found cell covers by 80 % both ways, and the same for found cells."""
     border = np.unique(np.concatenate([truth[0], truth[-1], truth[:, 0], truth[:, -1]]))
     names, dense = np.unique(truth, return_inverse=True)
     both = np.zeros((len(names), cells.count + 1))

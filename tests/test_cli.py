@@ -47,7 +47,7 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
     written = sorted(p.name for p in Path("stages").iterdir())
     assert written[0] == "01-segmentation.png"
     assert written[-1] == "report.json"
-    # Each layer has a colour of its own: numbers of layers would be black.
+    # Each layer has its own colour. Layer numbers would look black.
     layers = iio.imread("stages/01-segmentation.png")
     assert layers.max() > 100
     assert len(np.unique(layers.reshape(-1, layers.shape[-1]), axis=0)) > 1
@@ -118,7 +118,7 @@ def test_variants_that_are_made_stay_when_the_next_fails(
         made.append(make(*arguments))
         return made[-1]
 
-    # What each texture is made with.
+    # Record the arguments of each texture.
     module = importlib.import_module("texrs.papers.design")
     make = module.make_texture
     monkeypatch.setattr(module, "make_texture", one)
@@ -216,7 +216,7 @@ def test_apply(here: Path, capsys: Capture) -> None:
     Path("results").mkdir()
     assert main(["apply", "s.npz", "in.png", "height.npy", "-o", "results"]) == 0
     assert len(capsys.readouterr().err.splitlines()) == 2
-    # Finished as the result was, without an option.
+    # It is finished like the result, without an option.
     assert (iio.imread("results/in.png") == iio.imread("out.png")).all()
     result = np.load("results/height.npy")
     assert result.dtype == np.float32
@@ -249,7 +249,7 @@ def test_apply_blends(here: Path) -> None:
     assert (
         main(["design", "in.png", "-q", *TINY, "--screening", "0", "-o", "plain.png", "--source-map", "plain.npz"]) == 0
     )
-    # The map of a result that was not blended can be, and the other way round.
+    # The map of a result without blending can be blended, and vice versa.
     for source, blend, same in (("s.npz", "0", "plain.png"), ("plain.npz", "0.15", "out.png")):
         assert main(["apply", source, "in.png", "-q", "--screening", blend, "-o", "again.png", "--force"]) == 0
         assert (iio.imread("again.png") == iio.imread(same)).all()

@@ -1,4 +1,4 @@
-"""How the command line meets people: help in groups, completion, Ctrl-C from the start, sizes that cannot be mistaken."""
+"""The interface of the command line: grouped help, completion, Ctrl-C from the start, unambiguous sizes."""
 
 import os
 import re

@@ -109,7 +109,7 @@ def test_hostile_arguments(here: Path, capsys: Capture, name: str) -> None:
     assert main([w for w in arguments if w or name in ("empty name", "size nothing")]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    # Some of these are found out by the work itself, after its first line of progress.
+    # The work itself finds some of these errors, after its first progress line.
     lines = [line for line in err.splitlines() if line != "texrs: segment"]
     assert len(lines) == 1, err
     assert lines[0].startswith("texrs: ")
@@ -136,7 +136,7 @@ def test_outputs_are_checked_before_the_work(
 ) -> None:
     Path("folder.png").mkdir()
     before = files(here)
-    replace_design(monkeypatch, None)  # Would be an internal error.
+    replace_design(monkeypatch, None)  # This would be an internal error.
     assert main(["design", "in.png", "-o", name]) == 2
     assert NAMES[name] in complaint(capsys)
     assert main(["design", "in.png", "-o", "out.jpg", "--size", "16x65501"]) == 2
@@ -147,7 +147,7 @@ def test_outputs_are_checked_before_the_work(
 
 
 class Panic(BaseException):
-    """What a panic of the compiled part looks like from here: no Exception."""
+    """A stand-in for a panic of the compiled part, which is not an Exception."""
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""No command writes over what it reads."""
+"""No command overwrites its inputs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def writes(parameter: Any) -> bool:
 
 
 def pairs() -> list[tuple[str, str, str]]:
-    """Return each command with each of its texts that may name a file that is read, and each of its outputs."""
+    """Return each command with each of its arguments that may name an input file, and each of its outputs."""
     found = []
     for command in COMMANDS:
         given = parameters(command)

@@ -1,4 +1,4 @@
-"""Materials on the command line: folders of maps in, folders of maps out, nothing lost."""
+"""Materials on the command line: folders of maps in and out, without loss."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ SIZE = ["--size", "64x64", "-q"]
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder with a material of two maps and one that names do not tell."""
+    """Work in a folder with a material of two maps and one with unclear names."""
     monkeypatch.chdir(tmp_path)
     image = samples.pebbles((48, 64)).image
     Path("rock").mkdir()
@@ -42,7 +42,7 @@ def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixtur
     for name, each in made.items():
         assert (io.read(f"new/rock_{name}.png") == each.pixels).all()
     assert (io.read("lit.png") == made.preview()).all()
-    # What was made of one map is what apply makes of it, without options.
+    # The result for one map equals that of apply, without options.
     assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
     assert (io.read("again.png") == made["height"].pixels).all()
     assert main(["rerun", "new/rock_height.png", "-q"]) == 0
@@ -101,7 +101,7 @@ def test_every_verb_of_pictures_is_tried() -> None:
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str], verb: str) -> None:
     io.write("hole.png", np.pad(np.full((8, 8), 255, np.uint8), 28))
-    # Elements, and sides as long as the verbs of photographs need them.
+    # Use separate elements, and sides as long as the verbs for photographs need.
     dots = samples.dots((64, 64)).image
     Path("rock/rock_wet.png").unlink()
     io.write("rock/rock_albedo.png", dots)
@@ -113,17 +113,17 @@ def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str
     assert (made["height"].pixels.shape) == texrs.SourceMap.load("map.npz").shape
     assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
     assert (io.read("again.png") == made["height"].pixels).all()
-    # How a file of a kind says what made it is the same for all verbs.
+    # The record of a file depends on its format, not on the verb.
     again = ("new", "lit.png", "it.glb", "map.npz") if verb == "tile" else ("new",)
     for each in again:
         assert main(["rerun", each, "-q"]) == 0
-    # A material is two files.
+    # A material has two files.
     assert capsys.readouterr().out.count("the same bytes") == len(again) + 1
 
 
 @pytest.mark.parametrize("verb", [*VERBS, "info", "analyse", "tiles"])
 def test_no_command_ignores_a_file_silently(here: Path, capsys: pytest.CaptureFixture[str], verb: str) -> None:
-    """Each reads the folder before it works, so that a strict run fails at once."""
+    """Each command reads the folder before it works, so a strict run fails at once."""
     io.write("hole.png", np.pad(np.full((8, 8), 255, np.uint8), 28))
     words = VERBS.get(verb, f"{verb} rock").split()
     out = {"info": [], "analyse": ["-o", "new.npz"]}.get(verb, ["-o", "new"])
@@ -133,7 +133,7 @@ def test_no_command_ignores_a_file_silently(here: Path, capsys: pytest.CaptureFi
 
 
 def test_a_layout_may_be_that_of_a_material(here: Path) -> None:
-    """Of the second only where things lie counts: the result is a picture, as the first is."""
+    """Only positions of the second input count. The result is an image, like the first input."""
     io.write("dots.png", samples.dots((64, 64)).image)
     io.write("rock/rock_albedo.png", samples.dots((64, 64), seed=5).image)
     io.write("rock/rock_height.png", samples.dots((64, 64), seed=5).image[..., 0])
@@ -288,7 +288,7 @@ def test_nothing_is_lost_and_nothing_half_written(
 
 
 def test_whatever_a_folder_does_not_give_is_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A file of another format, a file without a role, a subfolder: each with its reason, by info, the verb and the report."""
+    """Another format, a file without a role and a subfolder: info, the verb and the report give the reason for each."""
     Path("rock/rock_normal.tga_").write_bytes(b"1")
     Path("rock/licence.txt").write_text("CC0")
     Path("rock/.hidden.png").write_bytes(b"1")

@@ -1,4 +1,4 @@
-"""Messages and help texts speak the words of the command line: near names are suggested, and Python is not mentioned."""
+"""Messages and help texts use the words of the command line: similar names are suggested, and no Python names occur."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ CALLS = {
 }
 BAD = ("bogus", "-5", "missing.png", "1,2")
 COMMON = {*LIMITS, "count", "strict", "force", "quiet"}
-"""Options that all commands have; one command is asked for them."""
+"""Options that all commands have. They are tested on one command."""
 PYTHON = re.compile(
     r"\b[a-z]+_[a-z_]+\b|\bNone\b|\bTrue\b|\bFalse\b|\btexrs\.[a-z]|\bndarray\b|\barray_like\b|\brows?, columns?\b"
     r"|internal error"
@@ -58,12 +58,12 @@ PYTHON = re.compile(
 
 
 class Work(Exception):
-    """Something that takes long was begun."""
+    """Long work has begun."""
 
 
 @contextmanager
 def refuse_work(*, quiet: bool) -> Iterator[object]:
-    """Stand in for what shows progress."""
+    """Replace the display of progress by an exception."""
 
     def watch(stage: str, share: float) -> None:
         raise Work(stage)
@@ -112,7 +112,7 @@ def test_messages_name_options_and_never_python(
             said = capsys.readouterr().err.strip().splitlines()
             if code == 0 or not said or "Work:" in said[-1]:
                 continue
-            # Values are quoted as they were given, and names of samples and fields are words of their own.
+            # Quoted values are given by users, and names of samples and fields are their own words.
             plain = re.sub(r"'[^']*'|(?<=one of ).*|(?<=known are ).*", "", said[-1])
             if PYTHON.search(plain):
                 wrong.append((flag, value, said[-1]))
@@ -128,7 +128,7 @@ def test_help_texts_never_mention_python(command: str) -> None:
             text,
         )
         if re.search("WIDTHx|X,Y", parameter.metavar or ""):
-            # The form has the width or x first, so rows must not come first in the text.
+            # Sizes give the width or x first, so the text must not give rows first.
             assert not re.search(r"\brows?(,| and) columns?\b", text, re.IGNORECASE), (parameter.name, text)
 
 

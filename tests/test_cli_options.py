@@ -1,4 +1,4 @@
-"""The options of the commands are those of the functions that they stand for."""
+"""The options of commands equal the parameters of their functions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STANDING = {name: (verb.options,) for name, verb in VERBS.items()} | {
     "analyse": (_elements.PICTURED,),
     "apply": (_maps.APPLIED,),
 }
-"""Commands that stand for a function, and all of the options that they take from it."""
+"""Commands of functions, and all options that they take from them."""
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -39,7 +39,7 @@ def test_every_option_has_a_help_text(command: str) -> None:
         assert text, parameter.name
         assert text[0] == text[0].strip(), text
         assert text.endswith((".", ")")), text
-        # Words of the signature that a shell does not have.
+        # These words of signatures do not exist in a shell.
         assert not any(word in text for word in ("None", "`", "  ", "texrs.exemplar")), text
 
 
@@ -65,7 +65,7 @@ def test_defaults_are_those_of_the_functions(command: str) -> None:
             function = options.function if len(path) == 1 else options.groups[path[0]]
             theirs = inspect.signature(function).parameters[path[-1]].default
             if theirs is MISSING or path[-1] in options.optional:
-                # The command has its own, and asks the function for nothing.
+                # The command has its own default, and passes nothing to the function.
                 assert default is None
                 continue
             assert understood(option, default, options.axes) == theirs or alike(option, default, theirs), option.name
@@ -73,14 +73,14 @@ def test_defaults_are_those_of_the_functions(command: str) -> None:
 
 @pytest.mark.parametrize("command", NAMES)
 def test_wrap_has_one_default_in_all_verbs(command: str) -> None:
-    """It says itself what it means: textures that are laid out anew repeat, and what follows something does not."""
+    """Its help describes the default: newly composed textures are periodic, and others follow their input."""
     for each in (p for p in GROUP.get_command(None, command).params if p.name == "wrap"):
         assert each.default == "default"
         assert re.search(r"[Dd]efault: (both|neither|none of them|none)", each.help)
 
 
 def understood(option: Option, text: Any, axes: int) -> Any:
-    """Return what the text of a default means to the function."""
+    """Return the value that a default's text has for the function."""
     if option.kind is None or text is None or (text == "default" and text in option.kind.words):
         return None if text == "default" else text
     if text in option.kind.words:
@@ -89,7 +89,7 @@ def understood(option: Option, text: Any, axes: int) -> Any:
 
 
 def alike(option: Option, text: Any, theirs: Any) -> bool:
-    """Return whether the default of all axes, or a sequence, is meant."""
+    """Return whether two defaults agree, where one may be a sequence for all axes."""
     found = understood(option, text, 2)
     return tuple(found) == (tuple(theirs) if not isinstance(theirs, bool) else (theirs,) * len(found))
 
@@ -247,8 +247,9 @@ def test_a_word_means_the_same_in_every_command() -> None:
                 form = str(parameter.metavar).removeprefix("default|").removeprefix("PLANESx").removesuffix("|auto")
                 form = form.replace("xyz|...", "xy|x|y")
                 forms.setdefault(max(parameter.opts, key=len), set()).add(form)
-    # The output is a folder, an entry or an image; each command has its own algorithms; an image of a volume is a square; a
-    # photograph may show several planes; check reads the source map that other commands write.
+    # These options differ on purpose: outputs are folders, entries or images; commands have their own algorithms; an
+    # image of a volume is a square; a photograph may show several planes; check reads the source map that other
+    # commands write.
     several = {flag for flag, found in forms.items() if len(found) > 1}
     assert several == {"--out", "--method", "--size", "--slant", "--tilt", "--fov", "--source-map"}
     assert not {"--source", "--source-image", "--held", "--rim", "--children"} & set(forms)

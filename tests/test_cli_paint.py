@@ -41,7 +41,7 @@ def test_an_atlas_and_its_provenance(here: Path, capsys: pytest.CaptureFixture[s
     assert np.array_equal(np.asarray(shown.visual.material.baseColorTexture)[..., :3], made.maps["image"])
     assert main(["rerun", "a.glb", "-q"]) == 0
     assert "the same bytes" in capsys.readouterr().out
-    assert main([*words, "--padding", "2"]) == 0  # Its own file is replaced.
+    assert main([*words, "--padding", "2"]) == 0  # The command replaces its own file.
 
 
 def test_a_material_in_16_bit_along_an_axis_as_obj(here: Path) -> None:

@@ -65,7 +65,7 @@ def test_files_of_any_format(files: Path, name: str) -> None:
 def test_files_by_workers_and_after_a_stop(
     files: Path, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each chunk is made once, whoever makes it; what a stopped run has left is gone on with, by two processes."""
+    """Each chunk is computed once, by any worker. Two processes continue an interrupted run."""
     words = ["solid", f"{files}/stripes.tif", "-o", f"{files}/{name}", "--size", "24", "--chunks", "24x24x8"]
     texture, made = texrs.SolidTexture(STRIPES), []
     read = type(texture).__getitem__
@@ -84,7 +84,7 @@ def test_files_by_workers_and_after_a_stop(
     journal = files / f"{part.name}.json"
     assert journal.read_text().splitlines()[1:] == ["0", "1"]
     with journal.open("a") as file:
-        file.write("2")  # Cut off before its end: the chunk is made again.
+        file.write("2")  # The chunk is cut off, so it is computed again.
     capsys.readouterr()
     assert main([*words, "--workers", "2"]) == 0
     assert "3 chunks, of which 2 were there" in capsys.readouterr().err
@@ -95,7 +95,7 @@ def test_files_by_workers_and_after_a_stop(
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_workers_of_a_run_that_ends_end_too_and_the_store_is_gone_on_with(files: Path, number: int) -> None:
-    """Ctrl-C reaches all processes of a terminal; a run that is killed takes its workers along."""
+    """Ctrl-C reaches all processes of a terminal. A killed run ends its workers."""
     words = ["synthesize", f"{files}/weave.png", "--size", "130", "--chunks", "16", "--seed", "3", "-o"]
 
     def heed() -> None:
@@ -110,7 +110,7 @@ def test_workers_of_a_run_that_ends_end_too_and_the_store_is_gone_on_with(files:
         else:
             process.send_signal(number)
         assert process.stderr is not None
-        rest = process.stderr.read().decode()  # Ends when the last worker has.
+        rest = process.stderr.read().decode()  # The pipe ends with the last worker.
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     assert "Traceback" not in rest
     there = {p: p.stat().st_mtime_ns for p in files.glob("a.zarr/0/c/*/*/*") if p.name.isdigit()}

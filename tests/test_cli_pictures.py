@@ -1,4 +1,4 @@
-"""The commands that mend a picture, end to end: ``texrs tile`` and ``texrs inpaint``."""
+"""The commands that mend an image, end to end: ``texrs tile`` and ``texrs inpaint``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BEFORE = b""
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder that holds a picture, a hole in it, another picture and a result of earlier."""
+    """Work in a folder with an image, a hole in it, another image and an earlier result."""
     monkeypatch.chdir(tmp_path)
     iio.imwrite("in.png", COLOURS)
     iio.imwrite("hole.png", HOLE.astype(np.uint8) * 255)
@@ -198,7 +198,7 @@ def test_outputs_are_checked_before_the_work(
     for name, verb in (("texrs.tiling", "tile"), ("texrs.inpainting", "inpaint")):
         module = importlib.import_module(name)
 
-        # Would be an internal error.
+        # This would be an internal error.
         def fail(*arguments: object, **options: object) -> None:
             raise RuntimeError("the work has begun")
 

@@ -42,7 +42,7 @@ def test_a_bar_on_a_terminal(here: Path) -> None:
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=theirs, env=environment, check=True)
     os.close(theirs)
     shown = b""
-    # A terminal without a writer ends with an error on Linux and with nothing elsewhere.
+    # On Linux, reading a terminal without a writer ends with an error. Elsewhere it returns nothing.
     try:
         while part := os.read(mine, 4096):
             shown += part

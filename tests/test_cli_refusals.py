@@ -1,4 +1,4 @@
-"""What no command takes is refused before long work, in the words of its options."""
+"""Invalid arguments are refused before long work, in the words of the command line."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ FREE = {
     ("apply", "--band", "-5"),
     *((command, "--grow", "-5") for command in COMMANDS),
 }
-"""What is fine for once: names of folders, angles below 0, masks that shrink, and what another option must come with."""
+"""Valid values: names of folders, angles below 0, masks that shrink, and options that need another option."""
 
 
 class Work(Exception):
-    """Something that takes long was begun."""
+    """Long work has begun."""
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @contextmanager
 def refuse_work(*, quiet: bool) -> Iterator[object]:
-    """Stand in for what shows progress: raises where some is made."""
+    """Replace the display of progress by an exception."""
 
     def watch(stage: str, share: float) -> None:
         if share > 0:
@@ -101,7 +101,7 @@ def test_bad_options_are_refused_before_the_work(
                 continue
             code = main([verb, *mode, *COMMANDS[command].split(), "-o", out, flag, value])
             said = capsys.readouterr().err.strip().splitlines()
-            # One line that names the option, or the file that it names.
+            # There must be one line that names the option, or its file.
             if code != 2 or not said or not (flag in said[-1] or value in said[-1]):
                 late.append((flag, value, code, said))
     assert not late

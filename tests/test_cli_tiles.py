@@ -1,4 +1,4 @@
-"""Designs without an end on the command line: tile sets, and windows of them."""
+"""Unbounded designs on the command line: tile sets, and windows of them."""
 
 from pathlib import Path
 
@@ -32,10 +32,10 @@ def test_the_set_is_what_engines_read(here: Path, tiles: texrs.CornerTiles, caps
     assert np.array_equal(io.read("set/image.png"), tiles.atlas)
     assert io.read("set/index.png").shape == (8, 12)
     assert {p.name for p in Path("set").iterdir()} >= {"tiles.glsl", "tiles.gdshader"}
-    assert main(words) == 0  # Its own files are replaced,
+    assert main(words) == 0  # The command replaces its own files,
     assert main(["rerun", "set", "-q"]) == 0
     assert capsys.readouterr().out.count("the same bytes") == 4
-    Path("set/tiles.glsl").write_text("mine")  # others are not.
+    Path("set/tiles.glsl").write_text("mine")  # but not others.
     assert main(words) == 2
     assert "tiles.glsl was changed since" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""k-coherence against its slow twin, exactly; bad arguments; the cache of similarity sets."""
+"""k-coherence compared with its slow twin, exactly; bad arguments; the cache of similarity sets."""
 
 import numpy as np
 import pytest

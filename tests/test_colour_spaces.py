@@ -1,4 +1,4 @@
-"""Values keep their meaning in every depth and format: written, read again, and compared as light, shares and directions."""
+"""Values keep their meaning in every depth and format: written, read again, compared as light, shares and directions."""
 
 from pathlib import Path
 from typing import Any
@@ -43,10 +43,10 @@ CHANNELS = {
     "orm": (3,),
     "other": (1, 3),
 }
-"""Of roles; of the rest one."""
+"""Channels by role. Other roles have one."""
 ROLES = (*CHANNELS, "height", "roughness", "metallic", "occlusion", "opacity", "mask")
 FINE = {"uint8": 1 / 255, "uint16": 1 / 65535, "float16": 1e-3, "float32": 1e-6, "float64": 1e-6}
-"""The largest step between values, as stored."""
+"""Largest step between stored values."""
 COLOURED, DIRECTED = ("colour", "emission"), ("normal", "normal-dx", "vector")
 
 
@@ -59,7 +59,7 @@ def to_linear(shown: NDArray[Any]) -> NDArray[Any]:
 
 
 def encode(role: str, channels: int, dtype: str, *, signed: bool = False) -> NDArray[Any]:
-    """Return what a file of a dtype holds if it means the truth."""
+    """Return the file contents of a dtype that represent the truth."""
     values = (VECTORS + 1) / 2 if role in DIRECTED else TRUTH[..., :channels].copy()
     if dtype.startswith("f"):
         return (VECTORS if signed else values[..., 0] if channels == 1 else values).astype(dtype)
@@ -70,7 +70,7 @@ def encode(role: str, channels: int, dtype: str, *, signed: bool = False) -> NDA
 
 
 def decode(role: str, pixels: NDArray[Any]) -> NDArray[Any]:
-    """Return what the values of a file mean."""
+    """Return the meaning of a file's values."""
     if pixels.dtype.kind == "f":
         values = pixels.astype(float)
         return (values + 1) / 2 if role in DIRECTED and values.min() < 0 else values
@@ -96,11 +96,11 @@ def test_every_role_keeps_its_meaning(role: str, channels: int, dtype: str, tmp_
         stored = str(back.pixels.dtype)
         if depth is not None:
             assert back.depth == depth
-        # A step of sRGB is up to 2.3 as much light.
+        # A step of sRGB is a step of light up to 2.3 times as large.
         step = 2.3 * max(FINE[dtype], FINE[stored])
         assert np.abs(decode(role, back.pixels) - truth).max() < step, (suffix, depth, stored)
         if stored == dtype:
-            # Colours of floats are multiplied by alpha in EXR files, and divided by it again.
+            # In EXR files, colours of floats are multiplied by alpha, and divided again on reading.
             bound = (
                 suffix in (None, ".exr") and role in COLOURED and channels in (2, 4) and dtype in ("float16", "float32")
             )
@@ -127,7 +127,7 @@ def test_other_formats_of_colours(dtype: str, suffix: str, depth: Any, tmp_path:
     flat = np.ascontiguousarray(np.broadcast_to(encode("colour", 3, dtype)[:1, :1], (16, 16, 3)))
     Material({"albedo": flat}).save(tmp_path, suffix=suffix, depth=depth)
     back = decode("colour", Material.read(tmp_path)["albedo"].pixels)
-    # A file of .hdr has eight bits below the largest channel; one of .jpg has less.
+    # A file of .hdr has eight bits below the largest channel, and .jpg has fewer.
     assert np.abs(back - TRUTH[0, 0, :3]).max() < 0.02
 
 
@@ -151,7 +151,7 @@ def test_the_numbers_that_people_meet(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_spaces_that_were_stated_hold_on_the_way_out(dtype: str, tmp_path: Path) -> None:
-    """Linear integers and sRGB floats are written as a reader without knowledge of them expects."""
+    """Linear integers and sRGB floats are written as readers without this information expect them."""
     whole = dtype.startswith("u")
     values = TRUTH[..., :3] if whole else to_srgb(TRUTH[..., :3])
     given = np.rint(values * np.iinfo(dtype).max).astype(dtype) if whole else values.astype(dtype)
@@ -159,7 +159,7 @@ def test_spaces_that_were_stated_hold_on_the_way_out(dtype: str, tmp_path: Path)
     for depth in (None, 8, 16, 32):
         material.save(tmp_path / str(depth), depth=depth)  # type: ignore[arg-type]
         back = Material.read(tmp_path / str(depth))["albedo"].pixels
-        # Half of a linear step near black is many steps of sRGB, but little light.
+        # Half a linear step near black is many steps of sRGB, but little light.
         assert np.abs(decode("colour", back) - TRUTH[..., :3]).max() < 2.3 * max(FINE[dtype], FINE[str(back.dtype)])
 
 
@@ -180,7 +180,7 @@ def test_values_that_integers_cannot_hold_are_reported(tmp_path: Path) -> None:
     assert (io.read(tmp_path / "albedo.png") == 255).all()
     bright.save(tmp_path, depth=32)
     assert (io.read(tmp_path / "albedo.exr") == 2).all()
-    # Doubles are not brought to 0 to 1.
+    # Doubles are not scaled to 0 to 1.
     Material({"height": np.array([[-2.0, 3.0]])}).save(tmp_path, depth=32)
     assert io.read(tmp_path / "height.exr").tolist() == [[-2, 3]]
 
@@ -188,7 +188,7 @@ def test_values_that_integers_cannot_hold_are_reported(tmp_path: Path) -> None:
 @pytest.mark.parametrize("width", [2, 4, 5])
 @pytest.mark.parametrize("channels", [(), (3,), (4,)])
 def test_volumes_are_converted_too(width: int, channels: tuple[int, ...], tmp_path: Path) -> None:
-    """The last columns of a volume of one channel are not its transparency."""
+    """The last columns of a one-channel volume are not its transparency."""
     light = RNG.uniform(0, 1, (6, 3, width, *channels)).astype(np.float32)
     Material({"albedo": light}, axes=3).save(tmp_path, depth=8)
     back = io.read_volume(tmp_path / "albedo.tif") / 255

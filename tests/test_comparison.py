@@ -1,4 +1,4 @@
-"""The comparison of methods: one page that holds all it shows, the same bytes each time."""
+"""The comparison of methods: one page with all its contents, the same bytes each time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ else:
 
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
-    """Return a program that copies what it is to fill, and refuses all else."""
+    """Return a program that copies the image to fill, and refuses all other input."""
     path = tmp_path / "program"
     path.write_text(PROGRAM.format(python=sys.executable))
     path.chmod(0o755)
@@ -53,14 +53,14 @@ def test_the_command_writes_one_whole_page(
             assert (attributes.get(name) or "#").startswith(("data:", "#")), (tag, name)
         assert tag != "img" or attributes["alt"]
     assert "prefers-color-scheme: dark" in text
-    # Whatever is not here is listed, with how to get it.
+    # Missing programs are listed, with installation hints.
     for method in METHODS:
         assert method.name in text
 
 
 def test_what_is_installed_takes_part(monkeypatch: pytest.MonkeyPatch, program: Path) -> None:
     def fill(picture: np.ndarray, hole: np.ndarray, radius: int, flag: int) -> np.ndarray:
-        # What was in the hole is shown to none.
+        # No method sees the contents of the hole.
         assert (picture[hole > 0] == 128).all()
         return picture
 
@@ -71,7 +71,7 @@ def test_what_is_installed_takes_part(monkeypatch: pytest.MonkeyPatch, program: 
     made = {r.method: r for r in found.results}
     assert made["OpenCV Telea"].figures["error"] > made["scikit-image biharmonic"].figures["error"]
     assert made["Resynthesizer"].image is not None
-    # Others may fail, and the page says so.
+    # Other programs may fail, and the page reports it.
     assert made["Embark texture-synthesis"].failure == "no texture today"
     assert "failed: no texture today" in found.page()
     assert "OpenCV shift maps" in {each.method for each in found.missing}

@@ -1,4 +1,4 @@
-"""Conventions of tools: names and packings in, through a verb, and out again, channel by channel; normals without z."""
+"""Conventions of tools: names and packings are read, processed and written, by channel; normals without z."""
 
 import os
 import re
@@ -44,7 +44,7 @@ def encode(values: Array, top: int = 255) -> Array:
 
 @cache
 def draw_channel(word: str) -> Array:
-    """Return a channel of a packed map; each quantity is another picture."""
+    """Return a channel of a packed map. Each quantity has its own image."""
     if word in ("x", "y", "-y", "z"):
         return encode(draw_normals(down=word == "-y"))[..., "xyz".index(word[-1])]
     if word == "height":
@@ -56,7 +56,7 @@ def draw_channel(word: str) -> Array:
 
 
 def draw_file(file: File) -> Array:
-    """Return the picture of a file of a convention."""
+    """Return the image of a file of a convention."""
     if file.role.layout:
         return np.stack([draw_channel(word) for word in file.role.layout], axis=-1)
     if file.role is Role.COLOUR and file.opacity:
@@ -65,7 +65,7 @@ def draw_file(file: File) -> Array:
 
 
 def write_stack(folder: Path, key: str) -> dict[str, Array]:
-    """Write a stack of a convention, and return its pictures by name."""
+    """Write a stack of a convention, and return its images by name."""
     folder.mkdir()
     convention = CONVENTIONS[key]
     pictures = {f"{convention.start}Stone02_1K{file.end}": draw_file(file) for file in convention.files}
@@ -75,7 +75,7 @@ def write_stack(folder: Path, key: str) -> dict[str, Array]:
 
 
 def look_up(source: SourceMap, picture: Array, role: Role) -> Array:
-    """Return a picture taken through a source map, channel by channel: vectors turn, codes are never mixed."""
+    """Look an image up by channel through a source map: vectors are rotated, and codes are not mixed."""
     stack = picture[..., np.newaxis] if picture.ndim == 2 else picture
     row, column = np.moveaxis(np.floor(source.coordinates + np.float32(0.5)).astype(int).clip(0, 63), -1, 0)
     made = np.stack(
@@ -94,7 +94,7 @@ def look_up(source: SourceMap, picture: Array, role: Role) -> Array:
         side = 1 if role.down else -1
         x, y = vectors[..., 0], side * vectors[..., 1]
         frames = source.jacobians().astype(float)
-        # The slope of a surface that is seen through the map, by the chain rule.
+        # The chain rule gives the slope of a surface seen through the map.
         turned = np.stack(
             [
                 frames[..., 0, 1] * y + frames[..., 1, 1] * x,
@@ -126,7 +126,7 @@ def test_a_stack_of_each_convention_comes_back_in_register(key: str, tmp_path: P
         assert sorted(f.stem for f in files) == sorted(pictures)
         for file in files:
             expected = look_up(result.source_map, pictures[file.stem], roles[file.stem])
-            # Rounding of halves may differ in the last bit of a turned vector.
+            # The last bit of a rotated vector may differ, because halves are rounded.
             assert np.abs(io.read(file).astype(int) - expected).max() <= (1 if roles[file.stem].normal else 0), (
                 file.stem
             )
@@ -193,7 +193,7 @@ def test_all_conventions_are_written_from_single_maps(key: str, tmp_path: Path) 
                 assert (channels[..., k] == words[word]).all(), (stem, word)
         seen |= set(file.role.quantities)
     assert {"normal", "opacity", "occlusion"} <= seen
-    # Nothing is lost on the way back either.
+    # Reading it again loses nothing either.
     again = Material.read(tmp_path / "out")
     again.save(tmp_path / "back", convention="ambientcg")
     for stem in ("Color", "Roughness", "Metalness", "AmbientOcclusion", "Displacement"):
@@ -349,7 +349,7 @@ def test_normals_turn_by_x_and_y_and_the_rest_stays(held: str, dtype: str) -> No
     for channel in range(2 if bare else 3, picture.shape[-1]):
         plain = result.source_map.render(np.ascontiguousarray(stored[..., channel]))
         assert (made[..., channel] == plain).all()
-    # The same by the functions for arrays.
+    # The functions for arrays give the same.
     again = texrs.apply(result.source_map, stored, map_type="normal", green="down")
     assert (again[..., :2] == made[..., :2]).all()
     assert (result.source_map.render(stored, map_type="normal", green="down") == again).all()
@@ -514,7 +514,7 @@ def test_what_is_shown_of_packed_maps_is_what_is_shown_of_plain_ones(tmp_path: P
     difference = np.abs(plain.preview().astype(int) - packed.preview())
     assert difference.mean() < 0.5
     assert difference.max() <= 8
-    # What is decided on is the same, too.
+    # The features for decisions are also the same.
     for one, other in zip(plain.features()[1:2], packed.features()[1:2], strict=True):
         assert (one == other).all()
 
@@ -596,12 +596,12 @@ def test_layers_keep_packed_maps(tmp_path: Path) -> None:
     for name, each in material.items():
         assert again[name].role is each.role
         assert (again[name].pixels == each.pixels).all()
-    # No other program takes the occlusion for a z.
+    # No other program mistakes the occlusion for z.
     assert {c for c in read_layers(tmp_path / "stack.exr")[0] if "_n." in c} == {f"1K_n.{k}" for k in range(4)}
 
 
 def test_the_labpbr_example_of_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """B was overwritten by a z that nobody stored."""
+    """A z that was not stored overwrote B."""
     monkeypatch.chdir(tmp_path)
     Path("in").mkdir()
     io.write("in/stone_albedo.png", DOTS.image)

@@ -1,4 +1,4 @@
-"""Designs without an end: corner tiles."""
+"""Unbounded designs: corner tiles."""
 
 import pickle
 from pathlib import Path
@@ -52,13 +52,13 @@ def test_windows_agree_wherever_they_are(tiles: texrs.CornerTiles) -> None:
 
 
 def _measure_steps(image: np.ndarray, axis: int, side: int) -> np.ndarray:
-    """Return by how much neighbours differ on the mean, by their place in a tile: the last are those across its end."""
+    """Return the mean difference of neighbours by position in a tile. The last ones are across its end."""
     steps = np.abs(np.diff(image, axis=axis, append=image.take([0], axis))).mean(axis=(1 - axis, 2))
     return np.asarray(steps[:-side].reshape(-1, side).mean(axis=0))
 
 
 def test_tiles_agree_along_their_edges(tiles: texrs.CornerTiles) -> None:
-    """A strip lies on both sides of an edge, so that nothing is seen there."""
+    """A strip is on both sides of an edge, so the edge is invisible."""
     side = tiles.tile_size
     image = tiles[0 : 12 * side, 0 : 12 * side].astype(float)
     cells = image.reshape(12, side, 12, side, 3)
@@ -66,7 +66,7 @@ def test_tiles_agree_along_their_edges(tiles: texrs.CornerTiles) -> None:
     loose = mixed.reshape(12, 12, side, side, 3).transpose(0, 2, 1, 3, 4).reshape(image.shape)
     for axis in (0, 1):
         found, apart = (_measure_steps(each, axis, side) for each in (image, loose))
-        # Other tiles beside each other differ there more than anywhere else.
+        # If other tiles are neighbours, the difference is the largest at their edge.
         assert apart[-1] == apart.max()
         assert found[-1] < min(1.5 * found.mean(), 0.7 * apart[-1])
     assert tiles.source_map.shape == tiles.atlas.shape[:2] == (9 * side, 9 * side)
@@ -75,7 +75,7 @@ def test_tiles_agree_along_their_edges(tiles: texrs.CornerTiles) -> None:
 def test_the_source_map_shows_the_window(tiles: texrs.CornerTiles) -> None:
     made = tiles.window((FAR + 5, -77), (90, 130))
     shown = made.source_map.render(DOTS).astype(int)
-    # But for colours that the design blended.
+    # The rest are colours that the design blended.
     assert np.median(np.abs(shown - made.image)) <= 3
     assert made.source_map.shape == (90, 130)
     assert made.report["origin"] == [FAR + 5, -77]
@@ -126,7 +126,7 @@ def test_dask_and_zarr(stones: texrs.CornerTiles, tmp_path: Path) -> None:
 
 
 def test_engines_read_what_is_saved(stones: texrs.CornerTiles, tmp_path: Path) -> None:
-    """What the shader does, in NumPy: the same pixels as a window; and the index goes around."""
+    """NumPy repeats the work of the shader: the same pixels as a window, and the index wraps."""
     files = stones.save(tmp_path, (8, 12))
     assert [f.name for f in files] == [
         "albedo.png",
@@ -147,7 +147,7 @@ def test_engines_read_what_is_saved(stones: texrs.CornerTiles, tmp_path: Path) -
             for row in index
         ]
     )
-    # The last row and column go on to the first, where the world would go on otherwise.
+    # The last row and column of the index continue at the first, although the plane continues otherwise.
     assert np.array_equal(shown[: 7 * side, : 11 * side], stones[0 : 7 * side, 0 : 11 * side])
     assert "textureGrad(atlas" in (tmp_path / "tiles.glsl").read_text()
     assert "shader_type spatial" in (tmp_path / "tiles.gdshader").read_text()
@@ -170,7 +170,7 @@ def test_wrong_arguments(tiles: texrs.CornerTiles) -> None:
 
 
 def test_what_repeats_does_so_in_whole_periods() -> None:
-    """Each tile lies as those beside it do, though no two show the same."""
+    """Each tile is in phase with its neighbours, though no two show the same."""
     tiles = texrs.CornerTiles(samples.weave((96, 96)).image, seed=1, variants=2)
     light = tiles[0 : 4 * tiles.tile_size, 0 : 4 * tiles.tile_size].mean(axis=-1)
     for axis in (0, 1):
@@ -184,7 +184,7 @@ def test_phases_of_pictures_are_found() -> None:
     wall = np.tile(image, (4, 3, 1))
     lattice = Lattice((12, 0), (0, 16), 1.0)
     step = find_step([wall, np.roll(wall, (5, 7), (0, 1))], lattice, 24)
-    assert step is None  # A tile holds one period and a half.
+    assert step is None  # A tile contains 1.5 periods.
     step = find_step([wall, np.roll(wall, (5, 7), (0, 1)), -wall], lattice, 48)
     assert step is not None
     assert step.shifts.tolist() == [[row, column] for row in range(0, 48, 12) for column in range(0, 48, 16)]

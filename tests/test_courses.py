@@ -1,4 +1,4 @@
-"""Walls of courses: found where they are, whatever their heights, and laid so that all joints go through."""
+"""Walls of courses: found for any heights, and composed so that all joints are continuous."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ JOINT = np.array([0.75, 0.73, 0.68])
 def lay_wall(
     shape: tuple[int, int] = (192, 224), heights: tuple[int, int] = (24, 24), *, turn: float = 0.0, seed: int = 0
 ) -> NDArray[np.uint8]:
-    """Draw a wall of level courses of such heights, of stones of all lengths, and turn it by so many degrees."""
+    """Draw a wall of level courses of given heights, with stones of all lengths, rotated by some degrees."""
     rng = np.random.default_rng(seed)
     rows, columns = (round(1.4 * n) for n in shape)
     picture = np.full((rows, columns, 3), JOINT)
@@ -43,9 +43,9 @@ def lay_wall(
 
 
 def measure_joints(image: NDArray[Any]) -> tuple[float, int]:
-    """Return how unbroken the joints of a level wall are, and how many there are.
+    """Return the continuity of the joints of a level wall, and their number.
 
-    Where a row is mostly joint, this is the share of it that is; stones on half of it would give a half.
+    The continuity of a row is the share of joint pixels in it. Stones on half of it give 0.5.
     """
     bright = gaussian_filter(image.astype(float), (0.5, 0.5, 0)).mean(axis=-1) > 150
     share = bright.mean(axis=1)
@@ -71,7 +71,7 @@ def test_courses_are_found_whatever_their_heights(heights: tuple[int, int], seed
     assert found is not None
     assert (found.axis, found.slope) == (0, 0.0)
     bright = wall.mean(axis=(1, 2))
-    # A joint is three rows that are brighter than those of stones.
+    # A joint has three rows that are brighter than stones.
     assert all(bright[round(j)] > np.median(bright) + 20 for j in found.joints)
     assert heights[0] - 1.5 <= found.heights.min()
     assert found.heights.max() <= heights[1] + 1.5
@@ -123,7 +123,7 @@ def test_joints_go_through_the_whole_texture(heights: tuple[int, int], wrap: boo
     assert unbroken > own - 0.03
     assert count >= 0.8 * 300 / heights[1]
     if wrap:
-        # So many whole courses go around.
+        # The wrap contains whole courses.
         rolled, there = measure_joints(np.roll(made.image, 150, axis=0))
         assert there == count
         assert rolled == pytest.approx(unbroken, abs=0.01)
@@ -142,7 +142,7 @@ def test_the_map_of_a_turned_wall_leads_back_to_it() -> None:
     made = texrs.design(wall, 256, seed=3, screening=None)
     np.testing.assert_array_equal(made.source_map.render(wall), made.image)
     frames = made.source_map.jacobians()
-    # What is level in the texture climbs in the photograph.
+    # Level lines in the texture climb in the photograph.
     climbs = np.degrees(np.arctan2(frames[..., 0, 1], frames[..., 1, 1] * np.sign(frames[..., 1, 1])))
     assert np.abs(np.abs(climbs) - 5).max() < 1.5
 
@@ -151,7 +151,7 @@ def test_sheets_of_a_texture_differ() -> None:
     wall = lay_wall(seed=8)
     one, two = (texrs.design(wall, 256, seed=seed).image for seed in (1, 2))
     assert (one != two).mean() > 0.5
-    # Below each other lie stones of other courses.
+    # Stones of other courses follow below each other.
     assert texrs.design(wall, 256, seed=1, copies=1).image.shape == one.shape
 
 

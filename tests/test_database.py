@@ -1,4 +1,4 @@
-"""The database of textures: kept, remade when damaged or out of date, written by two processes, spliced by a stub."""
+"""The database of textures: stored, remade when damaged or outdated, written by two processes, spliced by a stub."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_files_stay_where_they_are(tmp_path: Path, textures: TextureDatabase, sa
     assert textures.list()[0].image == str(file)
     assert not said
     iio.imwrite(file, DOTS.image[::-1])
-    with pytest.raises(InvalidInput, match="contradicts|mask"):  # The mask of the old picture is not that of this one.
+    with pytest.raises(InvalidInput, match="contradicts|mask"):  # The mask of the old image does not fit this one.
         textures.add(file, "buttons", replace=True, mask=~DOTS.mask, layout="disjoint")
     changed = textures["buttons"]
     assert said == ["buttons: analysed again, because the entry is of another image"]
@@ -176,12 +176,12 @@ def test_two_processes_may_write_at_once(tmp_path: Path) -> None:
 
 
 def meet(barrier: Any) -> None:
-    """Keep the barrier of a process, at which it waits for the others."""
+    """Store the barrier of a process, where it waits for the others."""
     globals()["_BARRIER"] = barrier
 
 
 def add_one(folder: str, number: int, replace: bool) -> str:
-    """Add a picture at the same time as the other processes; return what was said."""
+    """Add an image at the same time as the other processes. Return the messages."""
     globals()["_BARRIER"].wait(120)
     try:
         TextureDatabase(folder).add(
@@ -205,7 +205,7 @@ def test_one_name_given_by_several_processes_at_once(tmp_path: Path, said: list[
         assert sum("name: one exists already, with another image" in answer for answer in answers) == count - 1
         winner = answers.index("ok")
         assert (textures["one"].image == np.roll(DOTS.image, winner, axis=-1) // (winner + 1)).all()
-    # The manifest, the entry and the pixels are of one picture.
+    # The manifest, the entry and the pixels are of one image.
     assert (np.load(tmp_path / "db" / "one.npy") == textures["one"].image).all()
     assert textures.list()[0].hash == texrs.elements.hash_image(textures["one"].image)
     assert not said

@@ -1,4 +1,4 @@
-"""The demo: one page that holds all it shows."""
+"""The demo: one page with all its contents."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from texrs.demo._workshop import Texture, Workshop
 
 
 class Page(HTMLParser):
-    """Collects what a page refers to, and checks that its elements are closed."""
+    """A parser that collects the references of a page, and checks that its elements are closed."""
 
     VOID = ("meta", "img", "br", "link", "hr", "input")
 
@@ -38,7 +38,7 @@ class Page(HTMLParser):
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the demo make small textures, and each volume and picture at the least size."""
+    """Make the demo use small textures, and the minimum size of each volume and image."""
     designed: Callable[..., Texture] = Workshop.design
     monkeypatch.setattr(Workshop, "design", lambda self, name, *sizes, **o: designed(self, name, 64, 64, copies=1, **o))
     monkeypatch.setattr("texrs.demo._pictures.SIDE", 64)

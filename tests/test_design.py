@@ -1,4 +1,4 @@
-"""DESIGN, end to end: honest stages, exact look-up, the same bytes for any number of threads."""
+"""DESIGN, end to end: true stages, exact lookup, the same bytes for any number of threads."""
 
 import inspect
 import os
@@ -40,7 +40,7 @@ def test_size_dtype_and_content(pebbles, result):
     assert result.image.shape == (160, 224, 3)
     assert result.image.dtype == np.uint8
     assert result.source_map.shape == (160, 224)
-    # Every colour comes from the exemplar: where coordinates are whole, exactly that sample.
+    # Every colour is from the exemplar. At integer coordinates it is exactly that sample.
     whole = (result.source_map.coordinates == np.rint(result.source_map.coordinates)).all(axis=-1)
     at = result.source_map.coordinates[whole].astype(int)
     np.testing.assert_array_equal(result.stages["before_blending"][whole], pebbles[at[:, 0], at[:, 1]])
@@ -50,7 +50,7 @@ def test_size_dtype_and_content(pebbles, result):
 def test_stages_are_pictures_in_order(result):
     assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "before_blending"]
     assert result.stages["holes"].dtype == bool
-    # What lies apart leaves a hole where it was.
+    # A separate element leaves a hole where it was.
     apart = texrs.design(samples.dots((96, 96)).image, 96, copies=1).stages
     assert (apart["completed"][apart["holes"]] != apart["deformed"][apart["holes"]]).any()
 
@@ -98,7 +98,7 @@ def test_without_wrap_opposite_edges_are_free(pebbles):
 
 def test_elements_really_move(pebbles, result):
     moved = [entry for entry in result.report["operations"][0][1:] if entry["operations"]]
-    # Stones in a heap: most stay, or there would be nothing to lie on.
+    # In a heap most stones stay, because others need them as background.
     assert len(moved) >= 0.25 * result.report["elements"]
     other = texrs.design(pebbles, (160, 224), seed=6)
     assert (other.image != result.image).mean() > 0.5
@@ -135,7 +135,7 @@ def test_the_segmentation_is_shown_in_colours_on_the_exemplar(pebbles, channels)
     assert (shown[outline] == 255).all()
     ground = (truth == 0) & ~outline
     np.testing.assert_array_equal(shown[ground], np.broadcast_to(pebbles[..., channels], shown.shape)[ground])
-    # The colour of an element is that of no other, whatever the stone looks like.
+    # The colour of an element is independent of the stone's appearance.
     tints = [(shown - 0.45 * pebbles[..., channels])[(truth == k) & ~outline] for k in range(1, truth.max() + 1)]
     assert max(t.std(axis=0).max() for t in tints if len(t)) < 1
     assert len({tuple(np.rint(t.mean(axis=0) / 4)) for t in tints if len(t)}) > 0.9 * len(tints)
@@ -391,7 +391,7 @@ def test_options_are_frozen_and_keyword_only():
 
 @pytest.mark.parametrize("verb", [texrs.design, texrs.design_variants, texrs.inpaint, texrs.tile, texrs.blend])
 def test_a_type_checker_knows_every_option(verb):
-    """Overloads or ``**options`` would let a misspelt one pass."""
+    """Overloads or ``**options`` would accept misspelt options."""
     assert not get_overloads(verb)
     parameters = inspect.signature(verb).parameters.values()
     assert all(p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD) for p in parameters)
@@ -427,7 +427,7 @@ def test_variants_are_those_of_their_seeds(pebbles):
 
 
 def test_an_exemplar_is_analysed_once(pebbles, monkeypatch):
-    """What is known of it stays with it, and is kept for arrays of the same content."""
+    """Facts are stored with an exemplar, and cached for arrays of the same content."""
     from texrs.exemplar import _exemplar
 
     calls = []

@@ -1,6 +1,6 @@
-"""DESIGN against its acceptance checks, on generated exemplars and photographs, and each check against what must fail.
+"""DESIGN and its acceptance checks, on generated exemplars and photographs, and each check on failures.
 
-The measuring is in `design_checks`, which shares no code with the pipeline.
+`design_checks` has the measures. It shares no code with the pipeline.
 """
 
 from dataclasses import replace
@@ -24,12 +24,12 @@ CROPS = {
     "gravel": (slice(0, 192), slice(0, 192)),
     "grass": (slice(0, 192), slice(0, 192)),
     "brick": (slice(0, 192), slice(0, 192)),
-    # The wood of the table: the cup is no texture.
+    # Use the wood of the table, because the cup is not a texture.
     "coffee": (slice(40, 168), slice(484, 600)),
 }
 NAMES = (*GENERATED, *CROPS)
 REGULAR = 0.4
-"""Least share of an exemplar on a lattice that is used: patches are taken in step alone, so that courses go on."""
+"""Minimum used share of an exemplar on a lattice. Patches are only taken in phase, so that courses continue."""
 
 
 @cache
@@ -81,7 +81,7 @@ def measure(check, name, seed):
 
 CHECKS = ("d1", "d2", "d2b", "d3", "d3b", "d4", "d6", "d7", "d8", "d12", "d13")
 UNCOUNTED = ("grass", "coffee")
-"""Textures without separate elements, or with fewer than a census takes."""
+"""Textures without separate elements, or with fewer than a census needs."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -101,7 +101,7 @@ def test_seeds_differ_from_each_other_and_from_the_exemplar(name):
 
 
 def test_seams_of_brickwork_run_through_bricks_and_not_along_joints():
-    """Joints go on across every seam, so that a seam which keeps to them shows: 1.5 times the usual gradient and more."""
+    """Joints continue across every seam, so seams along joints are visible: 1.5 times the usual gradient and more."""
     for seed in SEEDS:
         result = made("brick", seed)
         assert "lattice" in result.report["reason"]
@@ -161,13 +161,13 @@ def test_d11_threads_and_starts():
 
 
 def cycle(image, rows, columns):
-    """Repeat an image as far as it is needed: at once a map of where its pixels come from."""
+    """Repeat an image as far as needed, as a source map of its pixels."""
     grid = np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"), axis=-1)
     return grid % np.array(image.shape[:2])
 
 
 def a_map(image, places, label=None):
-    """Make a source map, and the picture that it looks up."""
+    """Return a source map, and its image."""
     shape = places.shape[:2]
     source = SourceMap(
         places.astype(np.float32),
@@ -180,7 +180,7 @@ def a_map(image, places, label=None):
 
 
 def a_collage(image, side=24, seed=0):
-    """Lay squares from anywhere side by side, without a cut."""
+    """Put random squares side by side, without a cut."""
     rng = np.random.default_rng(seed)
     places = np.zeros((*SIZE, 2), np.int64)
     inner = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1)
@@ -197,7 +197,7 @@ def blurred(image):
 
 
 def noise_like(image, size=SIZE, seed=0):
-    """Draw pixels of the image at random: its histogram, and nothing else of it."""
+    """Draw pixels of the image at random: only its histogram stays."""
     flat = image.reshape(-1, image.shape[-1])
     return flat[np.random.default_rng(seed).integers(0, len(flat), size)]
 
@@ -228,7 +228,7 @@ def collage(pebbles):
 
 
 class Result:
-    """What `checks.d1` looks at."""
+    """The attributes that `checks.d1` reads."""
 
     def __init__(self, image, source, holes):
         self.image, self.source_map, self.report = image, source, {"holes": holes}
@@ -252,7 +252,7 @@ def test_d2_fails_for_a_hard_cut_collage(pebbles, collage):
     source, image = collage
     found = checks.d2(pebbles, image, source)
     assert not found.passed, found
-    # One row or column in 24, both sides of it: what a grid of squares has.
+    # A grid of squares has seams at one row or column in 24, on both sides of it.
     assert found.seams == pytest.approx(1 / 24, abs=0.005)
 
 
@@ -286,7 +286,7 @@ def test_d3_fails_for_an_image_that_is_not_cyclic(pebbles):
         assert not checks.d3(tilted, only).passed
         assert checks.d3(tilted, (axis == 1, axis == 0)).passed
     assert checks.d3(pebbles, (False, False)).passed
-    # The exemplar itself does not wrap.
+    # The exemplar itself is not periodic.
     assert not checks.d3(pebbles).passed
 
 
@@ -323,7 +323,7 @@ def test_d4_leaves_a_patch_itself_out():
     at = checks.corners(image.shape, 20, 0)
     assert checks.nearest_patches(image, at, image).max() < 1e-3
     assert checks.nearest_patches(image, at, image, own=8).min() > 0.1
-    # A slow twin.
+    # Compare with a slow twin.
     row, column = at[0]
     patch = image[row : row + 9, column : column + 9]
     apart = [
@@ -341,7 +341,7 @@ def test_d5_fails_for_copies_mirrored_or_moved(pebbles, shift, rows, columns):
     tile = np.roll(pebbles[::rows, ::columns], shift, (0, 1))
     image = np.tile(tile, (2, 2, 1))
     assert not checks.d5(pebbles, [image]).passed
-    # And for one copy in an otherwise good texture.
+    # The same holds for one copy in an otherwise good texture.
     good = made("pebbles", 0).image.copy()
     good[:128, 128:] = tile
     assert not checks.d5(pebbles, [good]).passed
@@ -393,23 +393,23 @@ def test_d8_fails_for_elements_lost_and_for_elements_shrunk(known_labels):
     labels = dots.labels if known_labels else None
     identity, image = a_map(dots.image, cycle(dots.image, 160, 160))
     assert checks.d8(dots.image, image, identity, labels).passed
-    # Half of them painted over by a place without one.
+    # Paint over half of the elements with a place without one.
     row, column = np.argwhere(ndimage.minimum_filter(dots.labels == 0, 5))[0]
     where = cycle(dots.image, 160, 160).copy()
     lost = ndimage.binary_dilation((dots.labels % 2 == 1), iterations=3)
     where[lost] = (row, column)
     source, image = a_map(dots.image, where)
     assert not checks.d8(dots.image, image, source, labels).passed
-    # The whole picture at half the size, four times.
+    # Use the whole image at half the size, four times.
     source, image = a_map(dots.image, (cycle(dots.image, 160, 160) * 2) % 160)
     assert not checks.d8(dots.image, image, source, labels).passed
 
 
 def test_d8_counts_on_a_lattice_what_the_eye_counts():
-    """Halves of two threads that meet are one thread; half of the picture without threads fails all the same."""
+    """Two halves of threads that meet are one thread. An image whose half has no threads still fails."""
     weave = samples.load("weave", size=(160, 160), seed=3)
     lattice = {"segmentation": "components", "reason": "a lattice", "elements": 50}
-    # Every other thread is cut in two: its right half is that of its neighbour two threads away.
+    # Every other thread is cut in two: its right half belongs to the neighbour two threads away.
     where = cycle(weave.image, 160, 160).copy()
     middles = {k: np.argwhere(weave.labels == k).mean(axis=0) for k in np.unique(weave.labels)}
     halves = [(weave.labels == k) & (where[..., 1] > middles[k][1]) for k in middles if k % 2]
@@ -425,7 +425,7 @@ def test_d8_counts_on_a_lattice_what_the_eye_counts():
 
 
 def test_d8_knows_a_median_as_well_as_its_elements_say():
-    """A heap of few leaves of many sizes: the halves of a photograph differ by more than the limits of the median."""
+    """In a heap of few leaves of many sizes, the halves of a photograph differ by more than the limits of the median."""
     sizes = np.random.default_rng(0).lognormal(6, 0.9, 30)
     many = np.random.default_rng(1).lognormal(6, 0.9, 120)
     found = checks.census(sizes, 100, many * 1.5 * np.median(sizes) / np.median(many), 400)
@@ -433,7 +433,7 @@ def test_d8_knows_a_median_as_well_as_its_elements_say():
     assert found.passed, found
     for wrong in (0.3, 2.5):
         assert not checks.census(sizes, 100, many * wrong * np.median(sizes) / np.median(many), 400).passed
-    # Where all are alike the median is known.
+    # If all are equal, the median is certain.
     alike = np.full(30, 400.0)
     assert not checks.census(alike, 100, np.full(120, 600.0), 400).passed
 
@@ -473,7 +473,7 @@ def test_d9_fails_for_what_breaks_the_limits():
 
 
 def mixture(exemplars, chosen):
-    """Lay 32 x 32 squares of several exemplars, as `chosen` says."""
+    """Put 32 x 32 squares of several exemplars together, as `chosen` specifies."""
     which = np.kron(chosen, np.ones((32, 32), int)).astype(np.uint16)
     places = cycle(exemplars[0], *which.shape)
     image = np.stack([e[places[..., 0], places[..., 1]] for e in exemplars])
@@ -489,10 +489,10 @@ def test_d10_on_a_mixture_made_by_hand():
     found = checks.d10(several, image, source)
     assert found.passed, found
     assert found.entropy == pytest.approx(1, abs=0.01)
-    # One exemplar has nearly all.
+    # One exemplar has nearly all squares.
     source, image = mixture(several, np.where(order + np.arange(64).reshape(8, 8) % 9 == 0, 1, 0))
     assert not checks.d10(several, image, source).passed
-    # The map names the wrong one.
+    # The map names the wrong exemplar.
     source, image = mixture(several, order)
     wrong = SourceMap(source.coordinates, (source.exemplar + 1) % np.uint16(3), source.label, None, source.shapes)
     assert not checks.d10(several, image, wrong).passed
@@ -512,7 +512,7 @@ def test_d12_fails_for_mirrors_and_not_for_what_only_repeats(pebbles, copy):
     places = cycle(pebbles, 256, 256).copy()
     places[:, 128:, 1] = 127 - places[:, 128:, 1]
     source, _ = a_map(pebbles, places)
-    # Two axes, the one in the middle and the one at the wrap.
+    # There are two axes, one in the middle and one at the wrap.
     assert checks.d12(source).axes == pytest.approx(2 * 256 / 512)
     assert not checks.d12(source).passed
 
@@ -526,7 +526,7 @@ def test_d13_fails_where_a_part_is_used_alone(pebbles, copy):
 
 
 def test_every_cheat_fails_somewhere(pebbles, blur, copy, noise, collage):
-    """What is no design of the texture must not get past the checks that need nothing but the picture and its map."""
+    """Results that are not designs must fail the checks that need only the image and its map."""
     source, repeated = copy
     mirrored = np.block([[[pebbles], [pebbles[:, ::-1]]], [[pebbles[::-1]], [pebbles[::-1, ::-1]]]])
     cheats = {

@@ -1,4 +1,4 @@
-"""Elements measured and moved by compiled code, beside the same in NumPy."""
+"""Elements measured and moved by compiled code, compared with NumPy."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ PAD = 9
 
 
 def blobs(seed, shape=(70, 90)):
-    """Draw discs that overlap and leave the picture."""
+    """Draw discs that overlap and leave the image."""
     rng = np.random.default_rng(seed)
     labels = np.zeros(shape, np.int32)
     rows, columns = np.indices(shape)
@@ -26,7 +26,7 @@ def blobs(seed, shape=(70, 90)):
 
 
 def measure_slowly(labels, label):
-    """Return what is measured of an element: distances, centre, spread along and across its axis."""
+    """Return the measures of an element: distances, centre, spread along and across its axis."""
     rows, columns = find_objects(labels)[label - 1]
     extended = np.pad(labels, PAD, mode="edge")
     near = extended[rows.start : rows.stop + 2 * PAD, columns.start : columns.stop + 2 * PAD] == label
@@ -59,7 +59,7 @@ def test_what_covers_all_has_no_outline():
 
 
 def move_slowly(element, operations, shape):
-    """Return where the pixels of a window come from, and how deep in the element they are."""
+    """Return the source of the pixels in a window, and their depth in the element."""
     matrix, shift = np.eye(2), np.zeros(2)
     for operation in operations:
         matrix, shift = operation.matrix() @ matrix, shift + operation.shift()
@@ -112,7 +112,7 @@ def test_elements_are_moved_as_numpy_does(operations):
 
 
 def test_large_shapes_are_moved_as_small_ones():
-    """Those of more than 4096 pixels go to the thread pool."""
+    """Shapes of more than 4096 pixels use the thread pool."""
     distance = np.float32(30) - np.hypot(*(np.indices((90, 80)) - 40.0)).astype(np.float32)
     [whole, part] = (
         move_shape(distance, (0, 0), (40, 40), ((0.8, -0.6), (0.6, 0.8)), (60.25, 3), canvas, 3)

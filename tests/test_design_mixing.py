@@ -1,4 +1,4 @@
-"""Several exemplars in one texture: shares and maps are kept, and borders run along outlines."""
+"""Several exemplars in one texture: shares and maps are kept, and borders follow outlines."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_a_map_is_obeyed_to_within_an_element(three, count):
     shown = result.source_map.exemplar
     away = np.stack([distance_transform_edt(where != which) for which in range(count)])
     away = np.take_along_axis(away, shown[np.newaxis].astype(int), axis=0)[0]
-    # Pebbles are some 20 pixels large.
+    # Pebbles are about 20 pixels large.
     assert (away <= 10).mean() >= 0.95
     assert away.max() <= 28
     assert 0.001 < (away > 0).mean() < 0.12
@@ -66,7 +66,7 @@ def test_territories_are_cyclic_and_even():
 
 
 def layer(which, things):
-    """Return a layer of one colour, with a thing in it."""
+    """Return a layer of one colour with an element in it."""
     size = things.shape
     plain = SourceMap.identity(size)
     source = SourceMap(plain.coordinates, np.full(size, which, np.uint16), plain.label, None, (size, size))
@@ -80,7 +80,7 @@ def test_borders_go_round_things_whole():
     layers = [layer(which, disc) for which, disc in enumerate(discs)]
     wanted = np.asarray(columns >= 40, np.uint16)
     chosen = cut_borders(layers, wanted, 16.0, (False, False))
-    # The straight border halves both discs; each is whole now, and lies where it was asked the more.
+    # The straight border halves both discs. Each is now whole, in the exemplar with the larger weight there.
     assert (chosen[discs[0]] == 0).all()
     assert (chosen[discs[1]] == 1).all()
     assert measure_error(np.bincount(chosen.ravel()) / chosen.size, np.array([0.5, 0.5])) <= 0.01

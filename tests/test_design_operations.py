@@ -1,4 +1,4 @@
-"""Elements under moves: by chance, from place to place of a heap, and on a lattice."""
+"""Moves of elements: random, between places of a heap, and on a lattice."""
 
 from dataclasses import replace
 
@@ -128,7 +128,7 @@ def test_operations_are_obeyed_in_heaps():
         n: max((len(e["operations"]) for e in result.report["operations"][0][1:] if "place" in e), default=0)
         for n, result in made.items()
     }
-    # Turned and scaled to the shape of the other one, and what comes on top of it.
+    # They are rotated and scaled to the shape of the other element, and so are elements on top of it.
     assert longest[0] == 0
     assert [longest[n] for n in (1, 2, 6)] == [2, 3, 7]
     assert len({result.image.tobytes() for result in made.values()}) == 4
@@ -146,7 +146,7 @@ def test_v_chooses_among_the_first_operations():
 
 @pytest.mark.parametrize("name", ["bricks", "weave"])
 def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
-    """What lies a side of the texture away is the same place of the lattice."""
+    """Points at a distance of the texture's side are the same point of the lattice."""
     wall = samples.load(name, size=(160, 160)).image
     lattice = texrs.exemplar.segment(wall).lattice
     assert lattice is not None
@@ -155,7 +155,7 @@ def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
     size = np.diag([200.0, 232.0])
     times = np.linalg.solve(np.array(closing) @ lattice.vectors, size)
     assert np.abs(times - np.rint(times)).max() < 0.02
-    # Shown as it is but for that; patches lie where it repeats, by a sixth of a period.
+    # Otherwise it is unchanged. Patches repeat in phase, by 1/6 of a period.
     frames = np.abs(made.source_map.jacobians().reshape(-1, 2, 2)) - np.abs(np.linalg.inv(closing))
     assert np.abs(frames).max() < 0.01
     places = np.moveaxis(np.indices((200, 232)), 0, -1).astype(float)
@@ -185,7 +185,7 @@ def test_on_a_lattice_elements_move_by_its_shifts_alone():
     shifts = [entry["place"] for entry in entries]
     assert len(shifts) > 20
     assert not any(entry["operations"] for entry in entries)
-    # Along an axis that is mirrored a lattice of orthogonal periods is its own mirror.
+    # A lattice with orthogonal periods equals its mirror image along a mirrored axis.
     times = np.linalg.solve(lattice, np.array(shifts).T)
     assert np.abs(times - np.round(times)).max() < 0.1
 
@@ -219,7 +219,7 @@ def test_shifts_are_mirrored_with_the_picture():
 
 
 def test_elements_keep_out_of_what_others_occupy():
-    """Also of the places of those that have yet to move: so an element can always stay."""
+    """This includes the places of elements that have not moved yet, so that an element can always stay."""
     rows, columns = np.mgrid[:96, :96]
     labels = np.zeros((96, 96), np.int32)
     for number, (r, c) in enumerate([(24, 24), (24, 50), (50, 24), (50, 50), (74, 74)], start=1):

@@ -1,4 +1,4 @@
-"""DESIGN as printed (``method="paper"``): the printed constants, and what the departures of the default are for."""
+"""DESIGN as printed (``method="paper"``): the printed constants, and the reasons for the departures of the default."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from texrs.papers.design.literal import START, choose_operation, choose_start, s
 from texrs.papers.design.logistic_map import iterate
 
 WEAK = -0.356261
-"""A start whose first two operations are translations by nothing."""
+"""A start whose first two operations are translations by 0."""
 
 
 @pytest.fixture(scope="module")
@@ -29,14 +29,14 @@ def result(pebbles):
 
 
 def apart(a, b):
-    """Return how different two pictures are, 1 being as different as one is from itself rolled by half its size."""
+    """Return the difference of two images. 1 is the difference of an image and itself rolled by half its size."""
     a, b = a.astype(float), b.astype(float)
     rolled = np.roll(a, (a.shape[0] // 2, a.shape[1] // 2), (0, 1))
     return np.abs(a - b).mean() / np.abs(a - rolled).mean()
 
 
 def nearest(a, b):
-    """Return the same against the nearest of a picture and its mirrors."""
+    """Return the same for the nearest of an image and its mirror images."""
     return min(apart(a, flip(b, axes)) for axes in [(False, False), (True, False), (False, True), (True, True)])
 
 
@@ -115,17 +115,19 @@ def test_layers_are_moved_whole():
     np.testing.assert_array_equal(whole.colours, picture)
     np.testing.assert_array_equal(whole.label, layers)
     moved = stitch_layers(picture, layers, START)
-    # T4 moves the ground by 8 pixels to the right; R1 turns the square by 9 degrees, into what the ground left open.
+    # T4 moves the background by 8 pixels to the right. R1 rotates the square by 9 degrees, into the gap of the
+    # background.
     assert (~moved.covered[:, :8]).all()
     assert 0 < (moved.label == 1).sum() <= 100
 
 
 def test_a_layer_over_others_altogether_is_lost():
-    """Nothing ties the minimum cut to it: the reason for the hard constraints of the default."""
+    """The minimum cut may remove it. This is the reason for the hard constraints of the default."""
     picture = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
     layers = np.zeros((40, 40), np.int32)
     layers[4:10, 15:25] = 1
-    # M of the ground along columns leaves its hole where it was; M of the square along rows lays it over the ground.
+    # M of the background along columns leaves its hole in place. M of the square along rows puts it over the
+    # background.
     starts = np.random.default_rng(1).uniform(-1, 1, 4000)
     wanted = [("M", 1), ("M", 0)]
     found = [x for x in starts if [(o.kind, o.axis) for o in chosen(x)] == wanted]
@@ -150,7 +152,7 @@ def test_it_can_hand_back_its_input_and_the_default_does_not(pebbles):
     assert nearest(literal.stages["completed"], unit) < 0.01
     for start in (None, WEAK, 0.3, -0.61):
         default = texrs.design(pebbles, 128, seed=1, copies=1, deformation=DeformationOptions(start=start))
-        # In a heap few stones move, so a single variant keeps much of its input; the texture does not.
+        # In a heap few stones move, so a single variant keeps much of its input, but the texture does not.
         assert nearest(default.stages["completed"], unit) > 0.05
         assert nearest(default.image, pebbles) >= 0.4
 
@@ -213,7 +215,7 @@ def test_unscreened_poisson_acts_and_keeps_the_border(result):
 
 
 def test_screening_keeps_the_colours(result, pebbles):
-    """The reason for the weight on the values: without it colours drift."""
+    """Without a weight of the values, colours drift."""
     from scipy.ndimage import gaussian_filter
 
     def drift(image):

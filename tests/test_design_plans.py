@@ -1,4 +1,4 @@
-"""Plans of DESIGN: what is done with elements, tried at a small size and judged."""
+"""Plans of DESIGN: treatments of elements, tried at a small size and judged."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_what_wins_small_wins_large(gravel, chosen):
 
 
 def test_still_elements_are_taken_where_moved_ones_are_torn():
-    """Blades of grass are no elements that could be cut out."""
+    """Blades of grass are not elements that can be cut out."""
     grass = np.ascontiguousarray(samples.photograph("grass").image[:160, :160])
     auto, move = (texrs.design(grass, 192, motion=plan) for plan in ("auto", "move"))
     assert auto.report["motion"] == ["keep"]
@@ -48,7 +48,7 @@ def test_still_elements_are_taken_where_moved_ones_are_torn():
 
 
 def test_deformation_is_kept_where_it_does_no_harm():
-    """Buttons on plain cloth, each surely found: moved ones lie as well."""
+    """Buttons on plain cloth are found reliably, so moved ones look as good."""
     assert texrs.design(samples.dots((96, 96)).image, 64).report["motion"] == ["move"]
 
 
@@ -58,7 +58,7 @@ def test_still_elements_are_copied_as_they_are(chosen):
     assert all(not entry.get("operations") for log in still.report["operations"] for entry in log)
     frames = np.abs(still.source_map.jacobians())
     np.testing.assert_array_equal(frames, np.broadcast_to(np.eye(2), frames.shape))
-    # Each mirror image serves once.
+    # Each mirror image is used once.
     shown = [tuple(log[0]["mirror"]) for log in still.report["operations"]]
     assert len(set(shown)) == len(shown)
 

@@ -1,4 +1,4 @@
-"""The pages of the documentation that are made from the code: `docs/*.py`."""
+"""The pages of the documentation that are generated from the code: `docs/*.py`."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Elements of textures whose centres and masks are known; bad input; entries as files."""
+"""Elements of textures with known centres and masks; bad input; entries as files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DISC, SPACING = 9, 32
 
 
 def discs(rows: int = 5, columns: int = 6, *, jitter: int = 4, seed: int = 0, radius: float = DISC) -> tuple:
-    """Shaded discs on a grainy ground: image, centres, mask."""
+    """Return shaded discs on a grainy background: image, centres, mask."""
     rng = np.random.default_rng(seed)
     size = (rows * SPACING, columns * SPACING)
     centres = (np.indices((rows, columns)).reshape(2, -1).T + 0.5) * SPACING
@@ -80,7 +80,7 @@ def test_samples_with_exact_centres(name: str, recall: float, overlap: float) ->
 
 
 def annotate(sample: samples.Sample) -> tuple:
-    """Return what a user would say of a sample: the box of a usual element, and places far from all of them."""
+    """Return the annotation of a sample by a user: the box of a usual element, and points far from all elements."""
     from scipy.ndimage import distance_transform_edt, find_objects
 
     height, width = sample.image.shape[:2]
@@ -395,7 +395,7 @@ def test_copies_are_as_large_and_turned_as_they_were_found() -> None:
         None,
         bank,
     )
-    # A mask that is everything is at fault, and copies of the element take its place.
+    # A mask of the whole image is wrong, so copies of the element replace it.
     found = reconcile(np.ones((80, 80), bool), near, np.ones((9, 21), bool), (False, False))
     assert found.made_by == "elements"
     rows = [int(found.mask[r - 15 : r + 16, c].sum()) for r, c in points.astype(int)]
@@ -423,7 +423,7 @@ def test_what_the_border_cuts_is_no_ground() -> None:
 
 
 def lay_tiles(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return tiles of many colours between grey joints, and their middles: grainy there, each looks like a thing."""
+    """Return tiles of many colours between grey joints, and their centres, whose grain looks like an element."""
     random = np.random.default_rng(0)
     image = np.full((*shape, 3), 0.5, np.float32)
     middles = np.array([(r, c) for r in range(24, shape[0], 48) for c in range(24, shape[1], 48)], float)
@@ -453,7 +453,7 @@ def test_a_layout_is_proposed_for_a_long_narrow_picture() -> None:
 
 
 def test_what_is_found_small_is_cut_small() -> None:
-    """The middles of elements are taken for foreground as large as these were found."""
+    """The middles of elements become foreground with the size in which they were found."""
     size, radius = (192, 192), 12
     centres = (np.indices((4, 4)).reshape(2, -1).T + 0.5) * 48
     radii = np.where(np.arange(16) % 3 == 1, radius / 2, radius)
@@ -477,7 +477,7 @@ def test_what_is_found_small_is_cut_small() -> None:
 @pytest.mark.parametrize("offset", [(0, 0), (2, -1)])
 def test_what_all_elements_have_around_them_is_theirs(offset: tuple[int, int]) -> None:
     image, centres, mask = discs()
-    # A mask of their middles alone, beside the middle: as a cut leaves where the ground's colours claim the rest.
+    # Use a mask of their off-centre middles, as a cut leaves if the background's colours claim the rest.
     middles = np.zeros_like(mask)
     for centre in centres.astype(int):
         row, column = centre + offset
@@ -488,7 +488,7 @@ def test_what_all_elements_have_around_them_is_theirs(offset: tuple[int, int]) -
     assert both > 0.9
     assert np.abs(found.points - centres).max() < 1.5
     assert max(found.box) == pytest.approx(2 * DISC + 1, abs=2)
-    # There is nothing to be had beyond what is known already, nor where elements have nothing in common around them.
+    # There is nothing to extend beyond the known mask, or if elements have different surroundings.
     assert extend_mask(to_lab(image), found.mask, found.points, found.box, (False, False), sure=True) is None
     noise = np.random.default_rng(0).random(image.shape, np.float32)
     noise[middles] = 1

@@ -18,7 +18,7 @@ DOTS = samples.load("dots", size=(96, 96))
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder that holds a picture, its mask, and a list of its centres."""
+    """Work in a folder with an image, its mask, and a list of its centres."""
     monkeypatch.chdir(tmp_path)
     iio.imwrite("in.png", DOTS.image)
     iio.imwrite("mask.png", DOTS.mask.astype(np.uint8) * 255)
@@ -50,7 +50,7 @@ def test_a_material_is_analysed_by_all_its_maps(here: Path, capsys: Capture) -> 
     assert main(["analyse", "stuff", "-o", "e.npz", "--layout", "disjoint"]) == 0
     assert "stuff_wet.png not used" in capsys.readouterr().err
     found = elements.load("e.npz")
-    # What colours do not tell, heights do; the entry shows the colours.
+    # Heights show the elements that colours do not. The entry contains the colours.
     assert (found.image == flat).all()
     assert len(found.points) >= 0.8 * len(DOTS.centres)
     assert main(["analyse", "stuff", "-o", "f.npz", "--layout", "disjoint", "--role", "stuff_wet=mask", "-q"]) == 0

@@ -1,4 +1,4 @@
-"""Corrections of an analysis, and the page on which they are made."""
+"""Corrections of an analysis, and the page where they are made."""
 
 import json
 import re
@@ -56,7 +56,7 @@ def test_the_rest_is_moved_named_and_painted(found: ElementAnalysis) -> None:
     assert made.layout == "connected"
     assert made.mask[0, 0]
     assert not made.mask[95, 95]
-    # What a net is not is said.
+    # The message gives the definition of a net.
     assert "connected means" in made.report["warnings"][0]
 
 
@@ -91,7 +91,7 @@ def test_the_command_writes_the_page_and_reads_the_list(
     known = json.loads(re.search(r"known = (\{.*\});", text)[1])  # type: ignore[index]
     assert len(known["points"]) == len(entry.points)
     assert known["earlier"] == entry.report["corrections"]
-    # Nothing is fetched from elsewhere.
+    # The page loads nothing from elsewhere.
     assert "http://" not in text.replace("http://www.w3.org/2000/svg", "")
     assert main([*command, "words"]) == 2
     assert main(["analyse", "in.png", "-q", "-o", "e.npz", "--page", "in.png"]) == 2

@@ -1,4 +1,4 @@
-"""Elements one by one: their labels and masks, and that DESIGN and SPLICE take the same ones."""
+"""Single elements: their labels and masks, and their use by DESIGN and SPLICE."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from texrs.point_sets import find_courses, find_lattice, spacing
 RADIUS, SIDE = 8, 96
 CENTRES = np.array([[20.0, 20], [20, 34], [20, 70], [60, 20], [60, 50]])
 ALONE = np.array([60.0, 78])
-"""The middle of a disc that no point lies in."""
+"""Centre of a disc without a point."""
 
 
 def draw_discs(centres: np.ndarray, radii: np.ndarray, *, wrap: bool = False) -> np.ndarray:
@@ -45,7 +45,7 @@ def test_points_own_the_pieces_they_lie_in() -> None:
     assert ((ENTRY.labels > 0) == MASK).all()
     at = CENTRES.astype(int)
     assert ENTRY.labels[at[:, 0], at[:, 1]].tolist() == [1, 2, 3, 4, 5]
-    # The first two touch, and are parted half way.
+    # The first two touch, and are separated halfway.
     assert ENTRY.labels[20, 26] == 1
     assert ENTRY.labels[20, 28] == 2
     assert ENTRY.labels[60, 78] == 6
@@ -84,7 +84,7 @@ def test_confidence_is_likeness_and_of_what_has_no_point_its_area() -> None:
     sure = [one.confidence for one in ENTRY.instances[:5]]
     assert sure[0] == 1
     assert sure == sorted(sure, reverse=True)
-    # As often as elements of that likeness, 1 to .5, were some where it is known.
+    # The confidence is the share of correct elements at similarities of 1 to 0.5, where it is known.
     np.testing.assert_allclose(sure, [1, 0.97, 0.8, 0.31, 0.05], atol=0.02)
     assert ENTRY.instances[5].confidence > 0.95
     radii = np.array([RADIUS] * 5 + [RADIUS * 0.7])
@@ -106,7 +106,7 @@ def test_around_cyclic_borders_elements_are_whole() -> None:
     centres = np.array([[2.0, 40], [94, 50], [50, 1], [50, 50]])
     mask = draw_discs(centres, np.array([RADIUS] * 4), wrap=True)
     entry = make_entry(centres, mask, wrap=(True, True))
-    # The first two touch across the border, and are parted there.
+    # The first two touch across the border, and are separated there.
     assert len(entry.instances) == 4
     assert entry.labels[92, 38] == 1
     assert entry.labels[4, 52] == 2
@@ -216,7 +216,7 @@ def test_cells_are_the_elements_where_joints_part_all() -> None:
     assert min(plain.report["confidence"].values()) >= 0.8
     assert "box" not in again.report["proposed"]
     assert abs(len(plain.points) - len(again.points)) <= 2
-    # Nothing is taken for cells where something else was said.
+    # Explicit arguments prevent an analysis as cells.
     for said in ({"layout": "disjoint"}, {"points": plain.points[:9], "layout": "jointed"}, {"box": (80, 80, 15, 15)}):
         assert elements.analyse(image, **said).report["mask"] != "cells"
 
@@ -229,7 +229,7 @@ def test_the_arrangement_is_known(name: str, regular: bool, rows: bool) -> None:
     found = entry.arrangement
     assert (found.lattice is not None, found.courses is not None) == (regular, rows)
     if found.courses is not None:
-        # Each element lies in a course, but where the border cuts them.
+        # Each element is in a course, except where the border cuts them.
         apart = np.abs(entry.points[:, :1] - np.array(found.courses)).min(axis=1)
         assert np.median(apart) < 0.1 * found.spacing
     light = entry.image.mean(axis=-1)

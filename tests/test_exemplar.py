@@ -1,4 +1,4 @@
-"""texrs.Exemplar: what is known of an example, worked out once and kept by its content."""
+"""texrs.Exemplar: facts about an example, computed once and cached by content."""
 
 import numpy as np
 import pytest

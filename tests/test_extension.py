@@ -1,4 +1,4 @@
-"""Photographs of planes that go on beyond their borders, in the same perspective; what a user may do wrong; the command."""
+"""Photographs of planes extended beyond their borders in the same perspective; user errors; the command."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -28,12 +28,12 @@ def test_nothing_known_changes() -> None:
 
 
 def test_it_is_the_same_plane() -> None:
-    """What is found of the whole is what was found of the photograph, seen from further left."""
+    """The plane of the result is the plane of the photograph, seen from further left."""
     before, after = (planes.find(picture, fov=50) for picture in (FLOOR, LARGER.image[:160, :240]))
     steep, aside = turn_between(before, after)
     assert steep <= 12
     assert aside <= 25
-    # Things are as large in what was added as they were beside it.
+    # Elements of the added part have the size of their neighbours.
     scales = np.abs(np.linalg.det(LARGER.source_map.jacobians()[:160, 250:310]))
     assert 0.6 < np.median(scales) < 1.7
 
@@ -45,7 +45,7 @@ def test_a_sky_goes_on_above_the_floor_and_a_wall_behind_it() -> None:
     made = texrs.extend(above, right=40, view=PlaneView(plane=floor, ground=low), seed=1)
     new = made.image[:, 200:].astype(int)
     blue = new[..., 2] > new[..., 0] + 40
-    # The line between them goes on.
+    # The line between them continues.
     y, x = np.indices((160, 240))[:, :, 200:]
     line = y - 0.12 * (x - 100) - 0.47 * 160
     assert blue[line < -4].mean() > 0.99
@@ -63,7 +63,7 @@ def test_a_thing_at_the_border_does_not_go_on() -> None:
     made = texrs.extend(seen, bottom=40, view=PlaneView(plane=PLANE, ground=ground), seed=1)
     rows, columns = np.rint(made.source_map.coordinates[160:]).astype(int).reshape(-1, 2).T
     assert ground[rows, columns].all()
-    # What covers all of the border does, as a wall on the left.
+    # An object that covers the whole border continues, such as a wall on the left.
     wall = np.ones_like(ground)
     wall[:, :50] = False
     made = texrs.extend(seen, left=30, view=PlaneView(plane=PLANE, ground=wall), seed=1)

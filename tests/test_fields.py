@@ -1,4 +1,4 @@
-"""Frame fields: what they turn, that they depend on the point alone, and what they refuse."""
+"""Frame fields: their rotations, their independence of other points, and their errors."""
 
 import pickle
 
@@ -15,13 +15,13 @@ RNG = np.random.default_rng(5)
 
 
 def bend(points):
-    """A smooth field, at module level so that it can be pickled."""
+    """Return a smooth field. It is at module level so that it can be pickled."""
     axes = points.shape[1]
     return np.eye(axes) * (1.5 + 0.5 * np.sin(points[:, :1] / 9))[:, :, None]
 
 
 def varied(axes):
-    """One field of every kind."""
+    """Return one field of every kind."""
     some = [fields.rotation(a, "xy", axes=axes).constant * s for a, s in ((0, 1), (40, 1.5), (80, 1), (30, 0.7))]
     grid = np.array(some * 2).reshape(*((2, 4) if axes == 2 else (2, 2, 2)), axes, axes)
     stretched = grid @ np.diag([1.0, 2.0, 0.5][:axes])
@@ -142,14 +142,14 @@ def test_circles():
     for y, x in RNG.uniform(0, 40, (50, 2)):
         frame = field.frames((RNG.uniform(0, 9), y, x))
         away = np.array([0, y - 20, x - 20]) / np.hypot(y - 20, x - 20)
-        assert_allclose(frame[:, 2], away, atol=1e-6)  # x outwards
-        assert_allclose(frame[:, 1], [0, away[2], -away[1]], atol=1e-6)  # y along
+        assert_allclose(frame[:, 2], away, atol=1e-6)  # x points outwards
+        assert_allclose(frame[:, 1], [0, away[2], -away[1]], atol=1e-6)  # y points along
         assert_allclose(frame[:, 0], [1, 0, 0])
         assert np.linalg.det(frame) == pytest.approx(1, abs=1e-5)
     assert_array_equal(field.frames((5, 20, 20)), np.eye(3))
     assert_array_equal(fields.circular().over((9, 41, 41)).frames((0, 3, 4)), field.frames((0, 3, 4)))
     rings = fields.circular("y").over((41, 9, 41))
-    assert_allclose(rings.frames((30, 0, 20))[:, 0], [1, 0, 0])  # z outwards, round y
+    assert_allclose(rings.frames((30, 0, 20))[:, 0], [1, 0, 0])  # z points outwards, around y
     assert_allclose(rings.frames((20, 0, 30))[:, 0], [0, 0, 1], atol=1e-7)
 
 

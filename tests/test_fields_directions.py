@@ -37,11 +37,11 @@ def test_volumes(along: str) -> None:
     assert np.allclose(np.linalg.det(frames), 1, atol=1e-4)
     assert np.allclose(frames @ frames.swapaxes(-1, -2), np.eye(3), atol=1e-4)
     upright = frames[..., 0 if along != "z" else 1]
-    assert np.allclose(np.abs(upright[..., 0]), 1, atol=1e-4)  # The axis that nothing goes along stays.
+    assert np.allclose(np.abs(upright[..., 0]), 1, atol=1e-4)  # The axis without movement is unchanged.
 
 
 def test_it_is_the_circular_field() -> None:
-    """As the field by formula has it: rows outwards, columns around; or the other way round about."""
+    """It equals the field by formula: rows outwards and columns around, or vice versa."""
     found = fields.from_directions(AROUND).lattice((32, 32), jacobians=False)
     wanted = fields.circular(axes=2, centre=(15.5, 15.5)).lattice((32, 32), jacobians=False)
     assert np.allclose(np.abs((found[..., 1] * wanted[..., 1]).sum(axis=-1)), 0, atol=1e-3) or np.allclose(
@@ -62,7 +62,8 @@ def test_order_up_extent_and_missing_directions() -> None:
     tilted = fields.from_directions(WOUND, up=(1, 0.2, 0)).lattice(Z.shape, jacobians=False)
     assert angle(tilted[..., 2], WOUND) < 0.05
     assert angle(tilted[..., 0], np.broadcast_to([1, 0.2, 0], WOUND.shape)) < 12
-    everywhere = fields.from_directions(np.broadcast_to([1.0, 0, 0], (4, 4, 4, 3)), up=(1, 0, 0))  # Along up itself.
+    # The direction is up itself.
+    everywhere = fields.from_directions(np.broadcast_to([1.0, 0, 0], (4, 4, 4, 3)), up=(1, 0, 0))
     assert np.allclose(np.linalg.det(everywhere.lattice((4, 4, 4))), 1, atol=1e-4)
 
 

@@ -1,4 +1,4 @@
-"""Source maps say how their pictures were finished: other maps are finished in the same way."""
+"""Source maps contain the finish of their images: other maps are finished in the same way."""
 
 import json
 from collections.abc import Callable
@@ -95,7 +95,7 @@ def test_another_finish_may_be_asked_for() -> None:
     plain = texrs.apply(source, PEBBLES, finish=RenderOptions((True, True)))
     assert (plain == source.render(PEBBLES)).all()
     assert (plain != texrs.apply(source, PEBBLES)).any()
-    # Put together by hand a map says nothing, and is looked up.
+    # A map created from arrays has no finish, and is only looked up.
     bare = SourceMap(source.coordinates, source.exemplar, source.label, source.jacobian, source.shapes)
     assert (texrs.apply(bare, PEBBLES) == plain).all()
 

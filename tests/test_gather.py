@@ -1,4 +1,4 @@
-"""Looking up: exact at samples, in range between them, the same for every dtype."""
+"""Lookup: exact at samples, within range between them, the same for every dtype."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def test_everything_is_that_of_the_slow_twin(dtype, channels, axes, interpolatio
     rng = np.random.default_rng(seed)
     images = [(rng.random((*shape[:axes], *channels)) * 99).astype(dtype) for shape in ((5, 6, 4), (3, 7, 5))]
     at = rng.uniform(-3, 9, (40, axes)).astype(np.float32)
-    # Also whole coordinates, halves, and those of fixed point, some of them along one axis alone.
+    # Include integer coordinates, halves, and fixed-point values, some along one axis only.
     rounded = rng.random((40, axes)) < 0.5
     at[rounded] = np.rint(at / step)[rounded] * step if step else np.rint(at)[rounded]
     which = rng.integers(0, 2, 40)
@@ -85,7 +85,7 @@ def test_everything_is_that_of_the_slow_twin(dtype, channels, axes, interpolatio
     if found.dtype.kind == "f":
         np.testing.assert_allclose(found, exact.astype(dtype), rtol=4 * np.finfo(dtype).eps, atol=1e-12)
     else:
-        # Where a sum ends in a half, its last bit says which integer is the nearest.
+        # If a sum ends in a half, its last bit decides which integer is the nearest.
         np.testing.assert_allclose(found.astype(np.float64), exact, rtol=0, atol=0.5 + 1e-9)
 
 

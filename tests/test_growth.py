@@ -1,4 +1,4 @@
-"""texrs.growth and the atlas that it grows from: where copies lie, what may be copied of them, and the levels."""
+"""texrs.growth and its atlas: positions of copies, copyable parts, and the levels."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def atlas(floor):
 
 
 def atlas_of(image, scale=None, sizes=(1.0,), *, coarsest=32, **options):
-    """Return the atlas of an image, of as many levels as its size gives."""
+    """Return the atlas of an image, with the levels for its size."""
     return Atlas.of(guidance(image), scale, sizes, levels=count_levels(image.shape[:2], coarsest), **options)
 
 
@@ -47,7 +47,7 @@ def test_copies_do_not_overlap_and_are_found_again(atlas):
         corners = np.array([[0, 0], [rows - 1, columns - 1]]) + copy.origin
         which, at = atlas.locate((corners * ONE).astype(np.int32).ravel())
         assert (which == number).all()
-        # The outer edges of a copy are those of the exemplar.
+        # The outer edges of a copy are the edges of the exemplar.
         np.testing.assert_allclose(at[0], 0.5 / np.array(copy.factor) - 0.5, atol=1e-4)
         np.testing.assert_allclose(at[1], [95.5, 79.5] - 0.5 / np.array(copy.factor), atol=1e-4)
     assert taken.max() == 1
@@ -114,7 +114,7 @@ def test_held_blocks_need_a_place_each():
 
 
 def test_any_start_and_any_corrector_can_be_handed_in():
-    """A draft that a corrector leaves alone comes out as it went in, upsampled; each level is asked for what it is to hold."""
+    """A draft without a corrector is returned upsampled. Each level gets its constraints."""
     calls = []
 
     def leave(places, level, region, frames, asked, progress):

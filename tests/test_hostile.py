@@ -1,7 +1,7 @@
-"""Whatever a public function is given, a result or a sentence of texrs comes out.
+"""A public function returns a result or raises an error of texrs, for any argument.
 
-Each function is called as its own example calls it, with one argument after the other replaced by what it is not meant to be
-(`hostile`). Here a few values of each argument are tried; `make fuzz` tries all of them.
+Each function is called as in its own example, with one argument after the other replaced by unsuitable values
+(`hostile`). This file tries a few values of each argument, and `make fuzz` tries all of them.
 """
 
 import contextlib
@@ -20,9 +20,9 @@ from texrs import samples
 from texrs.errors import TexrsError
 
 FEW = 6
-"""Values of each argument that are tried by `make test`."""
+"""Number of values of each argument that `make test` tries."""
 SKIPPED = {"scheduler", "function", "make", "each"}
-"""Arguments that start processes, or whose own errors are whoever gave them."""
+"""Arguments that start processes, or whose errors belong to the caller's functions."""
 
 
 class Late(BaseException):
@@ -31,7 +31,7 @@ class Late(BaseException):
 
 @contextlib.contextmanager
 def end_in(seconds):
-    """Interrupt what takes too long, where the system can."""
+    """Interrupt long calls, if the system supports it."""
     if not hasattr(signal, "setitimer"):
         yield
         return
@@ -50,7 +50,7 @@ def end_in(seconds):
 
 @pytest.fixture(scope="module", autouse=True)
 def _limited():
-    """Let what asks for more memory than all this needs fail here, and not the machine."""
+    """Limit memory, so that a large request fails here and does not disturb the machine."""
     if sys.platform != "linux":
         yield
         return
@@ -66,7 +66,7 @@ def _limited():
 
 @pytest.fixture(scope="module", autouse=True)
 def _drawn_anew():
-    """Have examples call the generators of samples themselves: of what was drawn before, a copy is given without a call."""
+    """Make examples call the original generators of samples, because cached samples are returned without a call."""
     with pytest.MonkeyPatch.context() as patch:
         for name in samples._GENERATORS:
             patch.setattr(samples, name, inspect.unwrap(getattr(samples, name)))
@@ -74,7 +74,7 @@ def _drawn_anew():
 
 
 def try_values(name, place, count):
-    """Call a function with some of the hostile values of each argument, or all; return the calls, and what came out wrong."""
+    """Call a function with some or all hostile values of each argument. Return the calls and the errors."""
     call = hostile.record(name, place)
     if call is None:
         return 0, []
@@ -109,13 +109,15 @@ LEFT = {
     "texrs.kernels.mean_shift.mean_shift.progress",
     "texrs.kernels.regions.felzenszwalb.progress",
 }
-"""Arguments of which some values end otherwise: a view of two bytes as an array of eight gigabytes, whose copy ends in a
-MemoryError; `int` as what is told of progress, whose own error goes through; and keys of a material, which is a mapping, that
-are not there or cannot be hashed: a KeyError or TypeError, as of all. None may come to it."""
+"""Arguments with known exceptions. A view of two bytes as an array of 8 GB ends in a MemoryError.
+
+`int` as progress callback raises its own error. Unknown or unhashable keys of a material, which is a mapping, raise a
+KeyError or TypeError. No new ones may be added.
+"""
 
 
 def list_left(name, wrong):
-    """Return what came out wrong of arguments that are not known to be left."""
+    """Return the errors of arguments that are not in LEFT."""
     return [each for each in wrong if f"{name}.{each.partition(',')[0]}" not in LEFT]
 
 
@@ -210,11 +212,11 @@ MAY_BE_NONE = {
     "texrs.volume.autocorrelation",
     "texrs.volume.compare",
 }
-"""Results that say by no number, or by an infinite one, what is not seen, not allowed or not there, or was given so."""
+"""Results with NaN or infinity for points that are not visible, not allowed or missing, or from the input."""
 
 
 def try_extremes(name, place, count, seed=0):
-    """Call a function with numbers whose sums are none; return what came out wrong."""
+    """Call a function with numbers whose sums are not finite. Return the errors."""
     call = hostile.record(name, place)
     rng, wrong = np.random.default_rng([seed, *name.encode()]), []
     for number in range(0 if call is None else count):

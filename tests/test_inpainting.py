@@ -1,4 +1,4 @@
-"""Completion of any picture: nothing known changes, nothing unknown is copied, every map in register."""
+"""Inpainting of any image: known pixels do not change, unknown ones are not copied, and maps stay in register."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_filling_continues_the_texture():
 
 
 def test_large_elements_are_not_torn_at_the_far_border():
-    # Stripes wider than a patch: filled row by row, the last patches would meet the lower border with no choice left.
+    # Stripes are wider than a patch. Filled row by row, the last patches would meet the lower border without a choice.
     rows, columns = np.indices((160, 160))
     image = np.where((columns + rows // 3) % 56 < 28, 200, 40).astype(np.uint8)
     hole = np.zeros(image.shape, bool)
@@ -123,7 +123,7 @@ def test_patches_do_not_mirror_or_repeat_what_is_beside_them():
     r, c = np.indices(row.shape)
     near = np.hypot(row - r, column - c) < 10
     assert (near & turned & hole).sum() < 0.02 * hole.sum()
-    # No place is shown by more than a few patches of a hole of so many.
+    # No position is shown by more than a few patches of such a hole.
     used = np.bincount((row * 160 + column)[hole])
     assert (used > 2).sum() < 0.1 * hole.sum()
 
@@ -164,7 +164,7 @@ def test_sources_of_floats_are_compared_in_one_range():
     ramp = np.tile(np.linspace(0, 10, 48, dtype=np.float32), (48, 1))
     hole = disc((48, 48))
     result = texrs.inpaint(ramp, hole, exemplar=ramp * 2)
-    # In a range of its own the doubled ramp would look like the ramp itself.
+    # Scaled by its own range, the doubled ramp would look like the ramp itself.
     assert np.abs(result.image - ramp)[hole].mean() < 1
 
 
@@ -187,7 +187,7 @@ def test_mirrored_patches_turn_normals():
     assert turned.any()
     plain = texrs.inpaint(PEBBLES, HOLE, allow_mirror=False).source_map
     assert (plain.jacobians() == np.eye(2)).all()
-    # Along a patch coordinates run as its frame says.
+    # Coordinates along a patch follow its frame.
     joined = result.source_map.is_coherent(1)[:, :-1]
     same = result.source_map.label[:, 1:] == result.source_map.label[:, :-1]
     assert joined[same].all()
@@ -219,7 +219,7 @@ def test_the_patches_are_kept_whose_seams_show_least():
 
 @pytest.mark.parametrize("side", [64, 40])
 def test_large_things_are_made_whole(side):
-    # Boxes of two colours that alternate; patches of the usual side, 32, are smaller than one.
+    # Boxes of two colours alternate. Patches of the usual side, 32, are smaller than a box.
     row, column = np.mgrid[:320, :320]
     wall = ((row // side + column // side) % 2 * 150 + (row % side < 3) * 60).astype(np.uint8)
     hole = np.hypot(row - 170, column - 150) < 48
@@ -256,7 +256,8 @@ def test_seams_are_judged_by_what_patches_show_beyond_them():
         colours = np.where(label[..., np.newaxis] > 0, stripes[row, column], stripes)
         costs.append(judge_seams(Filled(colours, label, moved, frames), stripes, free, (False, False)))
     assert costs[0] == costs[1] == 0
-    # 12 pixels above and below, 8 at either side: out of step by one half of them differ, by two all.
+    # There are 12 pixels above and below, and 8 on either side. Half of them differ after a shift by one step, all
+    # after two.
     assert costs[2] == pytest.approx(20)
     assert costs[3] == pytest.approx(40)
 
@@ -283,7 +284,7 @@ def test_holes_far_from_the_corner_are_filled_from_what_is_around_them():
     hole = np.zeros(picture.shape[:2], bool)
     hole[500:540, 700:760] = True
     result = texrs.inpaint(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole)
-    np.testing.assert_array_equal(result.image, picture)  # it repeats
+    np.testing.assert_array_equal(result.image, picture)  # The image is periodic.
     row, column = places(result)
     np.testing.assert_array_equal(result.image, picture[row, column])
     assert not hole[row, column].any()

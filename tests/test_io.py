@@ -1,4 +1,4 @@
-"""What is written is read back; what a format cannot hold is refused; files are whole or absent."""
+"""Written files are read back unchanged; values that a format cannot store are refused; files are whole or absent."""
 
 import os
 import stat
@@ -102,7 +102,7 @@ def test_jpeg_is_close(tmp_path):
 
 
 def turned(image, orientation):
-    """What a viewer shows, by the table of the Exif standard."""
+    """Return the image that a viewer shows, by the table of the Exif standard."""
     return {
         1: image,
         2: image[:, ::-1],

@@ -1,4 +1,4 @@
-"""Small files that unfold to gigabytes: refused, or read in the memory of what they show, by every reader."""
+"""Small files that expand to gigabytes: refused, or read in the memory of their contents, by every reader."""
 
 import io
 import lzma
@@ -18,7 +18,7 @@ from texrs import io as tio
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measured by what Linux says of a process")
 
 MOST = 200_000
-"""Kilobytes that a reader may take for a file of a few megabytes."""
+"""Kilobytes that a reader may use for a file of a few megabytes."""
 READ = """
 import sys
 from functools import partial
@@ -41,7 +41,7 @@ def info(path):
 
 readers = {
     "read": io.read, "read_volume": io.read_volume,
-    # Whatever they are said to be, these read.
+    # They read these files under any suffix.
     "read_vectors": partial(io.read_vectors, limit=2**22), "read_arrays": partial(io.read_arrays, limit=2**22),
     "read_headers": io.read_headers, "read_notes": io.read_metadata, "SourceMap": texrs.SourceMap.load,
     "Exemplar": texrs.Exemplar.load, "elements": elements.load, "database": database, "info": info,
@@ -67,7 +67,7 @@ for path in sys.argv[1:]:
 
 
 def tiff(data, compression):
-    """A TIFF file of 16 x 16 pixels, whose only strip is any bytes."""
+    """Return a TIFF file of 16 x 16 pixels, whose only strip has any bytes."""
     entries = [(256, 3, 16), (257, 3, 16), (258, 3, 8), (259, 3, compression), (262, 3, 1), (273, 4, 0), (277, 3, 1)]
     entries += [(278, 3, 16), (279, 4, len(data))]
     start = 8 + 2 + 12 * len(entries) + 4
@@ -85,7 +85,7 @@ def lzma_of_zeros(size):
 
 
 def other_packing(packing):
-    """An archive that Python would unpack whole, however little of it is asked for."""
+    """Return an archive that Python would expand completely, even for a small request."""
     file = io.BytesIO()
     head = make.npy("{'descr': '|u1', 'fortran_order': False, 'shape': (8192, 8192)}")
     with zipfile.ZipFile(file, "w", packing) as archive, archive.open("image.npy", "w") as member:
@@ -151,7 +151,7 @@ def test_no_reader_takes_much_memory_for_a_small_file(tmp_path):
     rows = [line.split(maxsplit=4)[1:] for line in done.stdout.splitlines() if line.startswith("measured ")]
     assert len(rows) == 11 * len(made)
     assert [row for row in rows if int(row[0]) > MOST] == []
-    # Nothing but headers may be read of them.
+    # Only their headers may be read.
     assert {row[2] for row in rows if row[3] == "read"} <= {"read_headers", "read_notes", "info"}
 
 

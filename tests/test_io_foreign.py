@@ -212,12 +212,12 @@ def test_damaged_grids(tmp_path: Path, name: str, content: bytes, words: str) ->
 
 Z, Y, X = np.mgrid[-6:6, -8:8, -8:8] + 0.5
 WOUND = np.stack([0 * Z, X, -Y], axis=-1)
-"""Around the axis of planes, as (plane, row, column)."""
+"""Rotation around the axis of planes, as (plane, row, column)."""
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".zarr", ".tif", ".nrrd", ".nii", ".vti", "array", "frames.npy"])
 def test_fields_in_files(tmp_path: Path, suffix: str) -> None:
-    """A field of vectors is the same from whatever holds it; what belongs to viewers has its components as x, y, z."""
+    """A field of vectors is the same from every format. Formats of viewers have components x, y, z."""
     path = tmp_path / f"flow{suffix}"
     wanted = fields.from_directions(WOUND.astype(np.float32))
     there = WOUND.astype(np.float32)
@@ -260,7 +260,7 @@ def test_verbs_take_fields_as_people_have_them(tmp_path: Path) -> None:
 
 
 def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
-    """As ParaView keeps vectors of pictures: one plane, three components."""
+    """ParaView stores vectors of images as one plane with three components."""
     flat = np.stack([0 * X[0], X[0], -Y[0]], axis=-1)
     io.write_volume(tmp_path / "flow.vti", np.ascontiguousarray(flat[np.newaxis, ..., ::-1]))
     assert fields.read(tmp_path / "flow.vti", axes=2) == fields.from_directions(flat[..., 1:])

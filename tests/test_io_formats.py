@@ -1,4 +1,4 @@
-"""Formats of other programs, which Pillow and tifffile read: the result is right, or a sentence names what is missing."""
+"""Formats that Pillow and tifffile read: the result is right, or an error names the missing part."""
 
 import struct
 import sys
@@ -67,7 +67,7 @@ def test_compressed_dds(tmp_path, layout):
 
 
 def make_dds(layout, blocks):
-    """A DDS file of 8 x 8 pixels in blocks of 16 bytes."""
+    """Return a DDS file of 8 x 8 pixels in blocks of 16 bytes."""
     head = struct.pack("<7I44x", 124, 0x1007, 8, 8, 0, 0, 0) + struct.pack(
         "<2I4s20x5I", 32, 4, b"DX10", 0x1000, 0, 0, 0, 0
     )
@@ -103,7 +103,7 @@ def test_psd(tmp_path):
     path.write_bytes(make.psd(COLOURS.astype(">u2"), bits=16))
     with pytest.raises(FileError, match="unsupported kind of PSD; save it with 8 bits"):
         tio.read(path)
-    # Photoshop says of a file without compatibility that its flattened picture is none.
+    # In a file without compatibility, Photoshop marks the flattened image as invalid.
     version = b"8BIM" + struct.pack(">HHIIB", 1057, 0, 5, 1, 0) + b"\0"
     path.write_bytes(make.psd(COLOURS, resources=version))
     with pytest.raises(FileError, match="no flattened image; save it with 'maximize compatibility'"):
@@ -163,7 +163,7 @@ def test_gif_is_written_with_up_to_256_colours(tmp_path):
 def test_inks_become_srgb(tmp_path, kind):
     path = tmp_path / "a"
     if kind == "PSD":
-        # PSD holds them inverted.
+        # PSD stores them inverted.
         path.write_bytes(make.psd(255 - INKS, mode=4))
     else:
         options = {"compression": "tiff_lzw"} if kind == "TIFF LZW" else {"quality": 100} if kind == "JPEG" else {}
@@ -177,7 +177,7 @@ def test_inks_become_srgb(tmp_path, kind):
 
 @pytest.mark.parametrize("kind", ["JPEG", "TIFF"])
 def test_inks_are_converted_by_their_profile(tmp_path, kind):
-    """An ink that its profile calls orange is orange, whatever the formula says."""
+    """The profile decides the colour of an ink, not the formula."""
     rng = np.random.default_rng(0)
     corners = np.column_stack([rng.uniform(30, 90, 16), rng.uniform(-40, 40, (16, 2))])
     corners[0], corners[8], corners[15] = (100, 0, 0), (65, 40, 60), (0, 0, 0)
@@ -188,9 +188,9 @@ def test_inks_are_converted_by_their_profile(tmp_path, kind):
     path.write_bytes(make.pillow(inks, kind, mode="CMYK", icc_profile=profile))
     back, notices = read_with_notices(path)
     assert notices.assumed == [f"{path}: CMYK converted to sRGB by its profile"]
-    # CIELAB (65, 40, 60) is this orange; the formula gives cyan.
+    # CIELAB (65, 40, 60) is this orange. The formula gives cyan.
     assert_allclose(back[8, 8].astype(int), (239, 127, 43), atol=6)
-    # The profile of inks is not said of the colours that are written.
+    # The profile of inks is not written with the converted colours.
     assert tio.read_metadata(path).fit(3).profile is None
 
 
@@ -218,7 +218,7 @@ def test_label_volumes_in_lzw(tmp_path, dtype):
 
 
 def encode_lzw(data: bytes) -> bytes:
-    """Codes of TIFF's LZW that say each byte as it is, with a clear code before the table grows."""
+    """Return LZW codes of TIFF for single bytes, with a clear code before the table grows."""
     bits = "".join(f"{code:09b}" for i, byte in enumerate(data) for code in ((256, byte) if i % 200 == 0 else (byte,)))
     bits += f"{257:09b}"
     bits += "0" * (-len(bits) % 8)
@@ -226,7 +226,7 @@ def encode_lzw(data: bytes) -> bytes:
 
 
 def write_lzw(path, image, *, tile=None, planar=False):
-    """Write a TIFF file whose strips or tiles are compressed by LZW, which tifffile alone cannot."""
+    """Write a TIFF file with strips or tiles compressed by LZW, which tifffile alone cannot write."""
     tifffile.imwrite(
         path,
         np.moveaxis(image, -1, 0) if planar else image,
@@ -333,7 +333,7 @@ def test_pages_of_other_sizes_are_reported(tmp_path):
             writer.write(COLOURS, photometric="rgb")
     with pytest.warns(InputWarning, match=r"2 of 3 pages not used: they do not form a stack with the first page"):
         assert_array_equal(tio.read(path), COLOURS)
-    # A thumbnail is the same picture.
+    # A thumbnail is the same image.
     tifffile.imwrite(path, COLOURS, photometric="rgb", metadata=None)
     tifffile.imwrite(path, make.picture((9, 8)), append=True, metadata=None, subfiletype=1)
     assert_array_equal(tio.read(path), COLOURS)
@@ -385,7 +385,7 @@ def test_a_hole_that_is_filled_may_go_to_jpeg(tmp_path, capsys):
     words = [str(tmp_path / "a.png"), str(tmp_path / "hole.png"), "-o", str(tmp_path / "out.jpg")]
     assert main(["inpaint", *words]) == 0
     assert tio.read(tmp_path / "out.jpg").shape == (64, 64, 3)
-    # A design of a picture with holes has holes: it is refused before the work.
+    # A design of an image with holes has holes, so JPEG is refused before the work.
     assert main(["design", str(tmp_path / "a.png"), "-o", str(tmp_path / "no.jpg")]) == 2
     assert "cannot store uint8 with 4 channels" in capsys.readouterr().err
 

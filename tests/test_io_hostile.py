@@ -1,4 +1,4 @@
-"""Whatever a file holds, an array or a sentence comes out, soon, and in little memory."""
+"""Every file gives an array or an error message, soon, and in little memory."""
 
 import os
 import struct
@@ -19,7 +19,7 @@ from texrs.errors import FileError, LimitExceeded, TexrsError
 
 
 def valid_files():
-    """One small file of every kind that is read."""
+    """Return one small file of every readable kind."""
     image = make.picture((24, 20, 3))
     floats = make.picture((24, 20, 3), "float32") + np.float32(2.5)
     files = {
@@ -70,7 +70,7 @@ def test_files_that_are_cut_off(files, name, tmp_path):
     for length in {*np.linspace(1, len(file) - 1, 60).astype(int).tolist(), len(file) - 1}:
         path.write_bytes(file[:length])
         with suppress(FileError):
-            # What is cut off may have been no pixel, but then all of them are there.
+            # The cut part may not have been pixels. Then all of them must be there.
             np.testing.assert_array_equal(tio.read(path), whole, str(length))
 
 
@@ -174,7 +174,7 @@ def test_missing_files_and_folders(tmp_path):
 
 
 def test_a_png_that_unfolds_to_gigabytes(tmp_path):
-    """Two and a half gigapixels in 300 kB are refused in a second and in little memory."""
+    """2.5 gigapixels in 300 kB are refused in a second and in little memory."""
     path = tmp_path / "bomb.png"
     path.write_bytes(make.png_bomb())
     assert path.stat().st_size < 400_000
@@ -216,14 +216,14 @@ def test_other_bombs(tmp_path):
     path.write_bytes(make.png(1, 1, 8, 2, row, [(b"iCCP", profile)]))
     with suppress(LimitExceeded):
         assert tio.read(path).shape == (1, 1, 3)
-    # The archive announces little and unfolds to much.
+    # The archive states a small size and expands to a large one.
     header = make.npy("{'descr': '|u1', 'fortran_order': False, 'shape': (4, 4)}", bytes(10_000_000))
     path.write_bytes(make.npz({"image.npy": header}))
     assert tio.read(path).shape == (4, 4)
 
 
 def test_large_pictures_do_not_warn(tmp_path, monkeypatch):
-    """Pillow's own limit neither warns nor stops what the caller's limit allows."""
+    """Pillow's own limit neither warns about nor stops images within the caller's limit."""
     path = tmp_path / "large.jpg"
     tio.write(path, np.zeros((40, 50), np.uint8))
     monkeypatch.setattr(make.Image, "MAX_IMAGE_PIXELS", 1500)
@@ -236,7 +236,7 @@ def test_large_pictures_do_not_warn(tmp_path, monkeypatch):
 
 
 def test_reading_in_threads(files, tmp_path):
-    """Decoders of many threads neither block nor disturb each other."""
+    """Decoders in many threads neither block nor disturb each other."""
     paths = [tmp_path / name for name in files]
     for path in paths:
         path.write_bytes(files[path.name])
@@ -273,7 +273,7 @@ def test_damaged_stores_and_encodings_are_refused_in_a_sentence(tmp_path):
     data, chain = bytearray(path.read_bytes()), [4]
     while at := int.from_bytes(data[chain[-1] : chain[-1] + 4], "little"):
         chain.append(at + 2 + 12 * int.from_bytes(data[at : at + 2], "little"))
-    # The last page leads to the third, round and round.
+    # The last page leads to the third, in an endless circle.
     data[chain[-1] : chain[-1] + 4] = data[chain[2] : chain[2] + 4]
     path.write_bytes(data)
     with pytest.raises(FileError, match="in a circle"):

@@ -1,4 +1,4 @@
-"""Files take their places whole and for good, and what a process that was killed left of them goes."""
+"""Files are complete and durable when they get their names, and remains of killed processes are removed."""
 
 import os
 import subprocess
@@ -76,7 +76,7 @@ def test_only_what_nobody_is_making_is_swept(tmp_path):
 
 @pytest.fixture
 def steps(monkeypatch):
-    """What is done to files, in order: which bytes are on the disk, and what takes a place."""
+    """Record the operations on files in order: bytes on the disk, and renamings."""
     done = []
     sync, replace = os.fsync, os.replace
 
@@ -96,7 +96,7 @@ def steps(monkeypatch):
 @pytest.mark.skipif(sys.platform != "linux", reason="files are named by their numbers")
 @pytest.mark.parametrize("name", ["a.npy", "a.png", "a.tif"])
 def test_bytes_are_on_the_disk_before_they_have_the_name(tmp_path, steps, name):
-    """What a file system may keep when the power goes is any beginning of this list: the former file, or the new one whole."""
+    """After a power failure, a file system may have any beginning of this list: the former file, or the whole new one."""
     path = tmp_path / name
     for value in (1, 2):
         steps.clear()

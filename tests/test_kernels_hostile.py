@@ -1,4 +1,4 @@
-"""Whatever a public kernel is given, a result or a sentence that names the argument comes out; soon, in little memory."""
+"""Public kernels return a result or an error that names the argument, for any argument, soon and in little memory."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Array: TypeAlias = NDArray[Any]
 Arguments: TypeAlias = dict[str, Any]
 
 MEMORY = 2 << 30
-"""Bytes that the tests of this file may take: what asks for more fails here, and not the machine."""
+"""Bytes that the tests of this file may use. Larger requests fail here, and do not disturb the machine."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -188,11 +188,11 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
 
 
 ALSO = {"seam.OldSeams": ("old",), "sparse.Cholesky.several": ("matrix",)}
-"""How a message names the part of an argument."""
+"""Other names of an argument in messages, for its parts."""
 
 
 def public_calls() -> dict[str, Callable[..., object]]:
-    """Return what the kernels offer to be called, and the dataclasses that are handed to it, by name."""
+    """Return the public functions of the kernels, and the dataclasses that are passed to them, by name."""
     found: dict[str, Callable[..., object]] = {}
     data = {}
     for module in kernels.__all__:
@@ -226,7 +226,7 @@ def test_no_argument_of_a_kernel_is_left_out() -> None:
 
 @st.composite
 def shapes(draw: st.DrawFn, like: tuple[int, ...]) -> tuple[int, ...]:
-    """Draw the shape of an array, or one that differs from it by one step; or any; or more than any memory holds."""
+    """Draw the shape of an array, a shape that differs by one step, any shape, or one larger than any memory."""
     kind = draw(st.sampled_from(("same", "same", "any", "one side", "one axis less", "one axis more", "huge")))
     sides = st.sampled_from((0, 1, 2, 3, 9))
     axis = draw(st.integers(0, max(len(like) - 1, 0)))
@@ -247,7 +247,7 @@ def shapes(draw: st.DrawFn, like: tuple[int, ...]) -> tuple[int, ...]:
 
 @st.composite
 def arrays(draw: st.DrawFn, like: Array) -> Array:
-    """Draw an array that has something of one that is right, and much that is not."""
+    """Draw an array that is partly valid."""
     shape = draw(shapes(like.shape))
     dtype = np.dtype(draw(st.sampled_from((like.dtype.str, like.dtype.str, *DTYPES))))
     value = draw(st.sampled_from((None, *VALUES)))
@@ -270,7 +270,7 @@ def arrays(draw: st.DrawFn, like: Array) -> Array:
 
 
 def hostile(valid: object) -> st.SearchStrategy[object]:
-    """Return a strategy for what may be given in place of a value that is right, or in place of one of its items."""
+    """Return a strategy for replacements of a valid value, or of one of its items."""
     drawn: list[st.SearchStrategy[object]] = [
         st.sampled_from(NUMBERS),
         st.sampled_from(OTHERS),
@@ -312,7 +312,7 @@ def test_a_hostile_argument_gives_a_result_or_is_named(name: str, argument: str,
         call(**given)
     except TexrsError as error:
         said = str(error)
-    # Numbers that are right by themselves may be refused for what does not fit to them.
+    # Numbers that are valid by themselves may be refused because they do not fit the others.
     alone = not isinstance(value, np.ndarray | list | tuple | int | float)
     names = (*((argument,) if alone else arguments), *ALSO.get(name, ()))
     assert not said or any(re.search(rf"\b{n}\b", said) for n in names), said

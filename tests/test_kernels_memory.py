@@ -1,4 +1,4 @@
-"""Where memory ends: each kernel, in processes whose address space may grow by so much, ends by an exception."""
+"""Exhausted memory: each kernel, in processes with a limited address space, ends by an exception."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import sys
 import pytest
 
 MEGABYTES = (1, 8, 32, 96, 256)
-"""What a process may grow by. What a kernel frees does not help it: it is the first that runs in its process."""
+"""Megabytes that a process may grow by.
+
+Memory that a kernel frees does not help it, because it is the first in its process.
+"""
 KERNELS = {
     "poisson": "_rust.poisson(image, (image, image), 0.01, ('free', 'free'), None, None)",
     "poisson in a disc": "_rust.poisson(image, None, 0.01, ('free', 'free'), disc, None)",
@@ -114,7 +117,7 @@ for call in sys.argv[2:]:
 
 def run(calls: dict[str, str], sizes: tuple[int, ...]) -> list[list[str]]:
     plain = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}
-    # What was freed before goes back to the system, and is not there to be taken again.
+    # Freed memory returns to the system, and cannot be used again.
     plain |= {"MALLOC_MMAP_THRESHOLD_": "131072", "MALLOC_TRIM_THRESHOLD_": "131072"}
     given = [" ".join(map(str, sizes)), *(f"{name}|{call}" for name, call in calls.items())]
     ran = subprocess.run([sys.executable, "-c", SCRIPT, *given], env=plain, capture_output=True, text=True, timeout=600)
@@ -128,6 +131,6 @@ def test_kernels_that_find_no_room_say_so():
     assert len(lines) == len(KERNELS) * len(MEGABYTES)
     bad = [line for line in lines if line[2] != "0" or line[3] not in ("done", "LimitExceeded", "MemoryError")]
     assert not bad, bad
-    # Each was refused once, and each had room enough at last.
+    # Each kernel was refused once, and had enough memory in the end.
     assert {line[0] for line in lines if line[3] == "LimitExceeded"} == KERNELS.keys()
     assert {line[0] for line in lines if line[3] == "done"} == KERNELS.keys()

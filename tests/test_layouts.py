@@ -1,4 +1,4 @@
-"""Layouts that are drawn: what they hold, and what is brought into them."""
+"""Drawn layouts: their contents, and elements in them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_an_oblique_lattice_goes_on_as_one(entry: ElementAnalysis) -> None:
     targets = list_matches(made, "target")
     inside = targets[((targets > 20) & (targets < 235)).all(axis=1)]
     index = (inside - inside[0]) @ np.linalg.inv(np.array(OBLIQUE) * 1.4)
-    # Cells end where the picture does, and separate elements make room for each other.
+    # Cells end at the image border, and separate elements keep apart.
     assert np.median(np.abs(index - np.rint(index))) < 0.05
     assert len(inside) >= 0.8 * 215**2 / (1.4**2 * 24 * 18)
 
@@ -75,7 +75,7 @@ def test_points_go_on_as_they_lie_and_are_not_mirrored() -> None:
     low, high = np.full(2, -200.0), np.full(2, 327.0)
     found, how = continue_points(layout, (128, 128), low, high)
     assert how == "quilted"
-    # The picture's own stay, and the rest lies as dense, but where these are no mirror has put any.
+    # The layout's own points stay. The rest has the same density, without mirrored points.
     assert cKDTree(found).query(places)[0].max() == 0
     assert len(found) == pytest.approx(len(places) * (527 / 128) ** 2, rel=0.2)
     apart = cKDTree(found).query(found, k=2)[0][:, 1]
@@ -274,5 +274,5 @@ def test_few_points_are_compared_one_by_one() -> None:
         among[:few] = points
         found = nearest_distances(points, 7, among)
         assert (found == cKDTree(among).query(points, k=[*range(1, 8)])[0]).all()
-    # Fewer than are asked for.
+    # There are fewer than requested.
     assert np.isinf(nearest_distances(points, 7, among[:3])[:, 3:]).all()

@@ -1,4 +1,4 @@
-"""What texrs is built on may be used freely, and what may not be is refused."""
+"""Dependencies of texrs have permitted licences, and others are refused."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def run(*given: str, path: Path | None = None) -> subprocess.CompletedProcess[st
 
 @pytest.fixture
 def free(tmp_path: Path) -> str:
-    """Return the manifest of a crate that needs none."""
+    """Return the manifest of a crate without dependencies."""
     return write_crate(tmp_path / "free", "MIT OR Apache-2.0")
 
 
@@ -35,7 +35,7 @@ def write_crate(folder: Path, licence: str, needs: str = "") -> str:
 
 
 def install(folder: Path, name: str, *about: str) -> Path:
-    """Write what an installed package says of itself."""
+    """Write the metadata of an installed package."""
     (folder / f"{name}-1.0.dist-info").mkdir(parents=True)
     lines = ["Metadata-Version: 2.4", f"Name: {name}", "Version: 1.0", *about]
     (folder / f"{name}-1.0.dist-info/METADATA").write_text("\n".join(lines) + "\n")

@@ -1,4 +1,4 @@
-"""Limits in one place: of a block, of the process, from outside; every verb is held to them before, and while, it works."""
+"""Limits: of a block, of the process, and from the environment. Every verb checks them before and during its work."""
 
 import asyncio
 import contextvars
@@ -76,7 +76,7 @@ def test_the_least_of_what_is_said_holds(monkeypatch):
     assert (limits.current().pixels, limits.current().voxels) == (1_000_000, 5)
     with limits.context(pixels=1000, memory=1e6):
         with limits.context(pixels=5000, seconds=9):
-            # No block allows more than the one around it.
+            # A block allows at most the limits of the block around it.
             assert limits.current().pixels == 1000
             assert limits.current().memory == 1_000_000
             assert 0 < limits.current().seconds <= 9
@@ -85,7 +85,7 @@ def test_the_least_of_what_is_said_holds(monkeypatch):
         assert limits.current().seconds is None
     limits.set(pixels=2**30)
     monkeypatch.delenv("TEXRS_PIXELS")
-    # More than usual can be asked for.
+    # More than the default can be requested.
     assert limits.current().pixels == 2**30
 
 
@@ -163,7 +163,7 @@ def test_more_takes_more():
     assert limits.estimate_memory("tile", np.shape(DOTS)) == limits.estimate_memory(
         "tile", [list(DOTS.shape)], (64, 64)
     )
-    # A picture of 16384 x 16000 is not begun with on a machine of 32 GB.
+    # A machine of 32 GB does not begin with an image of 16384 x 16000.
     assert limits.estimate_memory("perspective", (512, 512, 3), (16384, 16000)) > 32e9
 
 

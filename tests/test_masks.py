@@ -1,4 +1,4 @@
-"""Masks as people have them: layers, noise of JPEG, inverted ones, soft alpha, and pixels without data."""
+"""Masks from users: layers, noise of JPEG, inverted ones, soft alpha, and pixels without data."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_files_are_read_as_arrays_and_give_their_name(tmp_path: Path) -> None:
     marked, said = read(tmp_path / "stroke.png")
     np.testing.assert_array_equal(marked, DISC)
     assert said == ["stroke.png: read as a layer, because its transparency varies; its opaque pixels are marked"]
-    # Any other mask of texrs is read in the same way.
+    # All other masks of texrs are read in the same way.
     np.testing.assert_array_equal(as_mask(tmp_path / "stroke.png", "ground", SIZE), DISC)
     np.testing.assert_array_equal(as_mask(Mask(tmp_path / "stroke.png", invert=True), "ground", SIZE), ~DISC)
     with pytest.raises(InvalidInput, match="ground: cannot have a feather"):
@@ -122,7 +122,7 @@ def test_the_usual_threshold_survives_jpeg(quality: int) -> None:
     marked, said = read(noisy)
     assert said == []
     assert np.count_nonzero(marked != DISC) <= 0.005 * DISC.sum()
-    # The noise itself marks a ring if each pixel counts that is not black.
+    # If every pixel that is not black counted, the noise would mark a ring.
     assert np.count_nonzero((noisy > 0) != DISC) > 0.05 * DISC.sum()
 
 
@@ -220,7 +220,7 @@ def test_a_softly_erased_hole_keeps_nothing_of_the_brush(dtype: type) -> None:
     assert not is_magenta(made.image / full * 255).any()
     assert (made.image[..., 3] == full).all()
     assert made.report["filled"] == (soft[..., 3] < 255).mean()
-    # A threshold keeps what is hardly transparent.
+    # A threshold keeps pixels that are hardly transparent.
     kept = texrs.inpaint((soft / 255 * full).astype(dtype), Mask("alpha", threshold=0.5))
     assert kept.report["filled"] == pytest.approx((alpha <= 0.5).mean(), abs=0.01)
 
@@ -238,14 +238,14 @@ def test_a_feathered_filling_fades_into_the_image() -> None:
     made = texrs.inpaint(base, Mask(WHITE, feather=5))
     wide = widen(DISC, 5)
     assert made.report["filled"] == wide.mean()
-    # The marked area is replaced, what lies beyond the band stays, and the band is between the two.
+    # The marked area is replaced, pixels beyond the band stay, and the band is a mixture.
     composite = made.stages["before_blending"]
     np.testing.assert_array_equal(made.image[DISC], composite[DISC])
     np.testing.assert_array_equal(made.image[~wide], base[~wide])
     weight = np.rint(255 * fade(DISC, 5)) / 255
     expected = np.rint(weight * composite + (1 - weight) * base)
     np.testing.assert_array_equal(made.image[wide & ~DISC], expected[wide & ~DISC])
-    # Other maps fade in the same way; labels do not mix.
+    # Other maps fade in the same way. Labels do not mix.
     np.testing.assert_array_equal(texrs.apply(made.source_map, base), made.image)
     labels = (COLUMNS // 8).astype(np.uint8)
     assert np.isin(texrs.apply(made.source_map, labels, map_type="label"), labels).all()
@@ -359,7 +359,7 @@ def test_a_colour_is_nodata_only_in_all_channels() -> None:
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder with a raster that states where it lies, a picture, and masks."""
+    """Work in a folder with a georeferenced raster, an image, and masks."""
     monkeypatch.chdir(tmp_path)
     raster = HEIGHTS.copy()
     raster[DISC] = -9999
@@ -395,7 +395,7 @@ def test_georeference_that_is_not_written_is_reported(here: Path, capsys: Captur
     assert "heights.tif: its georeference is not written, because only TIFF holds it" in capsys.readouterr().err
     assert main(["inpaint", "heights.tif", "hole.png", "-o", "other.exr", "--strict"]) == 2
     assert not Path("other.exr").exists()
-    # The pixels of other results lie elsewhere.
+    # The pixels of other results have other positions.
     assert main(["design", "in.png", "-o", "new.tif", "-q"]) == 0
     assert read_tags("new.tif") == {}
 
@@ -490,7 +490,7 @@ def test_all_masks_of_commands_are_read_alike(here: Path, capsys: Capture, comma
 
 
 def test_warnings_of_python_are_only_of_what_is_not_used() -> None:
-    """What is assumed is in the report alone."""
+    """Assumptions are only in the report."""
     import warnings
 
     with warnings.catch_warnings():
@@ -499,7 +499,7 @@ def test_warnings_of_python_are_only_of_what_is_not_used() -> None:
 
 
 def test_words_after_a_name_say_how_a_mask_is_read(here: Path, capsys: Capture) -> None:
-    """Commands take several masks, so the words belong to one of them, and `texrs rerun` finds the file."""
+    """Commands have several masks, so the words belong to one of them, and `texrs rerun` finds the file."""
     seen = np.full(BRICKS.shape[:2], 255, np.uint8)
     seen[:12] = 0
     io.write("seen.png", seen)

@@ -1,4 +1,4 @@
-"""Materials: roles by name, what is decided on, and every map through one source map in every verb."""
+"""Materials: roles by name, maps used for decisions, and every map through one source map in every verb."""
 
 import warnings
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from texrs.materials import Map, Role, guess_role
 
 
 def make(shape: tuple[int, int] = (64, 80), seed: int = 0) -> Material:
-    """Return a material of all dtypes whose last map says where each pixel is."""
+    """Return a material of all dtypes. Its last map contains the coordinates of each pixel."""
     sample = samples.load("pebbles", size=shape, seed=seed)
     height = sample.image[..., 1].astype(np.float32) / 255
     down, right = np.gradient(height * 8)
@@ -82,7 +82,7 @@ def test_maps_stay_in_register_exactly() -> None:
     whole = (result.source_map.coordinates == np.rint(result.source_map.coordinates)).all(axis=-1)
     assert whole.any()
     assert (place[whole] == result.source_map.coordinates[whole]).all()
-    # Labels are never mixed: each is the one of the nearest pixel.
+    # Labels are never mixed: each is the label of the nearest pixel.
     row, column = np.floor(result.source_map.coordinates + np.float32(0.5)).astype(int).reshape(-1, 2).T
     row, column = np.clip(row, 0, 63), np.clip(column, 0, 79)
     assert (labels.ravel() == STONES["labels"].pixels[row, column]).all()
@@ -94,7 +94,7 @@ def test_normals_turn_and_keep_their_length(plan: Literal["still", "move"], most
     assert made is not None
     vectors = made["normal"].pixels.astype(np.float64) / 65535 * 2 - 1
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=-1), 1, atol=2e-3)
-    # They still are those of the heights, where nothing meets: both were mirrored and turned.
+    # They are still the normals of the heights away from seams, because both were mirrored and rotated.
     down, right = np.gradient(made["height"].pixels * 8)
     expected = np.stack([-right, down, np.ones_like(down)], axis=-1)
     expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
@@ -110,7 +110,7 @@ def test_a_single_map_is_decided_on_as_a_picture() -> None:
 
 
 def test_elements_are_those_of_the_colours_where_these_tell_surely() -> None:
-    """What decides where patches fit may show the joints between things more than the things."""
+    """The map that decides on fits of patches may show joints better than elements."""
     sample = texrs.samples.dots((96, 96))
     random = np.random.default_rng(3)
     noise = random.random((96, 96, 3), np.float32)
@@ -141,7 +141,7 @@ def test_several_materials_are_mixed() -> None:
 
 
 def test_what_the_albedo_hides_is_decided_on() -> None:
-    """Grey stones that only their normals show: decisions differ from those on the grey alone."""
+    """Only normals show these grey stones, so decisions differ from those on the grey alone."""
     grey = np.full((64, 80, 3), 128, np.uint8)
     guide = Material({"albedo": grey, "normal": STONES["normal"].pixels}).guide
     assert guide.shape[-1] in (1, 3)
@@ -254,9 +254,9 @@ def test_vectors_turn_with_what_they_lie_on() -> None:
     quarter = np.array([[0, 1], [-1, 0]], np.float32)  # A step down shows one to the left.
     turned = texrs.SourceMap(source.coordinates, source.exemplar, source.label, quarter[np.newaxis], source.shapes)
     flow = np.zeros((8, 8, 2), np.float32)
-    flow[..., 0] = -1  # Left, of signed values.
+    flow[..., 0] = -1  # Left, as signed values.
     made = Material({"flow": flow}).apply(turned)["flow"].pixels
-    np.testing.assert_allclose(made[4, 4], [0, -1], atol=1e-6)  # Down, where y grows up.
+    np.testing.assert_allclose(made[4, 4], [0, -1], atol=1e-6)  # Down, where y points up.
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert (Material({"flow": flow}).apply(source)["flow"].pixels == flow).all()
@@ -276,7 +276,7 @@ def test_maps_say_what_they_are() -> None:
 
 
 def test_heights_of_any_range_are_told_apart() -> None:
-    """Two heights may differ by more than single precision can be; what they tell is what their halves tell."""
+    """The difference of two heights may exceed single precision. Their halves give the same information."""
     heights = np.linspace(-1, 1, 96, dtype=np.float32).reshape(8, 12) * np.float32(3e38)
     (wide,), (narrow,) = (Material({"height": h}).features() for h in (heights, heights / 4))
     assert np.isfinite(wide).all()

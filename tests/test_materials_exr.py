@@ -1,4 +1,4 @@
-"""Materials in one EXR file: what comes back, what other programs find in it, and what theirs are read as."""
+"""Materials in one EXR file: read back, read by other programs, and files of other programs."""
 
 from pathlib import Path
 from typing import Any
@@ -140,7 +140,7 @@ def test_files_of_other_programs_are_read_by_names(tmp_path: Path) -> None:
     assert {name: each.role for name, each in back.items()} == {"Color": Role.COLOUR, "Normal": Role.NORMAL}
     assert (back["Color"].pixels == np.stack(list(colours.values()), axis=-1)).all()
     assert (back["Normal"].pixels[..., 2] == one + 2).all()
-    # Without a layer it is a picture; parts are layers.
+    # A part without a layer is an image; other parts are layers.
     parts = [({"name": "colour"}, colours), ({"name": "height"}, {"Z": one.astype(np.float16)})]
     back = Material.read(write(tmp_path / "b.exr", parts))
     assert back["height"].pixels.dtype == np.float16
@@ -154,7 +154,7 @@ def test_files_of_other_programs_are_read_by_names(tmp_path: Path) -> None:
 
 
 def write_render(path: Path) -> Path:
-    """Write what Blender writes: all layers begin with the name of the view layer."""
+    """Write a file like Blender: all layers begin with the name of the view layer."""
     one = draw("float32")
     passes = {"Combined": "RGBA", "Depth": "Z", "Normal": "XYZ", "DiffCol": "RGB", "Mist": "Z", "IndexOB": "X"}
     passes |= {"Vector": "XYZW", "UV": "UVA", "CryptoObject00": "rgba", "Puddles": "RGB"}
@@ -204,7 +204,7 @@ def test_a_sky_at_infinity_is_reported(tmp_path: Path) -> None:
 
 
 def test_channels_beside_a_picture_are_no_part_of_it(tmp_path: Path) -> None:
-    """A depth beside R, G and B is not their transparency, and a picture says that it is not used."""
+    """A depth next to R, G and B is not transparency, and reading an image reports that it is not used."""
     one = draw("float32")
     path = write(tmp_path / "a.exr", [({}, {"R": one, "G": one, "B": one, "Z": one})])
     back = Material.read(path)
@@ -267,7 +267,7 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
         Material.read(path, axes=3)
     with pytest.raises(InvalidInput, match="must not be a volume"):
         Material({"albedo": np.zeros((4, 4, 4), np.uint8)}, axes=3).save_exr(tmp_path / "b.exr")
-    # What the header says may be nonsense.
+    # The header may contain nonsense.
     one = draw("float32")
     for words in ("{", "[]", '{"maps": {"height": {"role": "height", "space": "srgb", "dtype": "O", "channels": 0}}}'):
         write(tmp_path / "words.exr", [({"texrs": words}, {"height.Y": one})])
@@ -275,7 +275,7 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
 
 
 def draw_leaf(dtype: str, *, clear: bool) -> Array:
-    """Return linear colours with alpha: 0 in some pixels if they may be clear."""
+    """Return linear colours with alpha, optionally 0 in some pixels."""
     pixels = np.dstack([RANDOM.uniform(0.1, 1, (*SHAPE, 3)), RANDOM.uniform(0.05, 1, SHAPE)])
     if clear:
         pixels[:5] = 0
@@ -303,7 +303,7 @@ def test_colours_are_multiplied_by_alpha_in_files(clear: bool, tmp_path: Path) -
     assert (
         "albedo.exr: colours are divided by alpha, because EXR files have them multiplied by it" in back.notices.assumed
     )
-    # A file of another program, with and without clear pixels.
+    # Read a file of another program, with and without clear pixels.
     other = {f"L.Color.{letter}": channels[f"albedo.{letter}"] for letter in "RGBA"}
     foreign = Material.read(write(tmp_path / "b.exr", [({}, other)]))
     np.testing.assert_allclose(foreign["L.Color"].pixels, leaf, atol=1e-6)
@@ -323,7 +323,7 @@ def test_colours_under_no_alpha_are_reported(tmp_path: Path) -> None:
 def test_a_picture_with_alpha_changes_between_exr_and_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """EXR to EXR keeps the values, and other formats have colours that are not multiplied."""
+    """EXR to EXR keeps the values. Other formats contain colours that are not multiplied."""
     leaf = draw_leaf("float32", clear=False)
     bound = np.dstack([leaf[..., :3] * leaf[..., 3:], leaf[..., 3]])
     write(tmp_path / "in.exr", [({}, {letter: bound[..., k].copy() for k, letter in enumerate("RGBA")})])
@@ -344,7 +344,7 @@ def test_a_picture_with_alpha_changes_between_exr_and_others(
 
 
 def test_layers_keep_their_names(tmp_path: Path) -> None:
-    """A picture without a layer stays the picture that other programs show, and Blender finds its layers again."""
+    """An image without a layer stays the image that other programs show, and Blender finds its layers again."""
     one = RANDOM.uniform(0, 1, SHAPE).astype(np.float32)
     names = [
         "R",

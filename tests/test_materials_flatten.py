@@ -1,4 +1,4 @@
-"""Even light: what varies over large parts goes, what is smaller stays, and borders that meet still do."""
+"""Even light: large variations are removed, small ones stay, and matching borders still match."""
 
 import dataclasses
 from typing import Any
@@ -21,7 +21,7 @@ BAND = (1 + 0.25 * np.sin(2 * np.pi * ROW / ROWS))[..., np.newaxis]
 
 
 def vary(image: Array, wrap: bool = False) -> float:
-    """Return by how much parts of a sixth of the sides differ, of the mean."""
+    """Return the variation of parts of 1/6 of the sides, relative to the mean."""
     blocks = image.astype(float).mean(axis=-1).reshape(6, ROWS // 6, 8, COLUMNS // 8).mean(axis=(1, 3))
     return float(blocks.std() / blocks.mean())
 
@@ -36,7 +36,7 @@ def test_light_is_evened_and_the_rest_stays(light: Array, wrap: bool, dtype: str
     assert (even.dtype, even.shape) == (lit.dtype, lit.shape)
     assert vary(lit) > 0.1
     assert vary(even) < vary(lit) / 6
-    # Grain is as strong as it was, in even light.
+    # Grain has the same strength as in even light.
     assert 0.85 < even.std() / (GRAIN * most).std() < 1.2
     half = vary(flatten_lighting(lit, 0.5, wrap=wrap, space="srgb"))
     assert vary(even) + 0.02 < half < vary(lit) - 0.02
@@ -44,7 +44,7 @@ def test_light_is_evened_and_the_rest_stays(light: Array, wrap: bool, dtype: str
 
 
 def test_more_flowers_are_no_more_light() -> None:
-    """White spots stand closer on one side; all are as bright as before, and so is what lies between."""
+    """White spots are denser on one side. All keep their brightness, and so does the background."""
     picture = np.full((ROWS, COLUMNS, 3), (40, 70, 30), np.uint8)
     for row in range(5, ROWS, 12):
         for column in range(4, COLUMNS, 8 if row < ROWS // 2 else 32):
@@ -52,7 +52,7 @@ def test_more_flowers_are_no_more_light() -> None:
     spots = picture[..., 0] > 100
     even = flatten_lighting(picture).astype(float)
     assert np.abs(even - picture).max() < 12
-    # In uneven light they become alike.
+    # They become equal under uneven light.
     lit = (picture * (0.6 + 0.35 * COLUMN / COLUMNS)[..., np.newaxis]).astype(np.uint8)
     better = flatten_lighting(lit).astype(float)
     assert better[spots].std() / better[spots].mean() < 0.35 * lit[spots].std() / lit[spots].mean()
@@ -60,10 +60,10 @@ def test_more_flowers_are_no_more_light() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_differs_by_chance_alone_stays(seed: int) -> None:
-    """Flowers are scattered, so that there are more of them here and there; nothing says that it is light."""
+    """Scattered flowers are denser in some places by chance, which is not evidence of light."""
     meadow = texrs.samples.leaves_and_flowers((256, 256), seed=seed).image
     assert (flatten_lighting(meadow) == meadow).all()
-    # Of what they are lit by, most goes.
+    # Most of the added light is removed.
     light = np.exp(0.8 * (np.arange(256) / 256 - 1))[:, np.newaxis]
     lit = np.maximum(meadow * light / 255, 1e-3)
     left = np.log(flatten_lighting(lit, space="srgb") / lit) + np.log(light)
@@ -71,7 +71,7 @@ def test_what_differs_by_chance_alone_stays(seed: int) -> None:
 
 
 def test_a_tile_is_in_even_light() -> None:
-    """Copies of what is lighter at one end show bands; those of a tile in even light do not."""
+    """Copies of an image with one lighter end show bands. Copies of an evenly lit tile do not."""
     lit = (GRAIN * RAMP).astype(np.uint8)
     as_it_is, even = texrs.tile(lit, size=(ROWS, COLUMNS)), texrs.tile(lit, size=(ROWS, COLUMNS), flatten_lighting=True)
     assert vary(as_it_is.image) > 4 * vary(even.image)
@@ -120,7 +120,7 @@ def test_linear_light_is_the_same_picture() -> None:
 @pytest.mark.parametrize("space", ["srgb", "linear"])
 @pytest.mark.parametrize("highest", [1.0, 65504.0, 1e15])
 def test_no_light_is_endless(dtype: str, space: Any, highest: float) -> None:
-    """Lamps, as bright as the dtype allows, become no brighter than that."""
+    """Lamps with the maximum of the dtype do not become brighter."""
     kind = np.dtype(dtype)
     lit = (GRAIN / 200 * RAMP**2).astype(kind)
     lit[::9, ::11] = min(highest, float(np.finfo(kind).max))

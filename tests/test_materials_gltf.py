@@ -1,4 +1,4 @@
-"""Materials as glTF: by the rules of the standard, as other libraries read it, and what pictures mean."""
+"""Materials as glTF: the rules of the standard, reading by other libraries, and the meaning of images."""
 
 import json
 import struct
@@ -45,7 +45,7 @@ FULL = Material(
 
 
 def read(path: Path) -> tuple[dict[str, Any], list[bytes], dict[str, Array]]:
-    """Return the document, its buffers and its pictures, and check what the standard asks of files."""
+    """Return the document, its buffers and its images, and check the standard's requirements for files."""
     if path.suffix == ".glb":
         data = path.read_bytes()
         magic, version, length = struct.unpack("<4sII", data[:12])
@@ -81,7 +81,7 @@ def take(document: dict[str, Any], buffers: list[bytes], number: int) -> bytes:
 
 
 def check_rules(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Check a file by the rules of the Khronos validator that say ERROR, and return what it holds."""
+    """Check a file by all rules of severity ERROR of the Khronos validator, and return its contents."""
     document, buffers, pictures = read(path)
     assert document["asset"]["version"] == "2.0"
     assert set(document.get("extensionsUsed", [])) == set(document["materials"][0].get("extensions", {}))
@@ -153,11 +153,11 @@ def test_files_obey_the_standard_and_hold_the_maps(suffix: str, tmp_path: Path) 
     packed = pictures["orm"]
     assert (packed == np.dstack([GREYS, STONES[..., 1], 255 * (STONES[..., 2] > 128)])).all()
     assert material["occlusionTexture"] == material["pbrMetallicRoughness"]["metallicRoughnessTexture"]
-    # Green is turned; the rest are the normals, of unit length.
+    # Green is inverted. The rest are the normals, with unit length.
     expected = FULL["normal_dx"].pixels.copy()
     expected[..., 1] = 255 - expected[..., 1]
     assert np.abs(pictures["normal"].astype(int) - expected).max() <= 1
-    # Brighter than white: a strength beside a picture.
+    # Values above white become a strength next to the image.
     strength = material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"]
     assert strength == FULL["emission"].pixels.max()
     light = np.where(pictures["emission"] > 10, ((pictures["emission"] / 255 + 0.055) / 1.055) ** 2.4, 0) * strength
@@ -206,11 +206,11 @@ def test_tangents_are_how_pictures_lie(make: Any) -> None:
     def cosines(u: Array, v: Array) -> Array:
         return (u * v).sum(axis=1) / np.linalg.norm(u, axis=1) / np.linalg.norm(v, axis=1)
 
-    # Between the poles, where a triangle's sides mean something.
+    # Between the poles, a triangle's sides are meaningful.
     middle = np.abs(corners[..., 1]).max(axis=1) < 0.95 if make is make_sphere else slice(None)
     assert (cosines(along, tangents[:, :3])[middle] > 0.99).all()
     assert (cosines(-down, up)[middle] > 0.99).all()
-    # Pictures meet where the sphere closes, and are about as wide as they are.
+    # Images meet where the sphere closes, and are about as wide as high.
     if make is make_sphere:
         assert mesh.places[:, 0].max() == 3
         ratio = np.linalg.norm(along, axis=1)[middle] / np.linalg.norm(down, axis=1)[middle]
@@ -233,7 +233,7 @@ def test_what_is_not_there_is_not_written(tmp_path: Path) -> None:
         assert "alphaMode" not in material
         assert ("occlusionTexture" in material) == ("orm" in names)
     assert list(tmp_path.iterdir()) == [tmp_path / "a.glb"]
-    # Metal is 0 where roughness alone is known.
+    # Metal is 0 if only roughness is known.
     assert (pictures["roughness_metallic"][..., 2] == 0).all()
     soft = np.dstack([STONES, GREYS])
     document, _ = check_rules(Material({"albedo": soft}).save_gltf(tmp_path / "a.glb", shapes=["sphere"])[0])

@@ -1,4 +1,4 @@
-"""Materials as MaterialX documents: valid by the package's own check, made into shaders, and with the right maps."""
+"""Materials as MaterialX documents: valid by the package's own check, compiled to shaders, and with the right maps."""
 
 from pathlib import Path
 from typing import Any
@@ -23,10 +23,10 @@ MaterialX.loadLibraries(MaterialX.getDefaultDataLibraryFolders(), MaterialX.getD
 
 
 def check(path: Path) -> tuple[dict[str, Any], dict[str, Path]]:
-    """Return the inputs of the surface and the files of its images, of a document that is valid and makes a shader."""
+    """Return the inputs of the surface and the files of its images, for a valid document that compiles to a shader."""
     document = MaterialX.createDocument()
     MaterialX.readFromXmlFile(document, str(path))
-    # With the library, the graphs of the library are the document's too.
+    # With the library imported, its graphs also belong to the document.
     graphs = document.getNodeGraphs()
     document.setDataLibrary(LIBRARY)
     valid, message = document.validate()
@@ -51,7 +51,7 @@ def check(path: Path) -> tuple[dict[str, Any], dict[str, Path]]:
         assert wanted is not None, f"{given.getName()}: no such input"
         assert wanted.getType() == given.getType()
         assert given.getValueString() or given.getConnectedOutput() is not None
-    # What cannot be connected would fail here.
+    # Inputs that cannot be connected would fail here.
     generator = PyMaterialXGenGlsl.GlslShaderGenerator.create()
     context = PyMaterialXGenShader.GenContext(generator)
     context.registerSourceCodeSearchPath(MaterialX.getDefaultDataSearchPath())

@@ -1,4 +1,4 @@
-"""Materials under a light: which side of a bump is bright, what each map does, and how large the picture is."""
+"""Lit materials: the bright side of a bump, the effect of each map, and the size of the image."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ GREY = np.full((ROWS, COLUMNS, 3), 128, np.uint8)
 
 
 def make_bump() -> tuple[Array, Array]:
-    """Return the heights of a bump, and its normals as 16-bit values whose green grows upwards."""
+    """Return the heights of a bump, and its normals as 16-bit values with y up."""
     down, right = np.indices((ROWS, COLUMNS)) - np.array([ROWS / 2, COLUMNS / 2])[:, None, None] + 0.5
     height = 12 * np.exp(-(down**2 + right**2) / 128)
     normal = np.stack([height * right / 64, -height * down / 64, np.ones_like(height)], axis=-1)
@@ -90,11 +90,11 @@ def test_every_map_counts() -> None:
     shown = shine(plain)
     assert (shine({**plain, "ao": none}) < shown).mean() > 0.95
     assert (shine({**plain, "ao": full}) == shown).all()
-    # What is smooth has a small, bright highlight where it is inclined by half the light's angle.
+    # Smooth materials have a small, bright highlight where they are inclined by half the light's angle.
     smooth, rough = (shine({**plain, "roughness": np.full_like(none, r)}) for r in (50, 255))
     assert smooth.max() > rough.max() + 15
     assert np.median(np.abs(smooth - rough)) < 15
-    # Metal mirrors what is around, and so is darker where that is dark.
+    # Metal mirrors its surroundings, so it is darker where they are dark.
     assert (
         shine({**plain, "metallic": full, "roughness": np.full_like(none, 60)})[0, 0].mean() < shown[0, 0].mean() - 20
     )
@@ -127,7 +127,7 @@ def test_tiles_and_sizes() -> None:
     assert four.shape == (2 * ROWS, 2 * COLUMNS, 3)
     assert (four == np.tile(one, (2, 2, 1))).all()
     assert shine(maps, tiles=(1, 3), side=96).shape == (24, 96, 3)
-    # Averages are those of light.
+    # Averages are averages of light.
     half = shine({"albedo": np.indices((32, 32)).sum(axis=0).astype(np.uint8) % 2 * 188}, side=16)
     even = shine({"albedo": np.full((4, 4), 137, np.uint8)})
     assert np.abs(half - even[0, 0]).max() <= 2

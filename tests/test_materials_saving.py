@@ -1,4 +1,4 @@
-"""Materials in folders: packed and unpacked, and with mipmaps that stay what their maps are for."""
+"""Materials in folders: packed and unpacked, and with mipmaps that keep the meaning of their maps."""
 
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ def test_three_maps_are_packed_and_come_back(tmp_path: Path) -> None:
     back = Material.read(tmp_path / "packed")
     assert back["orm"].role is Role.ORM
     assert (back["orm"].pixels == STONES).all()
-    # As the input had it, unless something else is asked for.
+    # The result has the packing of the input, unless another one is requested.
     assert {p.name for p in back.save(tmp_path / "same")} == {"albedo.png", "orm.png", "height.png"}
     assert {p.name for p in back.save(tmp_path / "orm", pack="orm")} == {"albedo.png", "orm.png", "height.png"}
     paths = back.save(tmp_path / "three", pack="none")
@@ -60,10 +60,10 @@ def test_what_is_missing_is_usual_and_the_deepest_counts(tmp_path: Path) -> None
             axis=-1,
         )
         np.testing.assert_allclose(packed / most, expected, atol=1e-3)
-    # Nothing to pack, or to unpack: nothing changes.
+    # There is nothing to pack or to unpack, so nothing changes.
     assert [p.name for p in Material({"albedo": STONES}).save(tmp_path, pack="orm")] == ["albedo.png"]
     assert [p.name for p in Material({"albedo": STONES}).save(tmp_path, pack="none")] == ["albedo.png"]
-    # A map by itself counts before the packed one.
+    # A separate map takes precedence over the packed one.
     both = Material({"arm": STONES, "rough": GREYS})
     assert {p.name for p in both.save(tmp_path / "b", pack="none")} == {"ao.png", "rough.png", "metallic.png"}
     assert (io.read(tmp_path / "b" / "rough.png") == GREYS).all()
@@ -94,13 +94,13 @@ def test_colours_are_averaged_as_light() -> None:
     floats = (black_white / 255).astype(np.float32)
     np.testing.assert_allclose(levels(floats, "colour")[0], 0.5, atol=1e-6)
     np.testing.assert_allclose(levels(floats, "colour", spaces={"map": "srgb"})[0], 188 / 255, atol=2e-3)
-    # Against slow means of areas, also where sides are odd.
+    # Compare with slow means of areas, also for odd sides.
     first, second = levels(STONES[:40, :48], "colour")[:2]
     light = decode_srgb(STONES[:40, :48] / np.float32(255)).astype(float)
     for made, side in ((first, 2), (second, 4)):
         expected = light.reshape(40 // side, side, 48 // side, side, 3).mean(axis=(1, 3))
         np.testing.assert_allclose(decode_srgb(made / np.float32(255)), expected, atol=5e-3)
-    # Bright floats and doubles are what they are.
+    # Bright floats and doubles keep their values.
     assert levels(np.full((4, 4, 3), 7.5, np.float32), "emission")[1].tolist() == [[[7.5] * 3]]
     assert levels(np.full((4, 4), 1e200), "other")[1].tolist() == [[1e200]]
 

@@ -1,4 +1,4 @@
-"""How much memory there is, as the machine, its containers and limits say; asked before it is taken."""
+"""Available memory, according to the machine, its containers and limits, checked before it is allocated."""
 
 import subprocess
 import sys

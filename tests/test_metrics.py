@@ -1,4 +1,4 @@
-"""The judge against pictures whose order is known: real over made, whole over torn, crisp over fogged, varied over repeated."""
+"""Quality measures on images with a known order: real, whole, crisp and varied over made, torn, blurred and repeated."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def picture(name):
 
 
 def paste(source, mask, shift):
-    """Show other places of the exemplar where a mask is set."""
+    """Show other places of the exemplar in a mask."""
     there = source.coordinates + np.float32(shift)
     inside = ((there >= 0) & (there <= np.array(source.shapes[0]) - 1)).all(axis=-1) & mask
     coordinates = np.where(inside[..., np.newaxis], there, source.coordinates)
@@ -38,7 +38,7 @@ def paste(source, mask, shift):
 
 
 def scramble(shape, seed, side=32):
-    """Return blocks from anywhere, side by side."""
+    """Return random blocks, side by side."""
     rng, made = np.random.default_rng(seed), SourceMap.identity(shape)
     for row in range(0, shape[0], side):
         for column in range(0, shape[1], side):
@@ -76,7 +76,7 @@ def test_results_are_ranked_over_blocks_from_anywhere(name):
 @pytest.mark.parametrize("name", ["pebbles", "beans", "dots"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_things_laid_whole_are_ranked_over_torn_ones(name, seed):
-    """The same holes are cut twice: along what is laid there, and across it."""
+    """The same holes are cut twice: along the new elements, and across them."""
     sample = samples.load(name, size=(160, 160))
     rng = np.random.default_rng(seed)
     boxes = ndimage.find_objects(sample.labels)
@@ -144,7 +144,7 @@ def test_what_stands_out_counts_for_more():
 
 
 def test_frames_are_heeded_where_a_picture_is_mirrored():
-    """A mirrored copy of the whole has no seam at all, and its lines run on."""
+    """A mirrored copy of the whole has no seam at all, and its lines continue."""
     image = picture("leaves_and_flowers")
     grid = np.indices((160, 160)).transpose(1, 2, 0).astype(np.float32)
     grid[..., 1] = 159 - grid[..., 1]

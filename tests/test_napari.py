@@ -1,4 +1,4 @@
-"""The plugin of napari, by npe2's own harness: each kind of file opens as the layers that are in it."""
+"""The plugin of napari, tested by npe2's harness: each kind of file opens as its layers."""
 
 import tomllib
 import warnings
@@ -16,7 +16,7 @@ from texrs import _napari, elements, io, samples
 from texrs.errors import FileError
 
 with warnings.catch_warnings():
-    # It is behind the newest pydantic.
+    # npe2 lags behind the newest pydantic.
     warnings.simplefilter("ignore")
     npe2 = pytest.importorskip("npe2")
     from npe2 import _pytest_plugin as harness
@@ -30,7 +30,7 @@ WEAVE = samples.weave((48, 64)).image
 
 @pytest.fixture
 def manager() -> Iterator[Any]:
-    """Yield npe2's own manager for tests, which knows this plugin alone."""
+    """Yield npe2's manager for tests, with only this plugin."""
     plugins = harness.TestPluginManager()
     with patch("npe2.PluginManager.instance", return_value=plugins), plugins.tmp_plugin(manifest=str(MANIFEST)):
         yield plugins

@@ -1,4 +1,4 @@
-"""Normalised cross-correlation against its slow twin; flat parts; bad arguments; threads."""
+"""Normalised cross-correlation compared with its slow twin; flat parts; bad arguments; threads."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What files say beside their values: profiles, densities, how they were made."""
+"""Metadata of files: profiles, densities, records of their creation."""
 
 import io as streams
 import struct
@@ -124,7 +124,7 @@ def test_what_other_writers_say_is_read(tmp_path: Path) -> None:
         found = io.read_metadata(path)
         assert found.profile == PROFILE, suffix
         if more:
-            # The picture is turned upright when it is read, and its density with it.
+            # Reading turns the image upright, together with its density.
             assert found.density == pytest.approx((72 / 0.0254, 144 / 0.0254), rel=1e-3), suffix
     chunks = b"gAMA" + struct.pack(">I", 100_000), b"sRGB\0"
     plain = streams.BytesIO()

@@ -1,4 +1,4 @@
-"""Notices: each is given once, shown or warned of, raised if strict, and kept in reports."""
+"""Notices: each is given once, shown or warned about, raised if strict, and stored in reports."""
 
 import json
 

@@ -70,7 +70,7 @@ def test_no_voxel_is_smaller_than_a_texel_by_default(
 
 
 def test_nothing_is_seen_where_pieces_meet(baked: texrs.painting.TexturedMesh) -> None:
-    """A point on the edge of two pieces has nearly the same colour in both, with what a viewer mixes."""
+    """A point on the edge of two pieces has nearly the same colour in both, also after a viewer's interpolation."""
     from scipy.ndimage import map_coordinates
 
     uv, image = baked.uv, baked.maps["image"].astype(float)
@@ -93,7 +93,7 @@ def test_files_go_around(baked: texrs.painting.TexturedMesh, tmp_path: Path) -> 
     there = trimesh.load(tmp_path / "ball.glb", force="mesh", process=False)
     assert np.allclose(there.visual.uv, baked.uv, atol=1e-5)
     assert np.array_equal(np.asarray(there.visual.material.baseColorTexture)[..., :3], baked.maps["image"])
-    again = texture_mesh(tmp_path / "ball.glb", TEXTURE, scale=1.0, atlas=64)  # Its own atlas is kept.
+    again = texture_mesh(tmp_path / "ball.glb", TEXTURE, scale=1.0, atlas=64)  # It keeps its own atlas.
     assert np.allclose(again.uv, baked.uv, atol=1e-5)
 
 
@@ -108,12 +108,12 @@ def test_materials_and_depth() -> None:
 
 
 def test_heights_lean_as_they_do_on_the_surface(tmp_path: Path) -> None:
-    """A ramp along x over a square: its normals lean to the left all over, and the file has them, in 16 bit."""
+    """A ramp along x over a square: its normals lean to the left everywhere, also in the 16-bit file."""
     pytest.importorskip("xatlas")
     corners = np.array([[0, 0, 0], [8, 0, 0], [8, 8, 0], [0, 8, 0]], float)
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     points, there = bake_points(corners, faces, corners[:, :2] / 8, 32, 2)
-    steep = np.arctan(0.4 * np.sqrt(2))  # Of both components together the slope is 0.4.
+    steep = np.arctan(0.4 * np.sqrt(2))  # Both components together have a slope of 0.4.
     normal = lean(points[..., 0].astype(np.float32), points, there, there)
     assert np.allclose(normal, [-np.sin(steep), 0, np.cos(steep)], atol=1e-5)
     normal = lean(points[..., 1].astype(np.float32), points, there, there)
@@ -130,28 +130,28 @@ def test_heights_lean_as_they_do_on_the_surface(tmp_path: Path) -> None:
     for image in said["images"]:
         view = said["bufferViews"][image["bufferView"]]
         picture = data[start + view["byteOffset"] :][: view["byteLength"]]
-        assert picture[24] == 16  # Bits of a sample, in the header of PNG.
+        assert picture[24] == 16  # Bits of a sample, in the PNG header.
     attributes = said["meshes"][0]["primitives"][0]["attributes"]
     assert set(attributes) == {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0"}
 
 
 def carved(vectors: np.ndarray, role: str = "normal", **options: object) -> texrs.SolidTexture:
-    """A texture of a material whose normals are the same everywhere."""
+    """Return a texture of a material with the same normals everywhere."""
     normals = np.broadcast_to(np.float32(vectors), (24, 24, 24, 3)).copy()
-    normals[0, 0, 0] = -normals[0, 0, 0]  # Some are negative, so that they are numbers as they are.
+    normals[0, 0, 0] = -normals[0, 0, 0]  # Some are negative, so they are not encoded.
     return texrs.SolidTexture(texrs.Material({"albedo": STRIPES, "n": normals}, roles={"n": role}, axes=3), **options)
 
 
 SQUARE = np.array([[2, 2, 4], [9, 2, 4], [9, 9, 4], [2, 9, 4]], float)
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
-TURNED = np.array([[0, 1], [0, 0], [1, 0], [1, 1]], float)  # Columns of the atlas go along y, its rows up along -x.
+TURNED = np.array([[0, 1], [0, 0], [1, 0], [1, 1]], float)  # Columns of the atlas go along y, and its rows up along -x.
 
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(
     ("vector", "role", "wanted"),
     [
-        # The rows of the texture go along the mesh's y, and the y of normals against them.
+        # The rows of the texture go along the mesh's y, and the y of normals in the opposite direction.
         ((0.6, 0, 0.8), "normal", (0.6, 0, 0.8)),
         ((0, 0.6, 0.8), "normal", (0, -0.6, 0.8)),
         ((0, 0.6, 0.8), "normal-dx", (0, 0.6, 0.8)),
@@ -167,7 +167,7 @@ def test_normals_of_space_lean_on_a_plane_as_they_do_in_the_texture(vector, role
 
 
 def test_normals_of_space_tilt_a_ball_by_what_lies_in_its_surface(baked: texrs.painting.TexturedMesh) -> None:
-    """Of a relief that rises along x the part in the surface counts; the bytes of a viewer give that normal back."""
+    """Only the part of a relief along x that is in the surface counts. A viewer's bytes return this normal."""
     from texrs.painting._relief import bake_frames
 
     flat = texture_mesh(BALL, carved((0, 0, 1)), scale=1.0, atlas=128).relief
@@ -197,7 +197,7 @@ def test_normals_of_space_turn_with_the_field_and_are_written(tmp_path: Path) ->
     painted = texture_mesh(mesh, carved((0.6, 0, 0.8), field=field), scale=1.0, atlas=16)
     assert painted.relief is not None
     assert np.allclose(np.median(painted.relief, axis=(0, 1)), (0, 0.6, 0.8), atol=1e-5)
-    # Those of a volume are directions in space, and turn too; y grows against the rows.
+    # Normals of a volume are directions in space, and are also rotated; y is opposite to the rows.
     assert np.allclose(np.median(painted.maps["n"], axis=(0, 1)), (0, -0.6, 0.8), atol=1e-5)
     painted.save(tmp_path / "a.glb")
     there = trimesh.load(tmp_path / "a.glb", force="mesh", process=False)
@@ -218,7 +218,7 @@ def test_smooth_things_stay_smooth_where_the_atlas_is_cut_and_edges_sharp(baked:
 
 
 def along_surface(field: texrs.fields.Field, points: np.ndarray) -> np.ndarray:
-    """Return where the x axis of the exemplar goes, as x, y, z."""
+    """Return the direction of the exemplar's x axis, as x, y, z."""
     return field.frames(points[:, ::-1] * 2.0)[..., 2][:, ::-1]
 
 
@@ -240,7 +240,7 @@ def test_directions_lie_in_the_surface_as_they_are_said(tmp_path: Path) -> None:
         found = along_surface(field, points)
         dots = (found * wanted).sum(axis=1)
         assert (dots if signed else np.abs(dots)).min() > 0.9, said
-        # Planes of the exemplar go up out of the surface.
+        # Planes of the exemplar point out of the surface.
         assert (field.frames(points[:, ::-1] * 2.0)[..., 0][:, ::-1] * out).sum(axis=1).min() > 0.9
     (tmp_path / "s.json").write_text(json.dumps({"strokes": [{"points": [[4, 0, -9], [4, 0, 9]]}]}))
     again = field_on_surface(mesh, str(tmp_path / "s.json"), scale=2.0, resolution=32)

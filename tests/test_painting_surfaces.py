@@ -1,4 +1,4 @@
-"""Meshes as people have them: materials, objects, tiles, missing UVs, scenes. All of it goes out again, or is reported."""
+"""Meshes from users: materials, objects, tiles, missing UVs, scenes. All of it is written again, or reported."""
 
 import json
 from pathlib import Path
@@ -59,7 +59,7 @@ def read_words(path: str, word: str) -> list[str]:
 
 
 def check_texels(made: texrs.painting.TexturedMesh) -> None:
-    """Each texel shows the texture at its place on the surface, in the picture of its set."""
+    """Check that each texel shows the texture at its place on the surface, in the image of its set."""
     for k in range(len(made.sets)):
         faces = made.faces if made.which is None else made.faces[made.which == k]
         uv = made.uv - np.floor(made.uv[faces].mean(axis=(0, 1)))
@@ -173,7 +173,7 @@ def test_colours_of_an_obj_go_to_its_own_vertices(here) -> None:
 
 
 def test_a_scene_keeps_places_names_and_uvs_without_materials(here) -> None:
-    """Trimesh drops UVs of primitives that have no material."""
+    """Trimesh drops UVs of primitives without a material."""
     flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]], process=False)
     flat.visual = trimesh.visual.TextureVisuals(uv=[[0, 0], [1, 0], [1, 1]])
     scene = trimesh.Scene()
@@ -197,7 +197,7 @@ def test_a_scene_keeps_places_names_and_uvs_without_materials(here) -> None:
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [5, 0, 0], [5, 1, 0], [4, 1, 0]]
     )
     made = texture_mesh(surface, TEXTURE, scale=20.0, atlas=32)
-    assert len(made.sets) == 2  # Both copies have the same UVs, and lie at different places.
+    assert len(made.sets) == 2  # Both copies have the same UVs, and are at different places.
     made.save("painted.glb")
     assert np.allclose(read_mesh("painted.glb").vertices, surface.vertices, atol=1e-6)
 

@@ -1,4 +1,4 @@
-"""Pictures with a palette or of few colours: no verb makes a colour of its own, and palettes come back."""
+"""Images with a palette or few colours: no verb adds colours, and palettes come back."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ TABLE = np.array([(20, 12, 28), (68, 36, 52), (48, 52, 109), (133, 76, 48), (52,
 
 
 def make_indices(side=64, step=4, seed=0):
-    """Bricks of a few colours."""
+    """Return bricks of a few colours."""
     rng = np.random.default_rng(seed)
     n = side // step
     small = np.full((n, n), 3)
@@ -92,7 +92,7 @@ def test_pictures_of_many_colours_are_left_alone():
         image = samples.load(name).image
         assert not has_few_colours(image)
         assert not has_few_colours(np.ascontiguousarray(image[:16, :16]))
-    # Few levels that lie side by side are a smooth course, and of many greys interpolation is right.
+    # A few neighbouring levels are a smooth transition, and interpolation is right for many greys.
     ramp = np.add.outer(np.arange(64), np.arange(64)) // 8
     assert not has_few_colours(ramp.astype(np.uint8))
     assert not has_few_colours(make.picture((64, 64)))
@@ -102,7 +102,7 @@ def test_pictures_of_many_colours_are_left_alone():
 
 def test_a_file_with_a_palette_is_known_by_it(tmp_path):
     rng = np.random.default_rng(0)
-    # As many colours as a palette has, which only the file tells from a photograph.
+    # These are as many colours as a palette has. Only the file shows that it is not a photograph.
     table = rng.integers(0, 256, (256, 3), np.uint8)
     image = Image.fromarray(rng.integers(0, 256, (64, 64), np.uint8))
     image.putpalette(table.tobytes())
@@ -113,7 +113,7 @@ def test_a_file_with_a_palette_is_known_by_it(tmp_path):
             made = texrs.synthesize(given, 48)
             assert find_colours(made.image) <= find_colours(pixels)
             assert made.report["assumed"][0].startswith(f"{tmp_path / f'a{suffix}'}: ")
-    # A grey photograph as GIF, which old collections of textures hold, is none.
+    # A grey photograph as GIF, as in old collections of textures, does not count as a palette image.
     Image.fromarray(make.picture((64, 64))).save(tmp_path / "grey.gif")
     assert "palette" not in texrs.tile(io.read(tmp_path / "grey.gif")).report
 
@@ -161,7 +161,7 @@ def test_notices_name_the_file_only_while_its_array_lives(tmp_path):
 
 
 def test_unbounded_textures_keep_few_colours():
-    """Turned windows have no colours between those of the example, unless they are asked for."""
+    """Rotated windows have only colours of the example, unless others are requested."""
     seen = find_colours(ART)
     with collect() as notices:
         plane = texrs.PlaneTexture(ART, field="circular", seed=1)

@@ -1,4 +1,4 @@
-"""What texrs.perspective must show, measured at small size (`perspective_checks`)."""
+"""Properties of results of texrs.perspective, measured at small size (`perspective_checks`)."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def grown(request, floor):
 
 
 def mean(measure, results):
-    """Measure several pictures: discs that meet count as one, and large ones are few, so a single picture strays."""
+    """Measure several images. Touching discs count as one, and large ones are few, so a single image varies."""
     return np.mean([measure(result.image) for result in results])
 
 
@@ -54,7 +54,7 @@ def test_the_papers_method_follows_the_scale_too():
     target = checks.targets(scale, (96, 96))["ramp"]
     result = texrs.perspective(small, scale, 96, target=target, method="paper", seed=1)
     assert checks.fidelity(result.image, target)[0] >= 0.9
-    # Averages make colours that the exemplar has not; the composite has none.
+    # Averages create colours that the exemplar does not have. The composite has none.
     known = np.unique(small.reshape(-1, 3), axis=0)
     made = np.unique(result.image.reshape(-1, 3), axis=0)
     assert len(np.unique(np.concatenate([known, made]), axis=0)) > len(known)

@@ -116,7 +116,7 @@ def test_bad_input_is_named(files, capsys, line, words):
 
 
 def test_a_picture_is_enough(files, capsys):
-    """The plane is found; what is no photograph of one is said to be doubtful."""
+    """The plane is found. An image that does not show a plane is reported as doubtful."""
     io.write(files / "discs.png", texrs.samples.tilted_discs((128, 128)).image)
     assert run(files, "perspective @discs.png -o @out.png --size 160x96 --seed 1") == 0
     assert "no plane" not in capsys.readouterr().err

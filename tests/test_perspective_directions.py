@@ -1,4 +1,4 @@
-"""Directions of elements: by how much what is copied is turned."""
+"""Directions of elements: the rotation of the copied parts."""
 
 import numpy as np
 import pytest
@@ -25,12 +25,12 @@ def measure_directions(image, blur=8.0):
 
     rows, columns = np.gradient(image.astype(float))
     rr, cc, rc = (ndimage.gaussian_filter(v, blur) for v in (rows * rows, columns * columns, rows * columns))
-    # Slopes are across lines; rows grow downwards.
+    # Slopes are across lines, and rows grow downwards.
     return np.degrees(np.arctan2(2 * rc, rr - cc)) / 2
 
 
 def apart(a, b):
-    """Return how far directions of lines are from each other, in degrees."""
+    """Return the difference of line directions, in degrees."""
     return np.abs((np.asarray(a) - b + 90) % 180 - 90)
 
 
@@ -53,7 +53,7 @@ def test_directions_may_change_from_pixel_to_pixel(lines):
     angles = 50 * np.sin(2 * np.pi * x / SIDE)
     made = texrs.perspective(lines, "front", direction=angles, size=SIDE, seed=1)
     assert np.median(apart(measure_directions(made.image, 4.0)[INNER], angles[INNER])) < 8
-    # Of another size they are stretched, across whole turns too.
+    # Directions of another size are stretched, also across whole turns.
     coarse = np.array([[350.0, 10.0]])
     level = texrs.perspective(lines, "front", SIDE, direction=coarse, seed=1)
     assert np.median(apart(measure_directions(level.image)[INNER], 0)) < 8
@@ -66,7 +66,7 @@ def test_a_field_turns_as_it_does_elsewhere(lines):
     np.testing.assert_allclose(made.source_map.jacobians(), wanted, atol=1e-3)
     again = texrs.perspective(lines, "front", SIDE, direction=field, seed=1)
     np.testing.assert_array_equal(again.image, made.image)
-    # Of frames that make larger only how they turn counts.
+    # Only the rotation of frames counts, not their scale.
     ramp = texrs.perspective(lines, "front", SIDE, direction=fields.scale_ramp(1, 2, length=SIDE, axes=2), seed=1)
     np.testing.assert_allclose(ramp.source_map.jacobians(), np.broadcast_to(np.eye(2), (SIDE, SIDE, 2, 2)), atol=1e-3)
 
@@ -92,7 +92,7 @@ def test_on_a_plane_it_turns_there():
         flat[name] = fold @ frames
     c, s = np.cos(np.radians(30)), np.sin(np.radians(30))
     np.testing.assert_allclose(flat["turned"], np.array([[c, s], [-s, c]]) @ flat["straight"], atol=0.04)
-    # So with a scale map as target, which keeps the plane's own foreshortening.
+    # The same holds with a scale map as target, which keeps the plane's own foreshortening.
     plain = texrs.perspective(floor, own, SIDE, direction=30.0, seed=1)
     assert plain.report["sheet"]["kind"] == "plane"
     assert plain.report["scale_error"] < 0.1

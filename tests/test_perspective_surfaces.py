@@ -1,4 +1,4 @@
-"""Targets that are surfaces: another plane, a curved sheet by its normals, a mesh by its texture coordinates, Jacobians."""
+"""Targets that are surfaces: another plane, a curved sheet by its normals, a mesh by its UVs, Jacobians."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ EYE = np.eye(2)
 
 
 def make_column(side=SIDE, turned=0.0, reach=0.9):
-    """Return normals of a cylinder, upright or turned by some degrees."""
+    """Return normals of a cylinder, upright or rotated by some degrees."""
     y, x = np.mgrid[:side, :side] - (side - 1) / 2
     angle = np.radians(turned)
     u = np.clip((x * np.cos(angle) - y * np.sin(angle)) / (side / 2), -1, 1) * reach
@@ -36,7 +36,7 @@ def test_a_plane_s_jacobians_are_the_derivatives():
     step = 1e-5
     by = [(plane.flatten(grid + step * e) - plane.flatten(grid - step * e)) / (2 * step) for e in EYE]
     np.testing.assert_allclose(plane.jacobians(), np.stack(by, axis=-1), rtol=1e-6, atol=1e-7)
-    # And those of `project` undo them.
+    # They are also the inverses of those of `project`.
     np.testing.assert_allclose(
         plane.projection_jacobians(plane.flatten(grid)) @ plane.jacobians(),
         np.broadcast_to(EYE, (40, 56, 2, 2)),
@@ -47,7 +47,7 @@ def test_a_plane_s_jacobians_are_the_derivatives():
 @pytest.mark.parametrize("turned", [0, 30, 90, 140])
 def test_a_cylinder_is_unrolled_by_its_normals(turned):
     found = scale_maps.jacobians_of_normals(make_column(turned=turned))
-    # As it is unrolled: the arc, along the direction in which it turns away.
+    # Unroll it: the arc, along the direction in which it curves away.
     y, x = np.mgrid[:SIDE, :SIDE] - (SIDE - 1) / 2
     angle, radius = np.radians(turned), SIDE / 2 / 0.9
     u, v = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
@@ -60,7 +60,7 @@ def test_a_cylinder_is_unrolled_by_its_normals(turned):
 def test_normals_in_any_form_say_the_same():
     normals = make_column(turned=30)
     wanted = scale_maps.jacobians_of_normals(normals)
-    # A cylinder that turns away to one side alone has no negative values, and is not taken for an encoded one.
+    # A cylinder that curves away to one side only has no negative values, and must not be taken for an encoded one.
     half = make_column()[:, SIDE // 2 :]
     assert half.min() >= 0
     np.testing.assert_allclose(
@@ -77,7 +77,7 @@ def test_normals_in_any_form_say_the_same():
     found = scale_maps.jacobians_of_normals(bare)
     np.testing.assert_array_equal(found[:12], np.broadcast_to(EYE, (12, SIDE, 2, 2)))
     np.testing.assert_array_equal(found[12:], wanted[12:])
-    # What is seen edge on is seen no more: nothing becomes infinite.
+    # Parts seen edge on are not visible, and nothing becomes infinite.
     assert np.abs(scale_maps.jacobians_of_normals(np.array([[[1.0, 0, 0], [0, 0, -1], [0.6, 0, 0.8]]]))).max() < 7
 
 
@@ -132,7 +132,7 @@ def test_frames_are_those_of_the_surface(around):
     assert around.report["sheet"]["kind"] == "front"
     frames = around.source_map.jacobians()
     np.testing.assert_allclose(frames, scale_maps.jacobians_of_normals(make_column()), atol=0.01)
-    # The coordinates follow them, but for seams.
+    # The coordinates follow them, except at seams.
     labels, made = around.source_map.label, derive(around.source_map.coordinates.astype(float))
     inside = np.ones(labels.shape, bool)
     for axis in (0, 1):
@@ -145,7 +145,7 @@ def test_frames_are_those_of_the_surface(around):
 
 
 def test_elements_are_foreshortened_as_the_surface_is(weave, around):
-    """By the picture alone: slopes across the axis get steeper where a column turns away, those along it do not."""
+    """In the image, slopes across the axis get steeper where a column curves away, and slopes along it do not."""
     grey = around.image.mean(axis=-1)
     rows, columns = np.gradient(grey)
     cos = make_column()[0, :, 2]
@@ -163,7 +163,7 @@ def test_normal_maps_of_the_texture_turn_with_it(weave, around):
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     shown = around.source_map.render(normal.astype(np.float32), map_type="normal", interpolation="linear")
     plain = around.source_map.render(normal.astype(np.float32), interpolation="linear")
-    # A bump that is pressed together is steeper: by the cosine, across the axis.
+    # A compressed bump is steeper by the cosine across the axis.
     cos = make_column()[..., 2]
     np.testing.assert_allclose(
         (shown[..., 0] / shown[..., 2]), (plain[..., 0] / plain[..., 2]) / cos, atol=0.02, rtol=0.02
@@ -187,7 +187,7 @@ def test_one_floor_laid_on_another():
     assert made.image.shape == (96, 120, 3)
     assert made.report["sheet"]["kind"] == "plane"
     assert made.report["scale_error"] < 0.05
-    # From the texture of the one to that of the other: what the frames undo on the exemplar's plane is what the target asks.
+    # From one texture to the other, the frames without the exemplar's plane equal the target.
     at, frames = made.source_map.coordinates.astype(float), made.source_map.jacobians().astype(float)
     flat = Plane((128, 128), own.slant, own.tilt, own.fov)
     away = at - flat.principal_point
@@ -217,7 +217,7 @@ def test_jacobians_and_coordinates_are_targets_too(weave):
     np.testing.assert_allclose(by_field.source_map.jacobians(), field, atol=1e-3)
     uv = np.moveaxis(np.indices((64, 64)), 0, -1) @ turned.T
     np.testing.assert_array_equal(texrs.perspective(weave, "front", target=uv, seed=1).image, by_field.image)
-    # Of another size it is stretched.
+    # A target of another size is stretched.
     assert texrs.perspective(weave, "front", (48, 80), target=field, seed=1).image.shape == (48, 80, 3)
     half = texrs.perspective(weave, "front", target=2 * EYE * np.ones((64, 64, 1, 1)), seed=1)
     assert half.report["scale_error"] < 0.02
@@ -233,7 +233,7 @@ def test_what_is_no_plane_and_has_many_sizes_is_bent_in_copies():
     assert made.report["scale_error"] < 0.15
     whole = np.abs(np.linalg.det(made.source_map.jacobians()))
     wanted = np.abs(np.linalg.det(scale_maps.jacobians_of_normals(make_column())))
-    # Where copies have other scales than 1 the frames shrink or enlarge them, by as much as their elements are larger.
+    # If copies have scales other than 1, the frames shrink or enlarge them by the size of their elements.
     sizes = scale[tuple(np.rint(made.source_map.coordinates).astype(int).reshape(-1, 2).T)].reshape(whole.shape)
     assert np.median(np.abs(np.log(whole / wanted / sizes**2))) < 0.25
 
@@ -298,7 +298,7 @@ def test_the_angle_of_view_of_a_photograph_is_used(tmp_path, monkeypatch):
     np.testing.assert_array_equal(io.read("out.png"), stated.image)
     unknown = texrs.perspective(floor, size=64, target="plane:slant=30", seed=1)
     assert (unknown.image != stated.image).any()
-    # A plane that is said has its own.
+    # A given plane has its own angle of view.
     assert main([*line.split(), "--scale-map", "plane:slant=50,fov=37"]) == 0
 
 

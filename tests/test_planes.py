@@ -1,4 +1,4 @@
-"""Planes: what is said of one in any way is the same plane, and what is found is the one that was seen."""
+"""Planes: every way to give one describes the same plane, and the found plane is the true one."""
 
 from collections.abc import Callable
 
@@ -26,7 +26,7 @@ def test_there_and_back(plane: Plane) -> None:
     step = 1e-5
     slopes = [(plane.project(there + step * way) - plane.project(there - step * way)) / (2 * step) for way in np.eye(2)]
     np.testing.assert_allclose(plane.projection_jacobians(there), np.stack(slopes, axis=-1), atol=1e-6)
-    # Areas are seen as the frames say: as the power 3/2 of widths.
+    # Areas follow the frames: they are the power 3/2 of widths.
     areas = np.sqrt(np.abs(np.linalg.det(plane.projection_jacobians(there))))
     np.testing.assert_allclose(areas / plane.width(points) ** 1.5, np.cos(np.radians(plane.slant)) ** 0.5)
 
@@ -119,7 +119,7 @@ def test_lines_lean_towards_their_horizon() -> None:
     side, rng = 320, np.random.default_rng(0)
     middles = rng.uniform(-120, 120, (400, 2))
     rise = np.array([0.4, -0.7])
-    # Three of four run in one of two directions of the plane, but for an error.
+    # Three of four run in one of two directions of the plane, with an error.
     angles = np.where(rng.uniform(0, 1, 400) < 0.75, rng.choice([0.3, 1.6], 400), rng.uniform(0, np.pi, 400))
     way = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     seen = way + middles / side * (way @ rise)[:, np.newaxis]
@@ -129,7 +129,7 @@ def test_lines_lean_towards_their_horizon() -> None:
     told = lean(lines, side, np.array([0.1, -0.3]), 0.5, 0.9)
     assert np.abs(told.rise - rise).max() < 0.05
     assert np.degrees(told.spreads).max() < 3
-    # What runs anyhow says nothing.
+    # Random directions are not evidence of a plane.
     anyhow = rng.uniform(0, np.pi, 400)
     loose = Lines(middles, np.stack([np.cos(anyhow), np.sin(anyhow)], axis=-1), lines.lengths)
     assert np.abs(lean(loose, side, np.zeros(2), 0.1, 0.9).rise).max() < 0.1
@@ -162,11 +162,12 @@ def test_what_is_not_the_plane_does_not_count() -> None:
 
 
 def test_the_same_doubt_is_more_of_a_small_slant() -> None:
-    # Of the tilt of what hardly rises, that is; where there is hardly any slant the tilt does not count.
+    # This is about the tilt of a plane with little rise. With hardly any slant, the tilt does not count.
     steep, aslant, front = (trust(rise, 0.03, 0.06, 1.4) for rise in (0.6, 0.2, 0.001))
     assert aslant < 0.8 * steep
     assert aslant < front
-    # As it is where bands differ, or something is off the plane; a longer lens makes a slant of the same rise larger.
+    # This also holds if bands differ, or something is off the plane. A longer lens gives a larger slant for the same
+    # rise.
     assert trust(0.6, 0.5, 0.06, 1.4) < 0.7 * steep
     assert trust(0.6, 0.03, 0.3, 1.4) < 0.5 * steep
     assert trust(0.3, 0.03, 0.06, 3.0) < trust(0.3, 0.03, 0.06, 1.0)
@@ -176,6 +177,6 @@ def test_confidence_says_what_to_believe() -> None:
     floor = look("weave", Plane((192, 224), 35, 90, fov=55))
     sure = planes.find(floor, fov=55)
     assert planes.find(floor, fov=55) == sure
-    # Two planes in one picture, and a wall.
+    # There are two planes in one image, and a wall.
     torn = planes.find(look_twice(), fov=55)
     assert 0 <= torn.confidence < sure.confidence <= 1

@@ -1,4 +1,4 @@
-"""How large things are where there is a plane, where there is none, and where nobody can say."""
+"""Sizes of elements on a plane, without a plane, and without evidence."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ def test_a_bulge_is_no_plane(name: str) -> None:
     assert found.confidence >= SURE
     off = np.log(found.scale) - np.log(truth)
     assert np.corrcoef(np.log(found.scale).ravel(), np.log(truth).ravel())[0, 1] > 0.93
-    # The plane that is nearest is off by as much as the sizes range; patterns under one Gaussian find six tenths of that.
+    # The nearest plane has an error as large as the range of sizes. Patterns under one Gaussian find 60 % of it.
     assert off.std() < 0.35 * np.log(truth).std()
 
 
@@ -32,7 +32,7 @@ def test_a_column_is_no_plane() -> None:
     found = planes.measure_scale(picture)
     assert found.shape == "curved"
     assert np.corrcoef(np.log(found.scale).ravel(), np.log(truth).ravel())[0, 1] > 0.93
-    # What goes on along it is as large everywhere.
+    # A pattern that continues along it has the same size everywhere.
     assert np.log(found.scale).mean(axis=1).std() < 0.03
 
 

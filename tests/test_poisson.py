@@ -58,7 +58,7 @@ def test_the_same_for_any_number_of_threads(masked):
 
 @pytest.mark.parametrize("masked", [False, True])
 def test_what_flows_in_is_carried_off(masked):
-    """`spread` is what `solve` adds: here of an image of zeros, whose differences say what flows."""
+    """`spread` is the change of `solve`: here for an image of zeros, whose differences give the flow."""
     _, rows, columns = problem(8, (40, 37, 2))
     mask = np.random.default_rng(8).random((40, 37)) < 0.8 if masked else None
     options = {"screening": 0.02, "boundary": ("periodic", "free"), "mask": mask}
@@ -90,7 +90,7 @@ def test_a_solution_can_be_stopped(masked):
         assert 0 <= share <= 1
         raise KeyboardInterrupt
 
-    # Alone, a thread looks up several times before it is done.
+    # A single thread asks several times before it is done.
     flow = np.zeros((4000 if masked else 12000, 1021, 3), np.float32)
     flow[::7, ::5] = 1
     mask = None if mask is None else np.random.default_rng(9).random(flow.shape[:2]) < 0.9

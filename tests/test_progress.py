@@ -1,4 +1,4 @@
-"""Long work is shown by whoever is told to."""
+"""Long work is shown by the given listener."""
 
 import builtins
 import inspect
@@ -109,7 +109,7 @@ def test_who_listens_is_not_asked_by_what_it_does_itself():
 
 
 class Stop(Exception):
-    """Raised to stop the work."""
+    """An exception that stops the work."""
 
 
 def stop(*place: object) -> None:
@@ -117,7 +117,7 @@ def stop(*place: object) -> None:
 
 
 def test_a_kernel_without_progress_is_stopped_by_who_watches_the_call_around_it():
-    # It would take minutes.
+    # This would take minutes.
     noise = np.random.default_rng(0).random((512, 512, 3)).astype(np.float32)
     with answering(stop, "stage", 0.0), pytest.raises(Stop):
         texrs.kernels.mean_shift.mean_shift(noise, 200, 0.5)
@@ -143,13 +143,13 @@ def test_items_that_are_stopped_have_not_failed(tmp_path: Path):
         texrs.stores.map_to_zarr(make, [{"seed": 1}, {"seed": 2}], tmp_path / "a.zarr", progress=stop)
     told: list[float] = []
     texrs.stores.map_to_zarr(make, [{"seed": 1}], tmp_path / "b.zarr", progress=lambda stage, share: told.append(share))
-    # While it is made, and when it is.
+    # There are reports during the work, and at its end.
     assert told.count(0.0) > 1
     assert told[-1] == 1.0
 
 
 def test_who_listens_outside_is_asked_from_within():
-    """A verb that is called without progress hands on what its own blocks ask."""
+    """A verb without progress passes on the requests of its own blocks."""
     told = []
     with answering(told.append, "outer"):
         inner = listen(None)

@@ -1,4 +1,4 @@
-"""What commands write is never lost: nothing is replaced that is not their own, and each file says how it was made."""
+"""Outputs of commands are never lost: only own files are replaced, and each file has a record of its creation."""
 
 import json
 import os
@@ -25,7 +25,7 @@ SMALL = ("--size", "48", "--copies", "1", "-q")
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder that holds inputs for every command."""
+    """Work in a folder with inputs for every command."""
     monkeypatch.chdir(tmp_path)
     sample = samples.load("dots", size=(64, 64))
     io.write("in.png", sample.image)
@@ -111,7 +111,7 @@ def test_commands_replace_what_they_made(here: Path, capsys: Capture, name: str)
     assert said(target)["verb"] == name.split()[0]
     assert main([*command, "--threads", "1"]) == 0
     assert Path(target).read_bytes() == first
-    # What somebody changed since is theirs.
+    # A file that was changed since belongs to the user.
     if target.endswith(".png"):
         picture = io.read(target)
         io.write(target, picture[::-1].copy())
@@ -195,7 +195,7 @@ def test_colours_and_density_go_through(here: Path) -> None:
     io.write_metadata("in.png", io.Metadata(gamma=1.0))
     assert main(["tile", "in.png", "-o", "linear.png", "-q"]) == 0
     assert io.read_metadata("linear.png").gamma == 1.0
-    # What lies on its side is turned upright, and says no more that it is not.
+    # A rotated photograph is turned upright, and its orientation is removed.
     picture = Image.fromarray(io.read("in.png")[:, :48])
     exif = picture.getexif()
     exif[274] = 6
@@ -301,7 +301,7 @@ def test_every_format_says_what_it_holds_and_is_made_again(here: Path, capsys: C
     if allowed.images:
         dtype = np.float32 if np.dtype(np.float32) in allowed.dtypes else np.uint8
         image = io.read("in.png")
-        # GIF holds few colours.
+        # GIF stores few colours.
         image = image // 64 * 64 if suffix == ".gif" else image
         io.write("in.npy", image if dtype == np.uint8 else image.astype(dtype) / 255)
         made.append(("image", f"tile in.npy -o image{suffix} --wrap x", "3 channels"))
@@ -356,7 +356,7 @@ def test_what_changed_is_named(here: Path, capsys: Capture) -> None:
     assert "hole.png is missing (SHA-256 " in err
     io.write("in.png", picture)
     os.rename("kept.png", "hole.png")
-    # A result that was painted over, and still says how it was made.
+    # This result was painted over, and still has its record.
     io.write("r.png", picture)
     io.write_metadata("r.png", io.Metadata(made=json.dumps(said_before(whole, here))))
     assert main(["info", "r.png"]) == 0

@@ -1,4 +1,4 @@
-"""The public face: names that are there, nothing beside them, and loaded when they are used."""
+"""The public names: they exist, there are no others, and they are loaded on use."""
 
 import enum
 import inspect
@@ -39,7 +39,7 @@ def test_dir_shows_public_names_alone(module: ModuleType) -> None:
 @pytest.mark.parametrize("name", [n for n in texrs.__all__ if not n.startswith("_")])
 def test_public_names_are_documented(name: str) -> None:
     text = getattr(texrs, name).__doc__
-    # What a dataclass writes of itself is its signature.
+    # The generated docstring of a dataclass is its signature.
     assert text
     assert not text.startswith(f"{name}(")
 
@@ -60,8 +60,8 @@ def test_a_name_loads_no_more_than_it_needs() -> None:
 def public_entries() -> dict[str, Any]:
     """Return all public functions, classes and methods by their names, each once.
 
-    Exempt are constants and types of arguments, which have no docstring of their own; properties, whose first line says all;
-    exceptions, which are described by their root; and what is inherited from a class that is not ours.
+    Exempt are constants and types of arguments without a docstring; properties, whose first line is enough;
+    exceptions, which their root describes; and members inherited from classes of other libraries.
     """
     found: dict[int, tuple[str, Any]] = {}
     for module in MODULES:
@@ -80,7 +80,7 @@ def public_entries() -> dict[str, Any]:
 
 
 def list_parameters(value: Any) -> list[inspect.Parameter]:
-    # The signature of an enumeration is that of its root.
+    # The signature of an enumeration is the signature of its root.
     if inspect.isclass(value) and issubclass(value, enum.Enum):
         return []
     own = inspect.signature(value).parameters.values()
@@ -93,7 +93,7 @@ def read_sections(text: str) -> dict[str, str]:
 
 
 def read_parameters(sections: dict[str, str]) -> dict[str, tuple[str, str]]:
-    """Return the type and the description of each parameter, or field."""
+    """Return the type and the description of each parameter or field."""
     said: dict[str, tuple[str, str]] = {}
     for section in ("Parameters", "Attributes"):
         for block in re.split(r"^(?=\S)", sections.get(section, ""), flags=re.MULTILINE):
@@ -105,18 +105,18 @@ def read_parameters(sections: dict[str, str]) -> dict[str, tuple[str, str]]:
 
 ENTRIES = public_entries()
 SHAPE = re.compile(r"\([^)]*(,|\.\.\.)[^)]*\)|of shape|\blike\b|`|register|'s shape|s' shape")
-"""An array has a shape in letters, or is said to be as another argument."""
+"""An array has a shape in letters, or refers to another argument."""
 UNIT = re.compile(
     r"\d|pixel|degree|share|second|byte|voxel|sample|number|how many|seed|times|cells|units|weight|`", re.IGNORECASE
 )
-"""A number has a unit, a range, or counts something."""
+"""A number has a unit or a range, or counts something."""
 RAISE_NOTHING = {
     "texrs.elements.to_html",
     "texrs.elements.draw",
     "texrs.exemplar.Segmentation.measure_depth",
     "texrs.io.Metadata.fit",
 }
-"""What takes results and numbers of texrs' own making, and checks nothing."""
+"""Functions that take results and numbers of texrs, and do not check them."""
 
 
 def find_faults(value: Any, name: str) -> list[str]:

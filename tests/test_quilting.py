@@ -1,4 +1,4 @@
-"""Patches stitched into textures: where they lie, what they repeat, and what the map says of them."""
+"""Patches stitched into textures: their positions, their repetitions, and their source map."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from texrs.quilting._windows import divide_axis, plan_waves
 
 
 def picture(image: np.ndarray, *, mirrored: bool = False) -> Picture:
-    """Return an image, or its mirror image, as a picture made from it."""
+    """Return an image, or its mirror image, with its source."""
     source = SourceMap.identity(image.shape[:2])
     if mirrored:
         flipped = np.ascontiguousarray(source.coordinates[:, ::-1])
@@ -52,7 +52,7 @@ def test_spans_cover_an_axis(length: int, side: int, part: float, share: float, 
         assert 0 < span.extent <= side
         places = span.start + np.arange(span.extent)
         assert wrap or places[-1] < length
-        # What it says to overlap at its beginning is covered already, and nothing behind it but what it says to.
+        # The stated overlap at its beginning is covered already, and nothing else behind it.
         inside = covered[places % length] > 0
         expected = np.zeros(span.extent, bool)
         expected[: span.before] = True
@@ -70,14 +70,14 @@ def test_every_pixel_is_one_of_the_exemplar(pebbles: np.ndarray) -> None:
     assert source.jacobian is not None
     hands = np.linalg.det(source.jacobians())
     assert set(np.unique(hands)) <= {-1.0, 1.0}
-    # Where a pixel and the next one are of one piece, the step between them is that of its frame.
+    # If a pixel and the next one are of one piece, the step between them follows its frame.
     step = np.diff(source.coordinates[..., 1], axis=1)
     same = np.diff(source.label.astype(np.int64), axis=1) == 0
     assert (np.abs(step[same]) == 1).mean() > 0.99
 
 
 def test_no_piece_grows_to_a_copy(pebbles: np.ndarray) -> None:
-    """The exact continuation of a patch would match without a seam; four of them would be the exemplar again."""
+    """The exact continuation of a patch would match without a seam. Four of them would be the exemplar again."""
     assert made([picture(pebbles)]).reuse().largest < 0.3
 
 
@@ -90,7 +90,7 @@ def test_no_mirror_image_lies_beside_its_original(pebbles: np.ndarray) -> None:
             turned = hands != np.roll(hands, -1, axis)
             apart = np.abs(source.coordinates - np.roll(source.coordinates, -1, axis)).max(axis=-1)
             met, edges = met + int((apart[turned] <= 2).sum()), edges + int(turned.sum())
-    # Where nothing is refused, it is a seventh.
+    # If nothing is refused, it is 1/7.
     assert met < 0.08 * edges
 
 
@@ -112,7 +112,7 @@ def test_threads_change_nothing(pebbles: np.ndarray, wrap: tuple[bool, bool]) ->
 
 
 def test_seams_run_between_elements() -> None:
-    """Colours say nothing here, but the depth does."""
+    """Colours do not differ here, but the depth does."""
     image = np.full((96, 96, 3), 128, np.uint8)
     rows, columns = np.mgrid[:96, :96] % 24
     depth = np.maximum(0, 8 - np.hypot(rows - 12, columns - 12)).astype(np.float32)
@@ -129,7 +129,7 @@ def test_seams_run_between_elements() -> None:
 def test_a_texture_smaller_than_a_patch_is_stitched_around(pebbles: np.ndarray, size: tuple[int, int]) -> None:
     source = made([picture(pebbles)], size=size)
     assert source.shape == size
-    # Each axis has two patches at least, so a step over the wrap is none from one end of a patch to its other.
+    # Each axis has at least two patches, so no step over the wrap goes from one end of a patch to its other end.
     for axis in range(2):
         apart = np.abs(source.coordinates - np.roll(source.coordinates, -1, axis)).max(axis=-1)
         ends = np.take(apart, -1, axis)
@@ -193,7 +193,7 @@ def test_patches_of_a_wave_lie_apart(
         near = np.zeros((height, width), int)
         for window in wave:
             near[reference.surround(window, (height, width), wrap)[0]] += 1
-            # All that it says to meet above and before it lies there already.
+            # All stated overlaps above and before it exist already.
             at, known = reference.index(window, (height, width)), reference.mark_known(window)
             if window.rows.after == 0:
                 assert covered[at][known].all()
@@ -211,7 +211,7 @@ def test_waves_are_the_same_for_any_number_of_threads(monkeypatch: pytest.Monkey
             sources.append(made([picture(pebbles)], **asked))
     assert all((s.coordinates == sources[0].coordinates).all() for s in sources[1:])
     assert all((s.label == sources[0].label).all() for s in sources[1:])
-    # Laid in another order, it is as good a texture.
+    # In another order, it is as good a texture.
     monkeypatch.undo()
     row = made([picture(pebbles)], **asked)
     assert (row.coordinates != sources[0].coordinates).any()

@@ -1,4 +1,4 @@
-"""The commands that the README, the first pages and the guides show are run as they stand, one after the other."""
+"""The commands of the README, the first pages and the guides run unchanged, one after the other."""
 
 import re
 import shlex
@@ -16,7 +16,7 @@ PAGES = ("README.md", "docs/five-minutes.md", "docs/install.md")
 
 
 def list_commands(page: str) -> list[str]:
-    """Return the commands of texrs in a page; what sets up an environment is not among them."""
+    """Return the commands of texrs in a page, without those that set up an environment."""
     blocks = re.findall(r"^```sh\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     lines = [line.partition("  #")[0].strip() for block in blocks for line in block.splitlines()]
     return [line for line in lines if line.startswith("texrs ")]
@@ -38,14 +38,14 @@ GUIDES = sorted(
 
 @pytest.fixture(scope="module")
 def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder that guides start from: all samples, the generated ones smaller than they are written for a reader."""
+    """Return the folder that guides start from: all samples, the generated ones smaller than for a reader."""
     folder = tmp_path_factory.mktemp("guides")
     solid = ["particles", "stripes", "weave_solid", "wood_solid"]
     planar = [name for name in samples.names() if name not in solid]
     out = str(folder / "pictures")
     assert main(["samples", *planar, "-o", out, "--size", "128", "-q"]) == 0
     assert main(["samples", *solid, *samples.photographs(), "-o", out, "-q"]) == 0
-    # What a reader draws: a mask by each name that guides have for one, and the maps of a material.
+    # Files that readers make: a mask for each name in the guides, and the maps of a material.
     hole = np.zeros((128, 128), np.uint8)
     hole[48:80, 44:70] = 255
     ground = np.full((128, 128), 255, np.uint8)

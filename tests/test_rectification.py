@@ -1,4 +1,4 @@
-"""Rectified floors: flat, level, of the photograph's own pixels; what a user may do wrong; the command."""
+"""Rectified floors: flat, level, with the photograph's own pixels; user errors; the command."""
 
 import json
 from collections.abc import Callable
@@ -18,7 +18,7 @@ FLOOR = look("dots", PLANE)
 
 
 def test_a_flat_texture_is_as_it_was() -> None:
-    """A pattern of lines, seen aslant, lies level and evenly spaced again."""
+    """A pattern of lines, seen obliquely, is level and evenly spaced again."""
     rows, columns = np.indices((SIDE, SIDE))
     lines = np.where((rows % 32 < 4) | (columns % 48 < 4), 40, 200).astype(np.uint8)[..., np.newaxis]
     plane = Plane((240, 288), 45, 60, fov=55)
@@ -47,18 +47,18 @@ def test_pixels_are_the_photograph_s() -> None:
     result = texrs.rectify(FLOOR, view=PLANE)
     np.testing.assert_array_equal(result.source_map.render(FLOOR, antialias=True), result.image)
     np.testing.assert_array_equal(result.stages["before_blending"], result.image)
-    # A map that is in register with the photograph follows: here where its pixels are.
+    # A map in register with the photograph is looked up too. This one contains the pixel coordinates.
     places = np.moveaxis(np.indices(PLANE.shape), 0, -1).astype(np.float32)
     np.testing.assert_allclose(
         result.source_map.render(places, interpolation="linear"), result.source_map.coordinates, atol=1e-3
     )
-    # And frames are those of the plane: what is a pixel down in the texture lies there in the photograph.
+    # Frames follow the plane: a step down in the texture is this step in the photograph.
     down = np.diff(result.source_map.coordinates, axis=0)
     np.testing.assert_allclose(down, result.source_map.jacobians()[:-1, :, :, 0], atol=0.05)
 
 
 def test_normals_turn_with_the_plane() -> None:
-    """What leans to the right in the photograph leans up in a texture that is turned by a quarter, counter-clockwise."""
+    """A normal to the right in the photograph points up in a texture that is rotated by 90 degrees, counter-clockwise."""
     right = np.empty((*PLANE.shape, 3), np.uint8)
     right[...] = np.rint((np.array([0.6, 0.0, 0.8]) + 1) * 127.5)
     for turn, leans in ((0, (0.6, 0.0)), (90, (0.0, 0.6)), (180, (-0.6, 0.0))):

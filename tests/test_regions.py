@@ -24,7 +24,7 @@ from texrs.kernels.regions import felzenszwalb
 def test_agrees_with_the_naive_twin(shape, levels, scale, blur, least, wrap, seed):
     random = np.random.default_rng(seed)
     image = random.integers(0, levels + 1, shape) + 10.0 * (np.arange(shape[1]) // 5)[:, None]
-    # Without a blur all is exact, and ties are taken in the same order; with one they are broken by rounding.
+    # Without a blur all values are exact, and ties have the same order. With a blur, rounding breaks ties.
     blur = blur if levels == 200 else 0.0
     options = {"blur": blur, "least": least, "wrap": wrap}
     assert (felzenszwalb(image, scale, **options) == reference.merge(image, scale, **options)).mean() > (
@@ -48,7 +48,7 @@ def test_regions_are_those_of_scikit_image(name, smooth):
 
     image = PICTURES[name]()
     unit = image / np.float32(255) if image.dtype.kind == "u" else image.astype(np.float32)
-    # No two colours alike, as in a photograph: of equal steps scikit-image takes any first.
+    # No two colours are equal, as in a photograph, because scikit-image orders equal steps arbitrarily.
     unit = np.float32(unit + np.random.default_rng(1).normal(0, 0.01, unit.shape))
     if smooth:
         unit = mean_shift(unit, 6, 0.05)

@@ -1,4 +1,4 @@
-"""Things taken out of photographs: what is ground, what lies behind, what a user may do wrong; the command."""
+"""Objects removed from photographs: the ground plane, the parts behind it, user errors, the command."""
 
 import re
 from collections.abc import Callable
@@ -23,7 +23,7 @@ PLANE = Plane(SIZE, 48, 90, fov=55)
 def see(
     name: str, *, sky: bool = False, thing: bool = False
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return a picture of a floor, what of it is floor, and what stands on that."""
+    """Return an image of a floor, the mask of the floor, and the mask of the object on it."""
     picture = look(name, PLANE, noise=2.0).astype(float)
     ground, marked = np.ones(SIZE, bool), np.zeros(SIZE, bool)
     if sky:
@@ -46,7 +46,7 @@ def test_ground_is_told_from_sky_and_things(name: str) -> None:
     picture, ground, marked = see(name, sky=True, thing=True)
     found, there = planes.find_ground(picture), ground & ~marked
     assert (found & there).sum() / (found | there).sum() >= 0.9
-    # What is not known is neither.
+    # Unknown pixels are in neither.
     known = planes.find_ground(picture, known=~marked)
     assert not known[marked].any()
     assert (known & there).sum() / (known | there).sum() >= 0.9
@@ -66,13 +66,13 @@ def test_a_wall_is_no_ground_where_one_slow_change_follows_both(name: str, above
     picture, ground = dress(look(name, plane), plane.tilt, above=above, seed=1)
     found = planes.find_ground(picture)
     assert (found & ground).sum() / (found | ground).sum() >= 0.9
-    # The border of a shadow is a step too.
+    # The border of a shadow is also a step.
     shadow = np.where(ground[..., np.newaxis], 1.0, 0.8) * look(name, plane)
     assert planes.find_ground(shadow.astype(np.uint8)).mean() > 0.97
 
 
 def shine(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a picture in the light of a window on the right."""
+    """Return the image in the light of a window on the right."""
     y, x = (np.indices(SIZE) + 0.5) / np.array(SIZE).reshape(2, 1, 1)
     light = np.exp(0.9 * (x - 0.5) - 0.5 * ((x - 0.5) ** 2 + (y - 0.4) ** 2))
     return np.clip(np.rint(picture * light[..., np.newaxis]), 0, 255).astype(np.uint8)
@@ -114,7 +114,7 @@ def test_what_goes_is_filled_from_the_ground_alone() -> None:
     wide = made.stages["known"] != picture
     assert wide.any(axis=2)[marked].all()
     np.testing.assert_array_equal(made.image[~wide.any(axis=2)], picture[~wide.any(axis=2)])
-    # Sky is blue, beans are not, nor did the thing leave anything.
+    # Sky is blue, beans are not, and the object leaves no trace.
     filled = made.image[marked].astype(float)
     assert (filled[:, 2] < filled[:, 0] + 30).mean() > 0.99
     rows, columns = np.rint(made.source_map.coordinates[marked]).astype(int).T
@@ -130,7 +130,7 @@ def test_a_shadow_that_is_left_does_not_go_on() -> None:
     made = texrs.remove(picture, marked, view=PlaneView(plane=PLANE, ground=ground & ~marked & ~shadow), seed=1)
     rows, columns = np.rint(made.source_map.coordinates[marked]).astype(int).T
     assert not shadow[rows, columns].any()
-    # Nor does the sky, but where there is sky around the hole.
+    # The sky does not either, except next to a hole in the sky.
     assert ground[rows, columns].all()
     aloft = np.zeros(SIZE, bool)
     aloft[20:35, 60:90] = True
@@ -147,7 +147,7 @@ def test_each_of_several_planes_is_filled_from_its_own() -> None:
     made = texrs.remove(np.where(marked[..., np.newaxis], np.uint8(9), picture), marked, view=views, seed=1)
     changed = made.source_map.label > 0
     rows, columns = np.rint(made.source_map.coordinates[changed]).astype(int).T
-    # They meet in the line in which they meet beside it.
+    # They meet in the line that continues their border.
     assert (low[rows, columns] == low[changed]).mean() > 0.97
     assert not marked[rows, columns].any()
     assert [each["plane"]["slant"] for each in made.report["planes"]] == [50, 35]
@@ -163,13 +163,13 @@ def test_parts_meet_in_a_hole_in_their_line(slope: float) -> None:
     rows, columns = np.indices((90, 120))
     low = rows - 45 > slope * (columns - 60)
     hole = np.zeros(low.shape, bool)
-    # Nearer to the one than to the other.
+    # It is nearer to the first one.
     hole[20:52, 40:85] = True
     everywhere = np.ones_like(hole)
     owner = share_out(hole, [low & ~hole, ~low & ~hole], [everywhere, everywhere])
     assert (owner[hole] == ~low[hole]).mean() > 0.98
     assert (owner[~hole] == -1).all()
-    # What cannot go on there does not.
+    # Parts that cannot continue there do not.
     assert (share_out(hole, [low & ~hole, ~low & ~hole], [~everywhere, everywhere])[hole] == 1).all()
 
 

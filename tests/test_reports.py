@@ -1,6 +1,6 @@
-"""Situations in which people lost data without a word, in other programs: recreated from code.
+"""Situations in which other programs lost data silently, recreated from code.
 
-The address of each public thread stands at its test.
+Each test contains the address of its public thread.
 """
 
 import json
@@ -49,7 +49,7 @@ def list_pixels(array: np.ndarray) -> set[bytes]:
 
 
 def test_white_is_zero(here: Path) -> None:
-    """A mask and a picture whose zeros are white: https://github.com/image-rs/image-tiff/issues/296."""
+    """A mask and an image whose zeros are white: https://github.com/image-rs/image-tiff/issues/296."""
     tifffile.imwrite("mask.tif", 255 - HOLE, photometric="miniswhite")
     Image.fromarray(HOLE).save("mask.png")
     for name in ("mask.tif", "mask.png"):
@@ -88,14 +88,14 @@ def test_associated_alpha(here: Path, capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_colours_of_transparent_pixels(here: Path) -> None:
-    """Colours below an alpha of 0, which textures bleed into edges: https://github.com/kornelski/pngquant/issues/298."""
+    """Colours below an alpha of 0, which extend beyond edges: https://github.com/kornelski/pngquant/issues/298."""
     clear = np.concatenate([PEBBLES, HALF], axis=-1)
     clear[20:60, 20:60, 3] = 0
     Image.fromarray(clear).save("clear.png")
     assert main(["tile", "clear.png", "-o", "tiled.png", "-q"]) == 0
     assert (read("tiled.png")[..., 3] == 0).any()
     assert list_pixels(read("tiled.png")) <= list_pixels(clear)
-    # Seams of a design are corrected, below an alpha of 0 as elsewhere.
+    # Seams of a design are corrected below an alpha of 0 too.
     assert main(["design", "clear.png", "-o", "made.png", "--size", "96", "-q"]) == 0
     made = read("made.png")
     below, given = made[made[..., 3] == 0, :3], clear[20:60, 20:60, :3].reshape(-1, 3)
@@ -124,7 +124,7 @@ def test_no_value_in_a_float_picture(here: Path, capsys: pytest.CaptureFixture[s
 
 
 def swap_primaries() -> bytes:
-    """Return a profile of sRGB whose red is green."""
+    """Return a profile of sRGB with exchanged red and green."""
     data = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
     tags = {bytes(data[at : at + 4]): at for at in range(132, 132 + 12 * struct.unpack(">I", data[128:132])[0], 12)}
     red, green = (slice(tags[key] + 4, tags[key] + 12) for key in (b"rXYZ", b"gXYZ"))
@@ -163,7 +163,7 @@ def test_a_photograph_that_lies_on_its_side(here: Path) -> None:
 
 
 def test_heights_in_the_alpha_of_normals(here: Path) -> None:
-    """Heights packed beside normals, dropped on import: https://github.com/godotengine/godot/issues/19223."""
+    """Heights packed next to normals, dropped on import: https://github.com/godotengine/godot/issues/19223."""
     down, right = np.gradient(GREY / 40.0)
     normals = np.dstack([-right, down, np.ones_like(down)])
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
@@ -192,7 +192,7 @@ def test_twelve_bits_in_sixteen(here: Path) -> None:
 
 
 def test_labels_that_are_resized(here: Path) -> None:
-    """Classes that did not exist, between others: https://github.com/vanvalenlab/deepcell-tf/issues/369."""
+    """New classes between existing ones: https://github.com/vanvalenlab/deepcell-tf/issues/369."""
     labels = (np.arange(96)[:, np.newaxis] // 8 * 12 + np.arange(96) // 8).astype(np.uint16) * 37
     picture = np.dstack([labels % 251, labels % 241, labels % 239]).astype(np.uint8)
     augment = texrs.transforms.TextureAugment()
@@ -206,7 +206,10 @@ def test_labels_that_are_resized(here: Path) -> None:
 
 
 def test_layers_without_a_default(here: Path) -> None:
-    """An EXR of named layers alone: https://github.com/disneyresearch/jeri/issues/14. All of its layers are in the result."""
+    """An EXR of named layers only: https://github.com/disneyresearch/jeri/issues/14.
+
+    All of its layers are in the result.
+    """
     exr = pytest.importorskip("OpenEXR")
     light = ((PEBBLES / 255) ** 2.2).astype(np.float32)
     channels = {
@@ -268,7 +271,7 @@ def test_an_obj_of_two_materials(here: Path) -> None:
 
 
 def test_uvs_without_a_material(here: Path) -> None:
-    """UVs of a glTF file dropped, for no material used them: https://github.com/KhronosGroup/COLLADA2GLTF/issues/282."""
+    """UVs of a glTF file, dropped without a material: https://github.com/KhronosGroup/COLLADA2GLTF/issues/282."""
     trimesh = pytest.importorskip("trimesh")
     uv = [[0.1, 0.2], [0.9, 0.2], [0.9, 0.7]]
     mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]], process=False)

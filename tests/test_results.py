@@ -1,4 +1,4 @@
-"""The docstrings of the verbs name all stages and report keys: compared with real results."""
+"""The docstrings of the verbs list all stages and report keys, compared with real results."""
 
 import sys
 from collections.abc import Callable, Iterator

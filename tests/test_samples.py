@@ -1,4 +1,4 @@
-"""The samples are what they say: their answers are measured again from the labels and pictures."""
+"""The samples are correct: their truth is measured again from the labels and images."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_shapes_and_types(name: str) -> None:
         assert ((sample.centres >= -0.5) & (sample.centres < np.array(shape) - 0.5)).all()
         assert sample.labels.dtype == np.int32
         assert sample.labels.shape == shape
-        # Every number from 1 up to the last is in use.
+        # Every number from 1 up to the last is used.
         assert (np.bincount(sample.labels.ravel())[1:] > 0).all()
         assert sample.labels.max() >= len(sample.centres) > 0
     if sample.mask is not None:
@@ -73,7 +73,7 @@ def test_shapes_and_types(name: str) -> None:
     if sample.jacobians is not None:
         assert sample.jacobians.dtype == np.float32
         assert sample.jacobians.shape == (*shape, axes, axes)
-    # A picture, not a cartoon: it uses the range, and neither end much.
+    # The image uses its range, and neither end much.
     assert 40 < sample.image.mean() < 190
     assert sample.image.std() > 12
     assert (sample.image == 255).mean() < 0.02
@@ -88,7 +88,7 @@ def test_centres_are_centroids_of_whole_elements(name: str, seed: int) -> None:
     assert sample.centres is not None
     whole = whole_labels(sample.labels)
     assert len(whole) >= 3
-    # The centroid of a whole element is inside the picture, and so is its number among the centres.
+    # The centroid of a whole element is inside the image, so its number is among the centres.
     assert max(whole) <= len(sample.centres)
     found = np.array(ndimage.center_of_mass(sample.labels > 0, sample.labels, whole))
     away = np.hypot(*(found - sample.centres[np.array(whole) - 1]).T)
@@ -124,7 +124,7 @@ def test_a_wall_has_21_whole_vertical_joints(seed: int) -> None:
             if row[left + 1] == 0 and 0 != pair[0] != pair[1] != 0 and right - left < 14:
                 rows[pair] = rows.get(pair, 0) + 1
     cut = set(labels[0]) | set(labels[-1])
-    # Rough edges make gaps in the bed joints too; a vertical joint is as tall as a brick.
+    # Rough edges also make gaps in the bed joints, but a vertical joint is as tall as a brick.
     whole = [p for p, count in rows.items() if count > 20 and not cut & set(p)]
     assert len(whole) == 21
 
@@ -172,7 +172,7 @@ def test_scale_map_is_what_the_frames_say(name: str) -> None:
     assert sample.scale_map.max() / sample.scale_map.min() > 2.5
     from_frames = np.linalg.det(sample.jacobians.astype(np.float64)) ** -0.5
     np.testing.assert_allclose(sample.scale_map, from_frames, rtol=1e-5)
-    # A Jacobian's columns are the derivatives of one map: their mixed derivatives agree.
+    # A Jacobian's columns are the derivatives of one map, so their mixed derivatives agree.
     mixed = [np.gradient(sample.jacobians[..., 1 - k], axis=k) for k in (0, 1)]
     np.testing.assert_allclose(mixed[0][2:-2, 2:-2], mixed[1][2:-2, 2:-2], atol=2e-4)
 
@@ -200,7 +200,7 @@ def test_a_torus_has_no_seam(name: str) -> None:
     for axis in range(image.ndim - 1):
         steps = np.abs(image - np.roll(image, 1, axis))
         steps = steps.mean(tuple(k for k in range(image.ndim) if k != axis))
-        # Lattices put the border on one phase of their element: compare with the steps of like phase.
+        # On lattices the border is at one phase of the element, so compare with steps of the same phase.
         inner = np.sort(steps[1:])
         assert steps[0] <= 1.3 * inner.mean() or steps[0] <= inner[int(0.95 * len(inner))]
 
@@ -219,7 +219,7 @@ def test_labels_go_on_across_the_border(name: str) -> None:
     sample = torus(name)
     assert sample.labels is not None
     assert sample.centres is not None
-    # On the torus every element is whole: rolled so that one is in the middle, its centroid is there.
+    # On the torus every element is whole. Rolled to the middle, its centroid is there.
     for i, centre in enumerate(sample.centres):
         at = np.argwhere(sample.labels == i + 1)
         box = np.array(sample.labels.shape)
@@ -239,7 +239,7 @@ def test_stripes_repeat_every_nine_voxels() -> None:
     power = (np.abs(np.fft.rfft(dark, axis=0)) ** 2).mean((1, 2))
     spread = power[7:14]
     assert abs(90 / ((spread * np.arange(7, 14)).sum() / spread.sum()) - 9.0) < 0.5
-    # Layers are counted along each line: their number is what the frame integrates to.
+    # Count layers along each line. Their number is the integral of the frame.
     layers = (np.diff(sample.mask.astype(int), axis=0) > 0).sum(0)
     turns = sample.jacobians[..., 0, 0].astype(float).sum(0) / 9
     assert np.abs(layers - turns).max() <= 1.1
@@ -305,7 +305,7 @@ def test_names_are_the_generators_and_no_photograph_shares_one() -> None:
 @pytest.mark.parametrize("size", [(31, 64), (64,), (64, 64, 64), (64.0, 64), (True, 64), 31, "64"])
 @pytest.mark.parametrize("name", ["pebbles", "tilted_discs"])
 def test_bad_sizes_are_refused(name: str, size: object) -> None:
-    # Though what equals one of them was drawn before.
+    # The request must be checked, although an equal one was drawn before.
     samples.load(name, size=(64, 64))
     with pytest.raises(ValueError, match="size: "):
         samples.load(name, size=size)
@@ -327,13 +327,13 @@ def test_bad_names_seeds_and_solids_are_refused() -> None:
 
 
 def whole_labels(labels: NDArray[np.int32]) -> list[int]:
-    """Return the labels that the border does not touch."""
+    """Return the labels that do not touch the border."""
     border = {*labels[0], *labels[-1], *labels[:, 0], *labels[:, -1]}
     return [i for i in range(1, int(labels.max()) + 1) if i not in border]
 
 
 def best_threshold(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
-    """Return the overlap with `mask` of the best threshold of any channel of four colour spaces."""
+    """Return the overlap of `mask` and the best threshold of any channel of four colour spaces."""
     from skimage.color import rgb2gray, rgb2hsv, rgb2lab
 
     lab = rgb2lab(image)

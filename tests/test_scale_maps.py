@@ -1,4 +1,4 @@
-"""Scale maps by angles, brought to other sizes, continued into holes, encoded and drawn."""
+"""Scale maps by angles, resized, continued into holes, encoded and drawn."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def test_elements_are_small_where_depth_grows(tilt: float, far: str) -> None:
     scale = scale_maps.from_angles((41, 61), 40, tilt)
     sides = {"right": scale[:, -1], "left": scale[:, 0], "top": scale[0], "bottom": scale[-1]}
     assert min(sides, key=lambda side: float(sides[side].mean())) == far
-    # Of quarter turns nothing changes along the other axis.
+    # Quarter turns do not change anything along the other axis.
     assert float(np.ptp(sides[far])) == 0
 
 
 def test_it_is_equation_4_with_its_misprints_repaired() -> None:
     height, width, slant, tilt = 40, 60, radians(46), radians(18)
-    # The paper's tau is from +y towards +x, and its y is up.
+    # The paper's tau is measured from +y towards +x, and its y is up.
     y, x = height - 1 - np.arange(height)[:, None], np.arange(width)
     y_max = (width - 1) / 2 * np.sin(tilt) + (height - 1) / 2 * np.cos(tilt)
     y_proj = (x - (width - 1) / 2) * np.sin(tilt) + (y - (height - 1) / 2) * np.cos(tilt)
@@ -100,7 +100,7 @@ def test_stretch_keeps_the_map_and_its_ends() -> None:
     assert (scale_maps.resample(scale, (40, 30)) == scale).all()
     larger = scale_maps.resample(scale, (120, 45))
     assert larger.shape == (120, 45)
-    # Linear in log S between the middles of the pixels, which stay where they are.
+    # The map is linear in log S between pixel centres, which keep their values.
     assert np.allclose(np.log(larger[1::3, 0]), np.log(scale[:, 0]), atol=1e-6)
     assert np.allclose(np.diff(np.log(larger[1:-1, 0])), 2 / 39 / 3, atol=1e-5)
     back = scale_maps.resample(larger, (40, 30))
@@ -175,7 +175,7 @@ def test_the_residual_is_carried_into_the_hole() -> None:
     known[20:35, 30:45] = False
     off = np.abs(np.log(scale_maps.extend(bumpy, known) / bumpy))
     assert off.max() < 0.06
-    # The plane alone is off by the whole bump.
+    # The plane alone has an error of the whole bump.
     assert np.abs(np.log(FLOOR / bumpy))[~known].max() > 0.1
 
 

@@ -21,7 +21,7 @@ BEFORE = b""
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder that holds a picture, its mask, a hole, edits and a result of earlier."""
+    """Work in a folder with an image, its mask, a hole, edits and an earlier result."""
     monkeypatch.chdir(tmp_path)
     iio.imwrite("in.png", FLOOR.image)
     iio.imwrite("mask.png", FLOOR.mask.astype(np.uint8) * 255)
@@ -104,7 +104,7 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
     report = json.loads(Path("stages/report.json").read_text(encoding="utf-8"))
     assert report["edit"] == EDITS
     assert report["size"] == [64, 64]
-    # What was done is done again.
+    # The same edits are applied again.
     again = ["scale-map", "in.png", "-o", "again.png", "--mask", "mask.png", "--edit", "stages/report.json", "-q"]
     assert main([*again, "--size", "64x64"]) == 0
     assert (iio.imread("again.png") == iio.imread("out.png")).all()
@@ -140,7 +140,7 @@ def test_what_cannot_be_done_is_said_and_nothing_is_written(
     here: Path, capsys: Capture, arguments: str, message: str
 ) -> None:
     assert main(["scale-map", "in.png", "-o", "out.tif", *arguments.split()]) == 2
-    # What masks mark is reported first.
+    # Notices about masks come first.
     *said, error = capsys.readouterr().err.splitlines()
     assert error.startswith(f"texrs: {message}"), error
     assert all("read as a mask that marks" in line for line in said)

@@ -1,4 +1,4 @@
-"""Edits of scale maps: what each does, that lists are replayed, and what is refused."""
+"""Edits of scale maps: the effect of each, replayed lists, and errors."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_edges_are_feathered_on_logarithms(region: list) -> None:
     share = np.log2(one("magnify", region=region, factor=2, feather=8))
     assert share.max() == pytest.approx(1, abs=1e-6)
     assert share.min() == 0
-    # Half-way at the edge, and as wide as was asked for.
+    # The edge is at half of the change, and as wide as requested.
     sharp = np.log2(one("magnify", region=region, factor=2, feather=0))
     assert set(np.unique(sharp).tolist()) == {0, 1}
     assert share[sharp == 1].min() >= 0.35
@@ -90,7 +90,7 @@ def test_duplicate_copies_values_or_variations() -> None:
     assert copied[15, 15] == pytest.approx(bump[40, 60], rel=1e-5)
     assert copied[40, 60] == bump[40, 60]
     varied = one("duplicate", bump, region=[40, 60, 12], to=[15, 15], mode="ratio")
-    # The bump is there, on what was there.
+    # The bump is added to the existing scales.
     assert bump[15, 15] < varied[15, 15] < copied[15, 15] * FLOOR[15, 15] / FLOOR[40, 60] * 1.2
     assert varied[5, 60] == bump[5, 60]
 
@@ -121,7 +121,7 @@ def test_no_edit_goes_beyond_an_eighth_or_eight() -> None:
     many = [{"op": "magnify", "factor": 8}] * 5
     assert np.allclose(scale_maps.edit(FLAT, many), 8)
     assert np.allclose(scale_maps.edit(FLAT, [{"op": "minify", "factor": 8}] * 5), 1 / 8)
-    # What was there already stays.
+    # Existing values beyond the limits stay.
     steep = scale_maps.from_angles((40, 40), 85, 90)
     assert np.allclose(one("minify", steep, region=[0, 0, 0.5], feather=0), steep, rtol=1e-5)
 

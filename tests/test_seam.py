@@ -1,4 +1,4 @@
-"""Minimum cuts: values recomputed with NumPy, SciPy's maximum flow as oracle, bad input."""
+"""Minimum cuts: values recomputed with NumPy, SciPy's maximum flow as reference, bad input."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def noise(seed: int, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def edge_costs(a, b, overlap, wrap, cost="gradient", penalty=None):
-    """Cost of each pair (p, next of p) along each axis; 0 where it is no edge of the overlap."""
+    """Return the cost of each pair (p, next of p) along each axis, 0 if it is not an edge of the overlap."""
     axes = overlap.ndim
     a, b = (i.reshape(*overlap.shape, -1).astype(np.float64) for i in (a, b))
     difference = np.abs(a - b).sum(-1)
@@ -45,7 +45,7 @@ def cut_value(costs, mask):
 
 
 def beside(mask, wrap):
-    """Pixels that have a neighbour in the mask."""
+    """Return pixels that have a neighbour in the mask."""
     found = np.zeros_like(mask)
     for axis in range(mask.ndim):
         for step in (1, -1):
@@ -57,7 +57,7 @@ def beside(mask, wrap):
 
 
 def least(costs, source, sink):
-    """Minimum cut by SciPy, in cost units."""
+    """Return the minimum cut by SciPy, in cost units."""
     n = source.size
     index = np.arange(n).reshape(source.shape)
     capacity: dict[tuple[int, int], int] = {}
@@ -133,8 +133,7 @@ def test_strip_is_the_minimum(seed, shape, axis, cyclic, cost):
 
 
 def test_cyclic_seam_closes():
-    """A seam that need not close ends at another column than it starts; the closed one costs no
-    less."""
+    """A seam that need not close ends in another column than it starts. The closed one costs no less."""
     a, b = noise(0, (40, 60, 3)), noise(1, (40, 60, 3))
     opened, closed = seam.cut_strip(a, b), seam.cut_strip(a, b, cyclic=True)
     costs = edge_costs(a, b, np.ones((40, 60), bool), (True, False))
@@ -171,7 +170,7 @@ def test_labels_are_the_best_of_all(seed, shape, wrap):
 
 
 def nothing_old(shape):
-    """Old seams that are none: what is given is no other problem, but only the general solver takes it."""
+    """Return old seams without a cost. They do not change the problem, but only the general solver accepts them."""
     zeros = [np.zeros(shape, np.float32)] * len(shape)
     return seam.OldSeams(kept=zeros, ab=zeros, ba=zeros)
 
@@ -190,7 +189,7 @@ def disc(shape, centre, radius):
     odd=st.sampled_from(["", "two cores", "core at the border", "holes", "cyclic", "penalty"]),
 )
 def test_a_ring_is_the_cut_of_the_general_solver(seed, shape, levels, cost, odd):
-    """The same set of pixels, few levels making many equal cuts, whether the shape is a ring or not."""
+    """The result is the same set of pixels for any shape. Few levels give many equal cuts."""
     random = np.random.default_rng(seed)
     a, b = (random.integers(0, levels, (*shape, 3)) / max(levels - 1, 1) for _ in range(2))
     middle = [n * x for n, x in zip(shape, random.uniform(0.3, 0.7, 2), strict=True)]
@@ -234,7 +233,7 @@ def test_a_shell_is_cut_in_three_dimensions():
 
 
 def test_old_seam_is_covered_where_that_is_cheaper():
-    """A holds a visible seam between columns 3 and 4, where B is the same on both sides."""
+    """A contains a visible seam between columns 3 and 4, where B is the same on both sides."""
     left, right = np.zeros((6, 8), np.float32), np.ones((6, 8), np.float32)
     columns = np.arange(8)
     a, b = np.where(columns < 4, left, right), np.full((6, 8), 0.5, np.float32)
@@ -258,8 +257,8 @@ def test_old_seam_is_covered_where_that_is_cheaper():
     kept = seam.cut(a, b, everywhere, mask_b, cost="paper", old=old(0.01))
     assert not kept.mask.any()
     assert kept.value == pytest.approx(6 * 2 * 0.01, abs=1e-3)
-    # A core of B beside the seam: joining at the old seam costs 1 a row as all other joins do, and
-    # covers the old seam.
+    # A core of B is next to the seam. Joining at the old seam costs 1 for each row, like any other join, and covers
+    # it.
     core = np.zeros((6, 8), bool)
     core[:, 4] = True
     covered = seam.cut(a, b, everywhere, mask_b, cost="paper", old=old(1), core_b=core)

@@ -1,4 +1,4 @@
-"""Which elements are found: against truth, against nonsense, and on lattices."""
+"""Found elements: compared with the truth, with nonsense, and on lattices."""
 
 from functools import cache
 from itertools import pairwise
@@ -27,7 +27,7 @@ def drawn(name):
 
 
 def matched(found, truth, share=0.7):
-    """Count the true elements that an element covers alone: intersection over union of at least ``share``."""
+    """Count the true elements that a single element covers, with an intersection over union of at least ``share``."""
     pairs = np.zeros((found.max() + 1, truth.max() + 1))
     np.add.at(pairs, (found.ravel(), truth.ravel()), 1)
     union = pairs.sum(axis=0, keepdims=True) + pairs.sum(axis=1, keepdims=True) - pairs
@@ -45,7 +45,7 @@ def test_elements_are_the_elements_that_were_drawn(name, share):
     found = segment(sample.image)
     assert (found.kind, found.reason) == ("components", "")
     assert matched(found.elements, sample.labels) >= share * sample.labels.max()
-    # Nothing is found twice: most elements are an element, or a few that could not be parted.
+    # Nothing is found twice: most are one element, or a few that could not be separated.
     assert found.count <= 1.1 * sample.labels.max()
 
 
@@ -78,7 +78,7 @@ def test_the_lit_part_of_a_thing_stands_for_it():
     crescent = (far < 20) & (np.hypot(rows - 26, columns - 24) > 16)
     elements = crescent.astype(np.int32)
     assert fill_crescents(elements).sum() > 1.3 * crescent.sum()
-    # Not over another element.
+    # The background does not cover another element.
     elements[20:24, 20:24] = 2
     assert (fill_crescents(elements) == elements).all()
 
@@ -116,7 +116,7 @@ def test_nonsense_takes_the_grid_and_says_why(image):
     found = segment(image)
     assert found.kind == "grid"
     assert found.reason
-    # What was asked for is given.
+    # The requested method is used.
     assert segment(image, ElementOptions(segmentation="components")).kind == "components"
 
 
@@ -271,14 +271,14 @@ def test_what_is_lit_from_one_side_differs_from_its_mirror_image(name, axes):
     picture = unit(drawn(name).image)
     found = measure_polarity(picture)
     assert all(found[axis] > 10 for axis in axes)
-    # Lit from the other side it differs as much.
+    # Lit from the other side, the difference is the same.
     assert np.allclose(measure_polarity(picture[::-1]), found, rtol=0.05)
     assert np.allclose(measure_polarity(np.swapaxes(picture, 0, 1)), (found[1], found[0], found[2]), rtol=0.05)
 
 
 @pytest.mark.parametrize("angle", [0, 20, 45])
 def test_a_lattice_that_leans_differs_from_its_mirror_image(angle):
-    """Two directions at right angles lean to one side, but for those that are a mirror image of themselves."""
+    """Two orthogonal directions lean to one side, except if they equal their mirror image."""
     rows, columns = np.indices((192, 192))
     turn = np.radians(angle)
     along, across = columns * np.cos(turn) + rows * np.sin(turn), rows * np.cos(turn) - columns * np.sin(turn)
@@ -303,7 +303,7 @@ def test_what_has_no_side_does_not():
 
 
 def test_further_layers_are_taken_where_they_find_more() -> None:
-    """The stones as dark as the ground are missed by two layers."""
+    """Two layers miss the stones that are as dark as the background."""
     sample = samples.pebbles((192, 192))
     assert segment(sample.image).count > 1.3 * segment(sample.image, ElementOptions(layers=2)).count
     flowers = samples.leaves_and_flowers((192, 192)).image

@@ -1,4 +1,4 @@
-"""Planes, sheets and look-up without aliases: what PERSPECTIVE is made of."""
+"""Planes, sheets and lookup without aliasing: the parts of PERSPECTIVE."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from texrs.scale_maps._slope import Slope
 
 @pytest.fixture(scope="module")
 def disc_floor():
-    """A plane seen from above, and the width of its elements: the square root of areas is the 3/2 power of that."""
+    """Return a plane seen from above, and the width of its elements. The square root of areas is its 3/2 power."""
     floor = samples.tilted_discs((128, 128))
     return floor.image, np.asarray(floor.scale_map ** (2 / 3), np.float32)
 
@@ -54,7 +54,7 @@ def test_what_is_seen_along_a_ramp_fits_together_and_stands_as_it_stood():
     turned = scale_maps.from_angles((40, 50), 50, 80)
     other = Slope.fit(turned)
     frames = plane.jacobians(turned, other)
-    # Derivatives of one map: along rows of what is along columns, and the other way round.
+    # They are derivatives of one map, so mixed derivatives agree.
     curl = np.gradient(frames[..., 1], axis=0) - np.gradient(frames[..., 0], axis=1)
     assert np.abs(curl[2:-2, 2:-2]).max() < 0.02 * np.abs(frames).max()
     np.testing.assert_allclose(frames[20, 25] @ plane.down, plane.jacobians(turned)[20, 25] @ plane.down, atol=0.15)
@@ -76,11 +76,11 @@ def test_a_map_that_hardly_varies_is_no_plane():
 def test_round_things_that_get_smaller_are_no_plane(disc_floor):
     image, scale = disc_floor
     assert find_plane(texrs.Exemplar(image).guidance, scale) is not None
-    # Of areas it is the same plane.
+    # From areas the plane is the same.
     areas = find_plane(texrs.Exemplar(image).guidance, scale**1.5)
     assert areas.power == pytest.approx(2 / 3)
     assert areas.slope == pytest.approx(find_plane(texrs.Exemplar(image).guidance, scale).slope, rel=1e-3)
-    # A measured map strays, but edges tell.
+    # A measured map varies, but edges give evidence.
     rough = scale * np.exp(0.05 * np.sin(np.arange(128) / 3))[:, np.newaxis].astype(np.float32)
     assert Slope.fit(rough).residual > 0.03
     assert find_plane(texrs.Exemplar(image).guidance, rough) is not None
@@ -116,7 +116,7 @@ def test_copies_have_the_elements_of_the_exemplar():
             sheet.elements.labels.ravel(), np.arange(sheet.free.size).reshape(sheet.free.shape)[copy.window]
         )
         assert not np.intersect1d(labels[labels > 0], others).size
-        # As many of them, and as much of them, as where they come from: so many times larger, and so many times as deep.
+        # The number and area of elements agree with their source, relative to the larger size and depth.
         assert len(np.unique(labels)) > 20
         size = float(np.sqrt(np.prod(copy.factor)))
         ends = [slice(f, f + round(n / k)) for f, n, k in zip(copy.first, copy.shape, copy.factor, strict=True)]
@@ -147,7 +147,7 @@ def test_elements_on_a_plane_are_whole():
     result = texrs.perspective(floor.image, scale, (160, 200), seed=2)
     assert result.report["sheet"]["kind"] == "plane"
     assert result.report["scale_error"] < 0.05
-    # The frames say how the exemplar is seen: they agree with the differences of the coordinates inside of patches.
+    # The frames show the view of the exemplar, and agree with coordinate differences inside patches.
     source = result.source_map
     steps = np.diff(source.coordinates, axis=0)[:, :-1]
     same = source.label[:-1, :-1] == source.label[1:, :-1]
@@ -174,7 +174,7 @@ def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
     at = np.rint(result.source_map.coordinates[hole]).astype(int)
     assert not hole[at[:, 0], at[:, 1]].any()
-    # Seen in depth, what is copied is turned and sized; copies of squares are neither.
+    # In depth, copies are rotated and scaled. Copies of squares are neither.
     assert np.abs(result.source_map.jacobians()[hole] - np.eye(2)).max() > 0.05
     with texrs.threads(1):
         alone = texrs.inpaint(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))

@@ -1,4 +1,4 @@
-"""How things show themselves: on one line, and as pictures in notebooks."""
+"""Display of results: on one line, and as images in notebooks."""
 
 import io
 from base64 import b64decode
@@ -56,7 +56,7 @@ def test_a_scale_map_is_shown_with_its_contours():
     seen = THINGS["ScaleMap"]
     assert repr(seen) == f"<ScaleMap of width, 64 x 64, {seen.min():.4g} to {seen.max():.4g}>"
     assert open_png(seen._repr_png_()).shape == texrs.scale_maps.picture(seen).shape
-    # Parts that are no maps show as other arrays do.
+    # Parts that are not maps are displayed like other arrays.
     assert repr(seen[0])[:10] == "ScaleMap(["
     assert seen[0]._repr_png_() is None
 
@@ -107,7 +107,7 @@ def test_a_source_map_is_shown_by_where_it_looks():
 def test_arrows_go_where_the_axes_go():
     straight = open_png(texrs.fields.identity()._repr_png_())
     red = (straight == (200, 40, 40)).all(axis=-1)
-    # The exemplar's rows go down: of each red arrow the shaft is a column.
+    # The exemplar's rows go down, so the shaft of each red arrow is a column.
     assert red.sum(axis=0).max() > 5 * np.median(red.sum(axis=1)[red.any(axis=1)]) / 2
 
 

@@ -1,6 +1,6 @@
-"""No command is silent about a part of an input that it does not use, or about a fact that an input does not state.
+"""Every command reports unused parts of its inputs, and facts that an input does not state.
 
-The cases come from the commands themselves: every argument and option that takes a folder, several files, or points.
+The cases are generated from the commands: every argument and option that accepts a folder, several files, or points.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Capture = pytest.CaptureFixture[str]
 GROUP: Any = typer.main.get_command(app)
 PARAMETERS = [(command, p) for command in COMMANDS for p in GROUP.get_command(None, command).params]
 OWN = ("rerun", "demo", "samples", "database")
-"""Commands whose folders are their own, or are written."""
+"""Commands with their own folders, or whose folders are outputs."""
 
 
 def takes_folder(command: str, parameter: Any) -> bool:
@@ -40,7 +40,7 @@ POINTS = [(command, p.name) for command, p in PARAMETERS if "csv" in (p.metavar 
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder of inputs; stop each command where its work begins."""
+    """Work in a folder of inputs, and stop each command where its work begins."""
     monkeypatch.chdir(tmp_path)
     picture = samples.dots((64, 96)).image
     volume = samples.stripes((32, 36, 40)).image
@@ -62,14 +62,14 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def make_words(command: str, name: str, text: str) -> list[str]:
-    """Return a call whose argument or option is a text."""
+    """Return a call with a text for one argument or option."""
     arguments = [p for p in GROUP.get_command(None, command).params if p.param_type_name == "argument"]
     words = CALLS[command].replace("out.tif", "made").split()
     place = next((k for k, p in enumerate(arguments) if p.name == name), None)
     if place is not None:
         return [command, *words[:place], text, *words[place + 1 :]]
     flag = max(next(p.opts for c, p in PARAMETERS if c == command and p.name == name), key=len)
-    # The other inputs are materials also, so that all fit.
+    # The other inputs are materials too, so that all fit.
     return [command, *(text if word == "in.png" else word for word in words), f"{flag}={text}"]
 
 
@@ -88,14 +88,14 @@ def test_unused_files_are_reported(here: Path, capsys: Capture, command: str, na
     suffix = ".tif" if folder == "block" else ".png"
     for unused, content in (("preview" + suffix, (here / folder / f"albedo{suffix}").read_bytes()), ("rock.sbs", b"x")):
         (here / folder / unused).write_bytes(content)
-        # Each file alone, so that one does not hide the other.
+        # Test each file alone, so that none hides another.
         strict = [*make_words(command, name, folder), "--strict"]
         before = sorted(here.rglob("*"))
         code = main(strict)
         err = capsys.readouterr().err
         assert unused in err, err
         assert "--strict" in err
-        # The reader of a job finds it out in the job.
+        # For batches, the reader of the job finds it.
         assert code == (3 if command == "batch" and unused.startswith("preview") else 2)
         assert sorted(here.rglob("*")) == before or command == "batch"
         main(make_words(command, name, folder))

@@ -1,4 +1,4 @@
-"""Single files that are maps by their name and values: normals turn with the surface, and labels stay what they are."""
+"""Single files that are maps by their name and values: normals are rotated with the surface, and labels stay labels."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ VERBS = {
     "remove": "hole.png --slant 30 --fov 60",
     "self-splice": "--edit regularise",
 }
-"""All verbs that take an image and write one, with what they need besides."""
+"""All verbs that take and write an image, with their other arguments."""
 
 
 def draw_normals(*, down: bool) -> Array:
@@ -51,7 +51,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("name", NORMALS)
 def test_a_single_normal_map_is_one(here: Path, capsys: pytest.CaptureFixture[str], verb: str, name: str) -> None:
-    """The result is what the source map makes of the normals as a map of a material."""
+    """The result equals the source map's lookup of the normals as a map of a material."""
     assert main([verb, f"{name}.png", *VERBS[verb].split(), "-o", "out.png", "--source-map", "map.npz"]) == 0
     role = "normal-dx" if name.endswith("dx") else "normal"
     assert f"{name}.png: read as {role}, because its name and its values say so" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Smoothing by Gaussians: SciPy's bytes."""
+"""Gaussian smoothing with the bytes of SciPy."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_axes_differ() -> None:
     found = smooth(values, (0, 2.5), mode=("wrap", "nearest"))
     assert (found == gaussian_filter(values, (0, 2.5), mode=("wrap", "nearest"))).all()
     assert smooth(values[:0], 1.0).shape == (0, 40)
-    # Not the caller's own.
+    # The caller's array must not change.
     before = values.copy()
     smooth(values, 2.0)[...] = 0
     assert (values == before).all()

@@ -1,4 +1,4 @@
-"""SOLID, end to end: any array, any size, any border; honest maps; the same bytes for any number of threads."""
+"""SOLID, end to end: any array, size and border; true source maps; the same bytes for any number of threads."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def result():
 
 
 def seen(made, exemplar):
-    """Return what the exemplar looks like through the map that was made, by the slow twin."""
+    """Return the exemplar looked up through the source map, by the slow twin."""
     return view(made.source_map, exemplar, made.report["interpolation"])
 
 
 def check_seen(made, exemplar):
-    """Check that the composite is what its map shows: integers exactly, floats but for the order of sums."""
+    """Check that the composite equals its map's lookup: integers exactly, floats except for the order of sums."""
     composite, expected = made.stages["before_blending"], seen(made, exemplar)
     assert composite.dtype == expected.dtype
     if composite.dtype.kind == "f":
@@ -69,7 +69,7 @@ def test_what_comes_in_is_what_comes_out(name):
     assert made.image.shape == (24, 24, 24, *exemplar.shape[3:])
     check_seen(made, exemplar)
     np.testing.assert_array_equal(made.image, made.stages["before_blending"])
-    assert made.image.min() >= exemplar.min() - 1e-3  # the look-up stays within
+    assert made.image.min() >= exemplar.min() - 1e-3  # the lookup stays in range
     assert made.image.max() <= exemplar.max() + 1e-3
 
 
@@ -95,7 +95,7 @@ def test_labels_are_classes_without_an_order():
     made = texrs.solid(marked, 32, field=TURNING, quality="fast")
     assert made.report["interpolation"] == "nearest"
     assert set(np.unique(made.image)) <= set(range(5))
-    # Other names for the classes, in the same order, change nothing else.
+    # Other names for the classes, in the same order, do not change anything else.
     renamed = np.array([3, 7, 20, 100, 255], np.uint8)
     again = texrs.solid(renamed[marked], 32, field=TURNING, quality="fast")
     np.testing.assert_array_equal(again.image, renamed[made.image])
@@ -111,7 +111,7 @@ def test_labels_are_classes_without_an_order():
 
 @pytest.mark.parametrize("values", [(0, 255), (0, 128, 255), (False, True), (-7, 900), range(0, 160, 10)])
 def test_few_whole_numbers_are_labels_whatever_they_are(values):
-    """No value is invented between them, and what they are called does not count."""
+    """No values are invented between them, and their names do not matter."""
     kinds, named = len(values), np.array(values)
     named = named.astype(
         {"i": np.int16, "u": np.uint8, "b": bool}["u" if values[-1] in (150, 255) else named.dtype.kind]
@@ -179,7 +179,7 @@ def test_any_exemplar(shape):
     made = texrs.solid(exemplar, 30, quality="fast")
     assert made.image.shape == (30, 30, 30, 3)
     assert len(made.report["levels"]) == 1
-    # A copy of all of it would not be a texture.
+    # A complete copy would not be a texture.
     assert volume.cell_reuse(made.source_map).largest < 0.6
 
 
@@ -194,7 +194,7 @@ def test_pictures_close_along_the_axes_that_wrap(size):
 
 
 def changes(image, wrap):
-    """Give, for each axis, the changes from line to line inside, and that from the last to the first."""
+    """Return for each axis the changes between inner lines, and the change from the last to the first."""
     seen = volume.lightness(image)
     return [(c[:-1], c[-1]) for c in volume.seam_planes(seen, wrap=wrap)]
 
@@ -218,7 +218,7 @@ def test_exemplars_that_repeat_are_found_by_measurement():
     assert around.report["periodic_axes"] == [True, True, True]
     bounded = texrs.solid(texrs.Exemplar(whole, axes=3, repeat=False), 40, seed=4)
     assert bounded.report["periodic_axes"] == [False, False, False]
-    # Where it repeats, patches go on across its end: all of it can be used.
+    # If it is periodic, patches continue across its end, so all of it can be used.
     across = [
         sum(
             (
@@ -409,7 +409,7 @@ MANY = texrs.Exemplar(np.arange(32**3, dtype=np.int32).reshape(32, 32, 32), axes
 
 
 def held(mask, **what):
-    """Return the option that holds some voxels."""
+    """Return the option that fixes some voxels."""
     return {"constraints": texrs.Constraints(mask=mask, **what)}
 
 

@@ -1,6 +1,6 @@
-"""SOLID against its acceptance checks, on generated volumes, and each check against what must fail.
+"""SOLID and its acceptance checks, on generated volumes, and each check on failures.
 
-The measuring is in `solid_checks`; `benches/solid_table.py` makes the table of more textures and seeds.
+`solid_checks` has the measures. `benches/solid_table.py` makes the table of more textures and seeds.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def made(name, kind, seed=0):
     return texrs.solid(exemplar(name).image, SIDE[name], seed=seed, field=FIELDS[kind])
 
 
-# Rare things are few in a small volume, and so are layers: what is held to a limit is the mean of several.
+# Rare elements and layers are few in a small volume, so the limit applies to the mean of several.
 SEEDS = dict.fromkeys(("s2", "s3", "s3b"), (0, 1))
 
 
@@ -111,7 +111,7 @@ def test_turned_exemplars_are_what_the_frame_says():
 
 
 def grown(image, size, *, contrast=1.0, acceptance=2.0, votes=(0, 0, 0), blocks=True, field=None):
-    """Grow a volume by blocks and their correction, kernel by kernel, or without a part of it."""
+    """Grow a volume by blocks and their correction, kernel by kernel, optionally without a part of it."""
     analysis = texrs.Exemplar(image, axes=3).analyse()
     regions = [Region.whole((size,) * 3)]
     while len(regions) < len(analysis.levels):
@@ -175,7 +175,7 @@ def test_s8_without_its_parts_particles_are_lost(name):
 
 
 def shown(places, image):
-    """Return what places of the exemplar look like, and their map."""
+    """Return the exemplar at given coordinates, and their map."""
     shape = places.shape[:3]
     empty = np.zeros(shape, np.uint16), np.zeros(shape, np.uint32)
     source = SourceMap(places.astype(np.float32), *empty, None, (image.shape[:3],))
@@ -183,7 +183,7 @@ def shown(places, image):
 
 
 def test_cheats_fail():
-    """What is no texture must not get past the checks."""
+    """Results that are not textures must fail the checks."""
     stripes = exemplar("stripes").image
     grid = np.stack(np.meshgrid(*[np.arange(64)] * 3, indexing="ij"), axis=-1)
     copy = shown(grid, stripes)
@@ -191,16 +191,16 @@ def test_cheats_fail():
     noise = shown(np.random.default_rng(0).integers(0, 64, grid.shape), stripes)
     assert "coherent" in checks.s5(noise).failed
     assert not checks.s2(stripes, noise).passed
-    # Only the places are turned, not what is between them.
+    # Only the coordinates are rotated, not the pixels between them.
     assert "median" in checks.s1(stripes, stripes, FIELDS["zigzag"]).failed
-    # A field that leaves the layers where they are says nothing.
+    # A field that leaves the layers unchanged gives no evidence.
     assert "turned" in checks.s1(stripes, stripes, fields.rotation(30, "xy")).failed
-    # Blocks side by side.
+    # Blocks are side by side.
     cells = (
         np.random.default_rng(1).integers(0, 40, (3, 3, 3, 3)).repeat(24, 0).repeat(24, 1).repeat(24, 2)[:64, :64, :64]
     )
     assert "planes" in checks.s6(stripes, shown(cells + grid % 24, stripes).image).failed
-    # A texture may change at planes of its own, at any of them, where it does so all over.
+    # A texture may change at planes of its own, at any of them, if it does so everywhere.
     woven = np.random.default_rng(2).integers(0, 256, (16, 16, 16, 3), dtype=np.uint8)
     woven[-1] = 255 - woven[0]
     assert "planes" not in checks.s6(np.tile(woven, (4, 4, 4, 1)), np.tile(woven, (5, 5, 5, 1))).failed

@@ -23,7 +23,7 @@ PICTURE = samples.dots((64, 64)).image
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder that holds a volume, a picture and results of earlier."""
+    """Work in a folder with a volume, an image and earlier results."""
     monkeypatch.chdir(tmp_path)
     io.write_volume("v.npy", VOLUME)
     iio.imwrite("in.png", PICTURE)
@@ -61,7 +61,7 @@ def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> No
     assert "blocks" in said.err
     assert re.search(r"wrote out.tif: 18 x 24 x 20, 3 channels, uint8, in [0-9.]+ s\n$", said.err)
     assert not list(here.glob(".texrs*"))
-    # Another map of the example goes the same way.
+    # Another map of the example is looked up in the same way.
     io.write_volume("height.npy", VOLUME[..., 0].astype(np.float32))
     assert main(["apply", "map.npz", "height.npy", "-o", "height.tif", "--interpolation", "cubic", "-q"]) == 0
     assert io.read_volume("height.tif").shape == (20, 24, 18)

@@ -1,4 +1,4 @@
-"""What is asked of a grown texture beside its look: points that are given, and maps that are followed."""
+"""Constraints of a grown texture: given points, and maps that are followed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WEAVE = samples.weave((48, 48)).image
 
 @pytest.fixture(scope="module")
 def boxed():
-    """Return a mask of a box, and what it shows: a piece of the exemplar from elsewhere."""
+    """Return the mask of a box, and its contents: a piece of the exemplar from elsewhere."""
     held = np.zeros((32, 36, 40), bool)
     held[10:24, 12:26, 8:22] = True
     values = np.zeros((32, 36, 40, 3), np.uint8)
@@ -30,7 +30,7 @@ def boxed():
 
 
 def edge(image, held):
-    """Return the mean change across the border of what is held."""
+    """Return the mean change across the border of the fixed part."""
     seen, total, count = image.astype(float), 0.0, 0
     for axis in range(3):
         border = np.diff(held.astype(int), axis=axis) != 0
@@ -41,12 +41,12 @@ def edge(image, held):
 
 @cache
 def free(quality="preserve"):
-    """Return what grows with nothing held: several, for the layers of one may happen to go on as what is held does."""
+    """Return several results without constraints, because the layers of one may match the fixed part by chance."""
     return [texrs.solid(STRIPES, (32, 36, 40), seed=seed, quality=quality).image for seed in (1, 2, 3)]
 
 
 def pasted_edge(held, values, quality="preserve"):
-    """Return the mean change across the border where what is held is only pasted in."""
+    """Return the mean change across the border if the fixed part is only pasted in."""
     return np.mean([edge(np.where(held[..., None], values, image), held) for image in free(quality)])
 
 
@@ -62,7 +62,7 @@ def test_held_values_stay_and_their_surroundings_agree(boxed, quality):
         view(made.source_map, STRIPES, made.report["interpolation"]), made.stages["before_blending"]
     )
     assert edge(made.image, held) < 0.7 * pasted_edge(held, values, quality)
-    # The texture itself goes through what is held.
+    # The texture itself continues through the fixed part.
     off = np.abs(made.stages["before_blending"][held].astype(int) - values[held]).mean()
     assert off < 0.5 * np.mean([np.abs(image[held].astype(int) - values[held]).mean() for image in free(quality)])
 
@@ -98,7 +98,7 @@ def test_held_pixels_of_pictures_and_of_labels():
 
 @pytest.mark.parametrize("axes", [2, 3])
 def test_a_map_is_followed(axes):
-    """What grows brighter downwards, grown with the trend the other way."""
+    """An exemplar that grows brighter downwards, grown with the opposite trend."""
     side, size = (64, 96) if axes == 2 else (32, 40)
     column = (-1, *[1] * (axes - 1))
     ramp, wanted = np.linspace(0, 1, side).reshape(column), np.linspace(1, 0, size).reshape(column)

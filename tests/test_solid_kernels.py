@@ -1,4 +1,4 @@
-"""The kernels of SOLID against their slow twins, exactly: all of it is integer arithmetic."""
+"""The kernels of SOLID compared with their slow twins, exactly: all of it is integer arithmetic."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def region_of(axes, wrap=False, origin=-3):
 
 
 def scattered(appearance, region, seed=0):
-    """Return places of any kind: fractions, outside, far away."""
+    """Return coordinates of any kind: fractions, outside, far away."""
     rng = np.random.default_rng(seed)
     axes = len(region.shape)
     at = rng.integers(-2 * ONE, (max(appearance.shape) + 1) * ONE, (region.points, axes))
@@ -141,7 +141,7 @@ def test_kernels_report_and_stop():
     def stop(share):
         raise KeyError("enough")
 
-    # What is done before the first report, a twentieth of a second after the start, cannot be stopped.
+    # Work before the first report, 0.05 s after the start, cannot be stopped.
     long = Region.whole((64, 64, 64))
     with pytest.raises((Cancelled, KeyError)):
         appearance.blocks(long, to_fixed(None, long), progress=stop)

@@ -1,4 +1,4 @@
-"""Unbounded textures put together from patches: every part the same however it is asked for, and as whole as a bounded one."""
+"""Unbounded textures from patches: the same for any requests, and as intact as bounded ones."""
 
 import multiprocessing
 from collections.abc import Callable
@@ -119,7 +119,7 @@ def test_slices_are_picked_from_the_same_texture() -> None:
 
 
 def test_seams_are_no_worse_than_those_of_a_bounded_texture() -> None:
-    """Boxes laid over each other may look at what they cover from all sides."""
+    """Overlapping boxes may consider the covered part from all sides."""
     turned = fields.circular(centre=(-40, -40), axes=2)
     for image, field in ((samples.load("pebbles").image[:96, :96], None), (samples.bricks((96, 96)).image, turned)):
         known = texrs.Exemplar(image)
@@ -155,7 +155,7 @@ def test_the_map_has_the_frames_of_its_patches() -> None:
     found = texrs.PlaneTexture(exemplar(2), field=field, seed=1).window((40, -50), (60, 70))
     assert found.source_map.label is not None
     frames = found.source_map.jacobians()
-    # Those of rigid patches: few, and about as the field.
+    # Rigid patches have few frames, about equal to the field.
     assert 1 < len(np.unique(frames.reshape(-1, 4), axis=0)) <= found.source_map.label.max() + 1
     assert np.abs(frames - field.lattice((60, 70), origin=(40, -50))).mean() < 0.5
     assert found.report["quality"] == "preserve"
@@ -216,14 +216,14 @@ def test_boxes_end_at_folds() -> None:
     field = fields.zigzag(24, 35)
     here = Region((40, 30, 32), (-3, 5, 0), (False,) * 3)
     _, boxes, table = Ground((64,) * 3, (True,) * 3, 32, 7, field).show(here)
-    # Each shows one band of the field alone, from end to end.
+    # Each shows only one band of the field, from end to end.
     assert np.array_equal(table[boxes, 6:15].reshape(-1, 3, 3), to_fixed(field, here))
     tiles = 3 * 2 * 1
     assert len(table) <= tiles * (32 // 12 + 2)
 
 
 def test_folds_do_not_shatter_what_lies_between_them() -> None:
-    """Boxes are divided along the axis of the folds alone: across the others patches go from end to end."""
+    """Boxes are divided only along the axis of the folds. Along the other axes, patches go from end to end."""
     plain = layers.Layers(exemplar(3), fields.zigzag(16, 30), 3, candidates=2, cache_bytes=1 << 24)
     made = next(plain._make_all([(1, 0, 0, 0)], None))
     assert plain.side > 1.5 * 16

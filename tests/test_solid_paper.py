@@ -1,4 +1,4 @@
-"""SOLID as printed (``method="paper"``), and what the departures of the default are for."""
+"""SOLID as printed (``method="paper"``), and the reasons for the departures of the default."""
 
 import numpy as np
 import pytest
@@ -102,7 +102,7 @@ def test_coordinates_that_leave_come_back_on_the_other_side():
 
 
 def speckle(image):
-    """Return the share of voxels that both neighbours along an axis differ from, the same way, by a third of the range."""
+    """Return the share of voxels that differ from both neighbours along an axis, the same way, by 1/3 of the range."""
     grey = volume.lightness(image)
     least = (np.quantile(grey, 0.95) - np.quantile(grey, 0.05)) / 3
     alone = []
@@ -114,7 +114,7 @@ def speckle(image):
 
 
 def test_neighbours_hardly_ever_go_on_together(of_stripes):
-    """Eight diagonal neighbours make lattices that exchange nothing, and fractions of a voxel never meet."""
+    """Eight diagonal neighbours form separate lattices, and fractions of a voxel never meet."""
     coherent = {m: volume.cell_reuse(made.source_map).coherent for m, made in of_stripes.items()}
     assert coherent["paper"] < 0.03
     assert coherent[None] > 0.65
@@ -142,7 +142,7 @@ def test_turned_textures_lie_wrong_and_are_too_fine(stripes):
 
 
 def test_most_of_which_compensation_cures(stripes):
-    """Neighbours read where the diagonal leads, not where the lattice makes it end: the paper leaves it out."""
+    """Neighbours are read in the diagonal direction, not where the lattice ends it. The paper omits this."""
     field = fields.rotation_3d()
     normal = volume.texture_normal(volume.lightness(stripes))
     off = []

@@ -1,4 +1,4 @@
-"""How pictures are put together from patches: said, or tried and judged."""
+"""Methods to compose images from patches: given, or tried and judged."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Unbounded textures: every part the same however it is asked for."""
+"""Unbounded textures: every part is the same for any request."""
 
 import threading
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def test_a_window_is_the_same_wherever_it_is_seen_from(axes: int, field: str) ->
     other = texture(axes, field)
     larger = other[box(axes, -5, side + 3)]
     assert np.array_equal(larger[box(axes, 5, 5 + side)], wanted)
-    assert np.array_equal(other[box(axes, 0, side)], wanted)  # out of what is kept
+    assert np.array_equal(other[box(axes, 0, side)], wanted)  # from the cache
     with texrs.threads(7):
         forgetful = texture(axes, field, cache_bytes=0)
         assert np.array_equal(forgetful[box(axes, 0, side)], wanted)
@@ -66,7 +66,7 @@ def test_the_same_without_a_field() -> None:
 @pytest.mark.parametrize("field", ["none", "circular"])
 @pytest.mark.parametrize("stage", range(5))
 def test_a_stage_sees_as_far_as_it_says(stage: int, field: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A region that is larger changes nothing, and one that is too small does: the other tests can fail."""
+    """A larger region does not change anything, and a smaller one does, so the other tests can fail."""
     here = Region((16, 16), (-8, 4), (False, False))
     plane = texrs.PlaneTexture(samples.load("pebbles").image[:64, :64], field=FIELDS[field](2), seed=3, quality="fast")
     assert len(plane._world.stages) > stage
@@ -204,7 +204,7 @@ def test_straight_slices_are_planes_of_the_texture() -> None:
 
 
 def test_oblique_slices_carry_places_on() -> None:
-    """No colour is mixed, and a part of a slice is the same."""
+    """No colours are mixed, and a part of a slice is the same."""
     t = texrs.SolidTexture(SOLID, seed=2, interpolation="nearest")
     cut = t.slice((0.3, 0.1, 9.7), normal=(1, 2, 3), size=(60, 20))
     assert cut.shape == (60, 20, 3)
@@ -232,7 +232,7 @@ def test_the_source_map_knows_the_field_where_the_window_lies() -> None:
     here = field.lattice((8, 9), origin=(40, -50))
     exact = texrs.PlaneTexture(PLANE, field=field, quality="fast").window((40, -50), (8, 9))
     assert np.array_equal(exact.source_map.jacobians(), here)
-    # Those of patches are those of the field in their middles.
+    # The frames of patches equal the field in their centres.
     found = texrs.PlaneTexture(PLANE, field=field).window((40, -50), (8, 9))
     assert np.abs(found.source_map.jacobians() - here).max() < 0.6
     assert np.allclose(np.linalg.det(found.source_map.jacobians()), 1, atol=2e-3)

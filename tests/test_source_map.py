@@ -8,7 +8,7 @@ from texrs.errors import FileError, InvalidInput
 
 
 def turned(shape, degrees):
-    """Return a map that turns an exemplar of ``shape`` about its middle, with its frame."""
+    """Return a map that rotates an exemplar of ``shape`` around its centre, with its frame."""
     angle = np.radians(degrees)
     frame = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     middle = (np.array(shape) - 1) / 2
@@ -66,17 +66,17 @@ def test_reuse_counts_pieces():
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
 def test_normals_turn_with_the_frame(dtype):
-    # A plane that falls to the right: x of the normal is positive. Turned by 90 degrees it falls up or down.
+    # A plane that falls to the right: x of the normal is positive. Rotated by 90 degrees it falls up or down.
     normal = np.zeros((21, 21, 3))
     normal[...] = np.array([0.6, 0.0, 0.8])
     encoded = normal if dtype == np.float32 else np.rint((normal + 1) / 2 * np.iinfo(dtype).max)
     encoded = encoded.astype(dtype)
     if dtype == np.float32:
-        encoded[0, 0] = [-1e-3, 0, 1]  # a negative value says that floats are signed
+        encoded[0, 0] = [-1e-3, 0, 1]  # a negative value shows that floats are signed
     quarter = turned((21, 21), 90)
     out = quarter.render(encoded, map_type="normal")[10, 10].astype(float)
     out = out if dtype == np.float32 else out / np.iinfo(dtype).max * 2 - 1
-    # The height that these normals belong to, turned by the same map, gives the direction independently.
+    # The heights of these normals, rotated by the same map, give the direction independently.
     height = quarter.render(np.tile(-0.75 * np.arange(21.0), (21, 1)))
     slope_row, slope_column = height[11, 10] - height[10, 10], height[10, 11] - height[10, 10]
     expected = np.array([-slope_column, slope_row, 1]) / np.sqrt(slope_row**2 + slope_column**2 + 1)
@@ -125,7 +125,7 @@ ARRAYS = {
     ],
 )
 def test_parts_that_make_no_map(name, value):
-    """What is made of such parts would fail later, as where a share of an exemplar's area is asked for."""
+    """Results of such parts would fail later, for example in shares of an exemplar's area."""
     with pytest.raises(InvalidInput, match=name):
         SourceMap(**(ARRAYS | {name: value}))
     with pytest.raises(InvalidInput):
@@ -170,7 +170,7 @@ def test_parts_that_disagree_are_refused():
 
 @pytest.mark.parametrize("green", ["up", "down"])
 def test_directions_of_volumes_turn_in_space(green):
-    """A normal is that of a plane seen through the map, and a step is one that the map takes back."""
+    """A normal belongs to a plane seen through the map, and the map reverses a step."""
     rng = np.random.default_rng(4)
     frames = rng.normal(size=(5, 3, 3)).astype(np.float32)
     start = SourceMap.identity((1, 1, 5))
@@ -181,7 +181,7 @@ def test_directions_of_volumes_turn_in_space(green):
     given = rng.normal(size=3)
     own = given[::-1] * [1, side, 1]  # (plane, row, column)
     exemplar = np.tile(given, (1, 1, 5, 1))
-    exemplar[0, 0, 1:, 0] = -9  # Numbers as they are, whatever the first one is.
+    exemplar[0, 0, 1:, 0] = -9  # Values are not encoded, whatever the first one is.
     for kind, wanted in (
         ("slope", np.einsum("nji,j->ni", frames, own)),
         ("normal", np.einsum("nji,j->ni", frames, own)),

@@ -1,4 +1,4 @@
-"""Volumes whose voxels are not cubes: fields, statistics and pictures are those of space."""
+"""Volumes with voxels that are not cubes: fields, statistics and images are in units of space."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SEMI = (3.2, 2.1, 2.1)
 
 
 def make_ellipsoids(shape: tuple[int, int, int] = (28, 48, 48), count: int = 40) -> np.ndarray:
-    """Return a volume that repeats, with ellipsoids that do not touch."""
+    """Return a periodic volume with separate ellipsoids."""
     rng = np.random.default_rng(0)
     step, semi = np.array(SPACING), np.array(SEMI)
     extent = np.array(shape) * step
@@ -41,7 +41,7 @@ ELLIPSOIDS = make_ellipsoids()
 
 
 def measure(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the median semi-axes of the pieces in millimetres, and the median direction of the longest one."""
+    """Return the median semi-axes of the pieces in millimetres, and the median direction of the longest axis."""
     from scipy import ndimage
 
     labels, _ = ndimage.label(image > 100)
@@ -50,7 +50,7 @@ def measure(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at = np.argwhere(labels[box] == number) * step
         if len(at) < 12 or any(s.start == 0 or s.stop == n for s, n in zip(box, image.shape, strict=True)):
             continue
-        # A voxel is no point.
+        # A voxel has an extent.
         values, vectors = np.linalg.eigh(np.cov(at.T) + np.diag(step**2 / 12))
         axes.append(np.sqrt(5 * values))
         longest = vectors[:, -1]
@@ -74,7 +74,7 @@ def test_ellipsoids_keep_their_axes_in_millimetres(angle: int, wanted: tuple[flo
     # Without a spacing the longest axis has as many voxels as before, which is more millimetres.
     stretched, _ = measure(texrs.solid(ELLIPSOIDS, (30, 56, 56), field=field).image)
     assert stretched[2] > 1.25 * before[2]
-    # Phases stay as they are.
+    # Phases keep their values.
     assert set(np.unique(turned.image)) <= set(np.unique(ELLIPSOIDS))
 
 
@@ -86,7 +86,7 @@ def test_the_command_reads_the_spacing(tmp_path: Path, capsys: pytest.CaptureFix
     wanted = texrs.solid(ELLIPSOIDS, (30, 56, 56), field="rotation:angle=90,plane=xz", spacing=SPACING)
     np.testing.assert_array_equal(io.read_volume(out), wanted.image)
     assert io.read_spacing(out) == SPACING
-    # What is said on the command line counts more than what the file states.
+    # The command line overrides the spacing in the file.
     assert main(["solid", source, "-o", out, *arguments, "--spacing", "1"]) == 0
     plain = texrs.solid(ELLIPSOIDS, (30, 56, 56), field="rotation:angle=90,plane=xz")
     np.testing.assert_array_equal(io.read_volume(out), plain.image)
@@ -121,7 +121,7 @@ def test_frames_are_those_of_space(field: fields.Field) -> None:
     points = np.random.default_rng(1).uniform(0, 30, (50, 3))
     wanted = field.frames(points * step).astype(float) * step / step[:, np.newaxis]
     np.testing.assert_allclose(spaced.frames(points), wanted, rtol=1e-5, atol=1e-6)
-    # A field that has a spacing keeps it, and cubes of side 1 change nothing.
+    # A field with a spacing keeps it, and cubes of side 1 do not change anything.
     assert fields.as_field(spaced, 3, spacing=(1, 2, 3)) is spaced
     assert fields.as_field(field, 3, spacing=(1, 1, 1)) is field
 
@@ -131,7 +131,7 @@ def test_the_middle_and_the_length_are_those_of_the_output_in_space() -> None:
     assert "about (8, 7, 10.5)" in str(wound)
     ramp = fields.as_field("scale_ramp:axis=z", 3, (11, 21, 31), spacing=SPACING)
     assert "along z over 16" in str(ramp)
-    # A length that is left out is so many of the smallest voxel sides.
+    # An omitted length is a number of the smallest voxel sides.
     assert "period 22.4 along x" in str(fields.as_field("zigzag", 3, (11, 21, 31), spacing=SPACING))
     assert "period 0.02" in str(fields.as_field("zigzag:period=0.02", 3, spacing=(0.005, 0.005, 0.005)))
     with pytest.raises(InvalidInput, match="period: must be at least 2 voxels, 1.4, got 1"):

@@ -1,4 +1,4 @@
-"""Splicing: the checks of the specification on samples whose elements are known, and what a user may do wrong."""
+"""Splicing: the checks of the specification on samples with known elements, and user errors."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
     mine, result = ENTRIES[a], spliced(a, b)
     colours, matched = checks.copied(mine, result)
     assert colours == 1.0, "S5"
-    # Connected figures are bent, so none of their pixels is of an element that moved whole.
+    # Connected figures are bent, so none of their pixels belongs to an element that moved as a whole.
     assert (matched is None) == (mine.layout != Layout.DISJOINT), "S5"
     assert matched is None or matched >= 0.99, "S5"
     np.testing.assert_array_equal(view(result.source_map, mine.image), result.image, "S5")
@@ -74,7 +74,7 @@ def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
 @pytest.mark.parametrize(("a", "b"), PAIRS)
 def test_the_ground_is_like_the_texture_s(a: str, b: str, spliced: Any) -> None:
     found = checks.coherence(ENTRIES[a], spliced(a, b))
-    # Pebbles as dense as dots, which are bigger, leave no ground; everywhere else there is some.
+    # Pebbles as dense as dots, which are larger, leave no background. All others leave some.
     assert found is not None or (a, b) == ("pebbles", "dots")
     assert found is None or found[0] <= 1.3 or found[1] <= 0.08, "S8"
 
@@ -104,7 +104,7 @@ def test_moving_all_moves_the_picture(name: str) -> None:
     if name in ("net", "bricks"):
         assert same.all(), "S9"
         return
-    # Separate elements whose straight edges would come in from the top or the right give way to whole ones; scraps, to ground.
+    # Separate elements with straight edges at the top or right are replaced by whole ones, and scraps by background.
     number, _ = label(mine.mask)
     coming = np.isin(number, np.union1d(number[0], number[:, -1])[1:])
     far = ~binary_dilation(coming, iterations=12)[:-5, 3:]
@@ -117,7 +117,7 @@ def test_moving_all_moves_the_picture(name: str) -> None:
 
 
 def joints(sample: samples.Sample) -> list[np.ndarray[Any, np.dtype[np.intp]]]:
-    """The whole vertical joints: their middle pixels, (rows, 2)."""
+    """Return the whole vertical joints: their centre pixels, (rows, 2)."""
     labels = sample.labels
     assert labels is not None
     found = []
@@ -136,7 +136,7 @@ def joints(sample: samples.Sample) -> list[np.ndarray[Any, np.dtype[np.intp]]]:
 
 
 def bend(displacement: np.ndarray[Any, np.dtype[np.float64]]) -> float:
-    """How far the middle line of a joint leaves a straight line: the standard deviation, in pixels."""
+    """Return the deviation of a joint's centre line from a straight line: the standard deviation, in pixels."""
     rows = np.arange(len(displacement))
     return float((displacement - np.polyval(np.polyfit(rows, displacement, 1), rows)).std())
 
@@ -203,7 +203,7 @@ def test_an_element_moves_whole_where_its_centre_lies_beside_it(shape: str, midd
 
 
 def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
-    """Triangles between them carry moved points, the mesh anything else: each reaches its own pixels."""
+    """Triangles between them carry moved points, and the mesh carries the rest: each reaches its own pixels."""
     mine = ENTRIES["dots"]
     listed = texrs.self_splice(mine, {"op": "move", "element": 12, "by": [6, 4]})
     changed = np.argwhere((listed.image != mine.image).any(axis=-1))
@@ -272,7 +272,7 @@ def test_maps_in_register_come_out_in_register() -> None:
     height = np.linspace(0, 1, mine.mask.size, dtype=np.float32).reshape(mine.mask.shape)
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     assert (result.source_map.render(height) == height[rows, columns]).all()
-    # Where the wall goes on as its mirror image, so do the directions on it.
+    # If the wall continues as its mirror image, so do the directions on it.
     frames = result.source_map.jacobians()
     assert set(np.unique(frames)) <= {-1.0, 0.0, 1.0}
     across = np.full((*mine.mask.shape, 3), (0.6, 0.0, 0.8), np.float32)

@@ -1,4 +1,4 @@
-"""Connected textures spliced by cells: where cells come to lie, what they show, and what a user may do wrong."""
+"""Connected textures spliced by cells: positions of cells, their contents, and user errors."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_few_whole_cells_keep_their_size() -> None:
     wide = texrs.self_splice(entry, size=(192, 208), seed=1)
     there = wide.source_map.render(entry.mask, interpolation="nearest")
     assert there.mean() == pytest.approx(entry.mask.mean(), abs=0.05)
-    # As many elements for its area, whole ones and those that the border cuts.
+    # The number of elements fits the area, including those that the border cuts.
     share = len(np.unique(wide.source_map.label)) / entry.labels.max() / (192 * 208 / 128**2)
     assert share == pytest.approx(0.85, abs=0.2)
 
@@ -108,7 +108,7 @@ def test_joints_are_unbroken_and_as_wide(a: str, b: str, spliced: Any) -> None:
         (j > 0.5).sum() / mark_outlines(x).sum()
         for j, x in ((cells.joints, cells.labels), (shown, result.source_map.label))
     ]
-    # Cuts are more jagged than outlines, and so longer.
+    # Cuts are more jagged than outlines, and therefore longer.
     assert 0.7 <= share[1] / share[0] <= 1.33
 
 
@@ -120,7 +120,7 @@ def test_the_result_is_a_source_map(spliced: Any) -> None:
     height = np.linspace(0, 1, STONES.image.size, dtype=np.float32).reshape(SIZE)
     assert result.source_map.render(height).shape == (176, 176)
     frames = result.source_map.jacobians()
-    # A map that is continuous inside of its cells, and whose frames are its slopes.
+    # The map is continuous inside its cells, and its frames are its slopes.
     slope = np.diff(result.source_map.coordinates, axis=1)
     same = np.diff(result.source_map.label.astype(int), axis=1) == 0
     off = np.abs(slope - frames[:, :-1, :, 1]).max(axis=-1)[same]

@@ -17,11 +17,11 @@ from texrs.papers.splice.edit import STEPS
 
 @pytest.fixture(autouse=True)
 def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in a folder that holds two small pictures."""
+    """Work in a folder with two small images."""
     monkeypatch.chdir(tmp_path)
     for name in ("dots", "pebbles"):
         io.write(f"{name}.png", texrs.samples.load(name, size=(96, 96)).image)
-    # What is known need not be found.
+    # Known elements need not be found.
     for name, side in (("bricks", 160), ("pebbles", 96)):
         texrs.ElementAnalysis.of_sample(texrs.samples.load(name, size=(side, side))).save(f"{name}.npz")
 

@@ -1,4 +1,4 @@
-"""The ground between separate elements: as rough as the texture's, with the shadows of elements, and in one light."""
+"""The background between separate elements: as rough as the texture's, with shadows of elements, in one light."""
 
 import numpy as np
 import pytest
@@ -9,12 +9,12 @@ from texrs.elements import ElementAnalysis, Layout
 
 SIDE, RADIUS = 160, 9
 SHADOW = (8, 8)
-"""Where the middle of a disc's shadow lies, from its own."""
+"""Centre of a disc's shadow, relative to the disc."""
 LAYOUT = ElementAnalysis.of_sample(samples.load("pebbles", size=(SIDE, SIDE)))
 
 
 def make_discs(*, shadow: bool = False, light: float = 0.0) -> ElementAnalysis:
-    """Return discs on a rough ground, with a shadow each, or in a light that grows from left to right."""
+    """Return discs with shadows on a rough background, optionally in a light that grows from left to right."""
     rng = np.random.default_rng(2)
     image = 0.5 + rng.normal(0, 0.05, (SIDE, SIDE))
     rows, columns = np.indices(image.shape)
@@ -78,7 +78,7 @@ def test_elements_bring_their_shadows() -> None:
             seen.append(light[row - 1 : row + 2, column - 1 : column + 2].mean() < 255 * 0.35)
     assert len(seen) >= 5
     assert np.mean(seen) > 0.85
-    # And leave none behind.
+    # They do not leave a shadow behind.
     far = find_ground(result)
     assert (light[far] < 255 * 0.3).mean() < 0.12
 
@@ -87,7 +87,7 @@ def test_elements_and_ground_are_in_one_light() -> None:
     mine = make_discs(light=0.8)
     plain, even = (texrs.splice(mine, LAYOUT, seed=1, screening=weight) for weight in (None, 0.01))
     np.testing.assert_array_equal(plain.source_map.coordinates, even.source_map.coordinates)
-    # From what a disc brings along outwards to the ground: where neighbours are none in the texture.
+    # The border of a disc's surroundings, where neighbours are not neighbours in the texture.
     apart = np.abs(np.diff(plain.source_map.coordinates, axis=1)).sum(axis=-1) != 1
     apart &= (plain.source_map.label[:, 1:] == 0) & (plain.source_map.label[:, :-1] == 0)
     rows, columns = np.indices(apart.shape)
@@ -104,7 +104,7 @@ def test_elements_and_ground_are_in_one_light() -> None:
 
 def test_without_ground_to_speak_of_it_is_warped_as_before() -> None:
     mine = make_discs()
-    # Squares of 40 with a line of a pixel between them.
+    # Squares of 40 with lines of one pixel between them.
     mask = np.ones_like(mine.mask)
     mask[::40] = mask[:, ::40] = False
     full = ElementAnalysis(mine.image, mine.points, mask, (39, 39), Layout.DISJOINT, mine.scores)
@@ -124,7 +124,7 @@ def test_what_is_kept_of_a_texture_changes_nothing() -> None:
         return np.asarray(texrs.splice(entry, LAYOUT, seed=seed).image)
 
     discs = make_discs(shadow=True)
-    # Of the same elements, in other colours.
+    # The same elements, in other colours.
     other = replace(discs, image=255 - discs.image)
     fresh = [splice_anew(entry, seed) for entry in (discs, other) for seed in (1, 2)]
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""What keeps large splices, and those of connected figures on layouts unlike theirs, within bounds."""
+"""Bounds of large splices, and of connected figures on very different layouts."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_neighbours_in_walls_go_about_as_far() -> None:
 
 @pytest.mark.parametrize("shifted", [False, True])
 def test_layouts_go_on_as_they_are(shifted: bool) -> None:
-    """Beyond the border each point has the neighbours that points inside have."""
+    """Beyond the border each point has the same neighbours as points inside."""
     points = lattice(7, 7, shifted=shifted, noise=0.5)
     shape = (160, 160)
     found = point_sets.PointLayout.of(points, shape, (False, False), beyond=True)
@@ -97,7 +97,7 @@ def test_outermost_points_do_not_make_a_layout_wider() -> None:
 
 
 def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarser systems and near matches go through the whole of a splice."""
+    """Coarser systems and approximate matches pass through the whole splice."""
     monkeypatch.setattr(energy, "MOST", 1 << 13)
     monkeypatch.setattr(_matching, "DENSE", 0)
     wall = ElementAnalysis.of_sample(samples.load("bricks", size=(128, 128)))
@@ -116,13 +116,13 @@ def test_separate_elements_go_on_unmirrored_on_their_own_layout(name: str) -> No
     inside = ((found >= 0) & (found < 480)).all(axis=1)
     found, which = found[inside], which[inside]
     assert len(found) == pytest.approx(9 * len(mine.points), rel=0.25)
-    # Seen in a mirror at a side of the picture, an element is hardly ever the same one.
+    # An element is hardly ever its own mirror image at a side of the image.
     for axis in range(2):
         seen = found.copy()
         seen[:, axis] = 2 * 319.5 - seen[:, axis]
         away, near = KDTree(found).query(seen)
         close = away < 3
         assert (which[near[close]] == which[close]).sum() < 0.2 * len(found)
-    # Nor does it lie beside itself.
+    # It is not its own neighbour either.
     near = KDTree(found).query(found, k=4)[1][:, 1:]
     assert (which[near] == which[:, np.newaxis]).mean() < 0.1

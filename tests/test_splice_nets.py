@@ -1,4 +1,4 @@
-"""Nets spliced by their graph: where knots come to lie, what they show, and what a user may do wrong."""
+"""Nets spliced by their graph: positions of knots, their contents, and user errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ UNIT = 30.0
 
 
 def draw_net(seed: int = 0, *, shifted: bool = False, jitter: float = 2.0) -> ElementAnalysis:
-    """Draw rings, each joined with its neighbours by slack lines, over a ground of noise."""
+    """Draw rings, each joined to its neighbours by slack lines, over a background of noise."""
     rng = np.random.default_rng(seed)
     lattice = np.argwhere(np.ones((5, 5))) * UNIT + 12.0
     if shifted:

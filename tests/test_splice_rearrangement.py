@@ -1,4 +1,4 @@
-"""Edits of separate elements: what does not move stays, what left is closed by ground, what comes in is whole; and light."""
+"""Edits of separate elements: unmoved ones stay, gaps are filled with background, new ones are whole; and light."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIDE, RADIUS = 160, 9
 
 
 def make_discs(*, light: float = 0.0, noise: float = 0.02, share: float = 1.0) -> ElementAnalysis:
-    """Return discs on a rough ground, in a light that grows from left to right, of which a share falls on the discs."""
+    """Return discs on a rough background, in a light that grows from left to right and partly affects the discs."""
     rng = np.random.default_rng(4)
     rows, columns = np.indices((SIDE, SIDE))
     centres = np.array(
@@ -42,7 +42,7 @@ def find_middle(a: ElementAnalysis) -> int:
 
 
 def count_elements(result: texrs.Synthesis, a: ElementAnalysis) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """How many pixels of an element the result shows of each target."""
+    """Return how many pixels of each target's element the result shows."""
     core = split_foreground(a).core > 0
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     return np.bincount(result.source_map.label.astype(int)[core[rows, columns]], minlength=1)[1:]
@@ -72,7 +72,7 @@ def test_moved_elements_keep_their_colours_above_others() -> None:
 
 @pytest.mark.parametrize("edit", [{"op": "rows", "by": 12}, {"op": "shift", "by": 14}, {"op": "scale", "factor": 0.85}])
 def test_margins_of_dense_textures_are_full(edit: dict[str, Any]) -> None:
-    """Of pebbles hardly any ground is seen; the layout goes on, and is not reflected at pixels."""
+    """Pebbles leave hardly any background visible. The layout continues, and is not mirrored at pixels."""
     stones = ElementAnalysis.of_sample(samples.load("pebbles", size=(192, 192)))
     result = texrs.self_splice(stones, edit, seed=1)
     shown = result.source_map.label > 0
@@ -87,7 +87,7 @@ def test_what_was_removed_leaves_ground_alone() -> None:
     gone = split_foreground(mine).core == one + 1
     rows, columns = result.source_map.coordinates.astype(int)[gone].T
     assert not mine.mask[rows, columns].any()
-    # No ghost: as bright as the ground around.
+    # There is no ghost: it is as bright as the background around.
     around = binary_dilation(gone, iterations=8) & ~binary_dilation(gone, iterations=3)
     here, there = (float(result.image[where].mean()) for where in (gone, around))
     assert abs(here - there) < 3
@@ -107,7 +107,7 @@ def test_nothing_is_cut_but_by_the_border(edit: Any) -> None:
 
 @pytest.mark.parametrize("edit", [{"op": "shift", "by": [10, 15]}, {"op": "rows", "by": 10}])
 def test_elements_that_come_in_are_whole(edit: dict[str, Any]) -> None:
-    """What the border cuts keeps its straight edge at the border: inside of the picture none is seen."""
+    """Cut elements keep their straight edge at the border. No such edge is inside the image."""
     result = texrs.self_splice(BUTTONS, edit, seed=1)
     parts, label = split_foreground(BUTTONS), result.source_map.label.astype(int)
     element = np.array([m["element"] for m in result.report["matches"]])
@@ -115,7 +115,7 @@ def test_elements_that_come_in_are_whole(edit: dict[str, Any]) -> None:
     inner = np.setdiff1d(np.unique(label), np.append(border, 0)) - 1
     assert len(inner) > 20
     assert parts.whole[element[inner]].all()
-    # And no scrap of one lies about but at the border.
+    # Their scraps are only at the border.
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     assert not (BUTTONS.mask[rows, columns] & (label == 0))[12:-12, 12:-12].any()
 
@@ -255,7 +255,7 @@ def test_edits_as_printed(step: str) -> None:
 
 
 def test_ground_is_as_rough_as_it_was() -> None:
-    """Of patches the smoothest fit best: without a say in it, a fifth of the roughness of such a ground is lost."""
+    """The smoothest patches fit best. Without a weight of roughness, such a background loses 20 % of it."""
     mine = make_discs(noise=0.08)
     image = mine.image.copy()
     smooth = (np.indices(mine.mask.shape)[1] // 40) % 2 == 1

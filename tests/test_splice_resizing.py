@@ -1,4 +1,4 @@
-"""Edits of a texture's own layout in another size: what is known of the sample must hold of the larger picture."""
+"""Edits of a texture's own layout in another size: facts about the sample must hold for the larger image."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def test_the_layout_goes_on(name: str) -> None:
     assert (result.report["edit"], result.stages["resized"] is result.image) == ([], True)
     points = np.array(result.report["elements"])
     assert spacing(points) == pytest.approx(spacing(mine.points), rel=0.2)
-    # As many for its area, and no margin without any: an element lies within a spacing of each side, whatever the border cuts.
-    # Cells that the border cuts have their centres in the picture, other elements the whole ones alone.
+    # The number of elements fits the area, and no margin is empty: an element is within a spacing of each side. Cut
+    # cells have their centres in the image, and only whole ones of other elements do.
     count = len(mine.points) if mine.known is None else int(mine.known.max())
     share = len(points) / count / (LARGE[0] * LARGE[1] / 128**2)
     assert share == pytest.approx(1.0, abs=0.25)
@@ -47,7 +47,7 @@ def test_the_map_looks_into_the_texture(name: str, edit: Any) -> None:
     result = texrs.self_splice(mine, edit, LARGE, seed=1, screening=None)
     assert result.source_map.shapes == ((128, 128),)
     np.testing.assert_array_equal(result.source_map.render(mine.image), result.image)
-    # What the map shows at an element's place is one: so the mask says, which took no part in the picture.
+    # The map shows an element at each element's place, according to the mask, which is independent of the image.
     shown = result.source_map.render(mine.mask, interpolation="nearest")
     assert shown.mean() == pytest.approx(mine.mask.mean(), abs=0.12)
 
@@ -86,7 +86,7 @@ def test_steps_are_done_in_the_larger_texture() -> None:
     row, column = points[inner].astype(int)
     assert plain.source_map.render(mine.mask, interpolation="nearest")[row, column]
     assert not result.source_map.render(mine.mask, interpolation="nearest")[row, column]
-    # Far from it nothing changes.
+    # Pixels far from it do not change.
     np.testing.assert_array_equal(result.image[:20, :20], plain.image[:20, :20])
     again = texrs.self_splice(mine, result.report["edit"], LARGE, seed=1)
     np.testing.assert_array_equal(again.image, result.image)

@@ -1,4 +1,4 @@
-"""Stitched patches: what is known of an exemplar for them, how they follow a field, and whether elements stay whole."""
+"""Stitched patches: facts about an exemplar, fields that are followed, and intact elements."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_elements_in_a_plain_background_are_found():
     there = (found.depth > 0) & PARTICLES.mask
     assert there.sum() > 0.75 * PARTICLES.mask.sum()
     assert abs(found.count - len(PARTICLES.centres)) <= 0.15 * len(PARTICLES.centres)
-    # Each particle has one number but for a sample or two, also across the ends.
+    # Each particle has one number except for one or two samples, also across the ends.
     for k in range(1, 11):
         inside = found.labels[(PARTICLES.labels == k) & (found.labels > 0)]
         assert inside.size == 0 or np.bincount(inside).max() > 0.95 * inside.size
@@ -110,7 +110,7 @@ def test_bend_overrules_what_the_exemplar_says(bend):
 
 
 def test_the_frames_of_rigid_patches_are_their_own():
-    """Inside a patch places go on as its frame says, so normals are turned by what was done."""
+    """Inside a patch coordinates follow its frame, so normals are rotated consistently."""
     made = texrs.synthesize(samples.dots((96, 96)).image, 128, field=fields.circular(axes=2), seed=2)
     frames, coordinates, labels = made.source_map.jacobians(), made.source_map.coordinates, made.source_map.label
     for axis in range(2):
@@ -118,7 +118,7 @@ def test_the_frames_of_rigid_patches_are_their_own():
         same = np.diff(labels, axis=axis) == 0
         expected = np.take(frames, range(127), axis)[..., axis]
         near = np.abs(step - expected).max(axis=-1) < 0.01
-        # Where the exemplar repeats, places come around.
+        # If the exemplar is periodic, coordinates wrap.
         assert near[same].mean() > 0.95
 
 
@@ -149,7 +149,7 @@ def test_elements_stay_whole(kind):
 
 @pytest.mark.parametrize("kind", FIELDS)
 def test_elements_keep_their_share_and_number(kind):
-    """Cuts around elements are shorter than cuts between them, and would leave fewer than there are."""
+    """Cuts around elements are shorter than cuts between them, so elements would get fewer."""
     exemplar = texrs.Exemplar(PARTICLES.image, axes=3)
     depth = exemplar.instances.depth
     shares, numbers = [], []
@@ -164,7 +164,7 @@ def test_elements_keep_their_share_and_number(kind):
 
 
 def test_elements_are_counted_without_bias():
-    """A part of what repeats has as many elements for its size as the whole has, though its ends cut many."""
+    """A part of a periodic texture has the same density of elements as the whole, though its ends cut many."""
     exemplar = texrs.Exemplar(PARTICLES.image, axes=3, repeat=True)
     places = np.stack(np.meshgrid(*(np.arange(48),) * 3, indexing="ij"), axis=-1)
     counts = []
@@ -210,7 +210,7 @@ def test_rare_things_keep_their_share():
 
 
 def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
-    """Things in a heap, which no background parts, are not found for sure."""
+    """Elements in a heap, without a background between them, are not found reliably."""
     picture = texrs.samples.beans((160, 160)).image
     exemplar = texrs.Exemplar(picture, repeat=False)
     assert exemplar.instances is None
@@ -218,7 +218,7 @@ def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
     assert not exemplar.stitcher.separate
     torn = [evaluate(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source_map).torn for seed in range(3)]
     monkeypatch.setattr(_exemplar, "guess_instances", lambda parts: None)
-    # Said in another way, so that it is another exemplar, of which nothing is kept.
+    # Use other options, so that it is another exemplar without cached facts.
     unaware = texrs.Exemplar(picture, repeat=False, labels=False)
     assert not unaware.stitcher.guessed
     before = [evaluate(exemplar, texrs.synthesize(unaware, 160, seed=seed).source_map).torn for seed in range(3)]

@@ -1,4 +1,4 @@
-"""Past one process: Dask, Zarr, workers that are killed, stores that are gone on with."""
+"""Several processes: Dask, Zarr, killed workers, continued stores."""
 
 import errno
 import hashlib
@@ -46,7 +46,7 @@ def client() -> Iterator[Client]:
 
 
 def digest(path: Path) -> dict[str, str]:
-    """Return digests of all values that are stored, by array."""
+    """Return digests of all stored values, by array."""
     found: dict[str, str] = {}
 
     def walk(group: Any) -> None:
@@ -276,7 +276,7 @@ def test_a_full_disk_leaves_no_half_chunk(tmp_path: Path, monkeypatch: pytest.Mo
         nonlocal writes
         writes += 1
         if writes == 3:
-            # Cut off in the middle of the file, as a full disk does.
+            # Cut the file off in the middle, as a full disk does.
             import zarr.storage._local as local
 
             with pytest.MonkeyPatch.context() as patch:
@@ -295,7 +295,7 @@ def test_a_full_disk_leaves_no_half_chunk(tmp_path: Path, monkeypatch: pytest.Mo
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of 160 kB."""
+    """Create a disk of 160 kB."""
     folder = tmp_path / "disk"
     folder.mkdir()
     if shutil.which("mount") is None or subprocess.run([*_mount("size=160k"), folder], capture_output=True).returncode:
@@ -380,7 +380,8 @@ def test_results_of_other_shapes_are_named(tmp_path: Path) -> None:
         stores.map_to_zarr(np.zeros, [2, 2, 3], tmp_path / "m.zarr")
     with pytest.raises(FileError, match="contains other data"):
         stores.map_to_zarr(np.zeros, [2, 2], tmp_path / "m.zarr")
-    stores.map_to_zarr(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)  # Sent by cloudpickle.
+    # cloudpickle sends the function.
+    stores.map_to_zarr(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)
     assert stores.open_store(tmp_path / "l.zarr").compute().tolist() == [[1, 1], [2, 2]]
 
 
@@ -390,7 +391,7 @@ def test_what_always_ends_its_worker_is_said(tmp_path: Path) -> None:
 
 
 def test_what_ends_its_worker_stops_no_other_where_that_is_asked_for() -> None:
-    """Those that wait at a worker that ends are not to blame, however often it does."""
+    """Tasks that wait at a worker that ends are not to blame, however often this happens."""
     found = dict(workers.run(end, range(8), 1, spare=True))
     assert {n: r for n, r in found.items() if n not in (2, 5)} == {n: n * n for n in range(8) if n not in (2, 5)}
     assert all(isinstance(found[n], stores.WorkerLost) for n in (2, 5))
@@ -398,7 +399,7 @@ def test_what_ends_its_worker_stops_no_other_where_that_is_asked_for() -> None:
 
 
 def test_a_worker_that_is_to_stop_raises_only_in_its_task(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Elsewhere the pool would tell of an exception, as where it begins."""
+    """Elsewhere the pool would report an exception, for example at its start."""
     left: list[int] = []
     monkeypatch.setattr(os, "_exit", left.append)
     monkeypatch.setattr(workers, "_LEAVING", True)
@@ -412,13 +413,13 @@ def test_a_worker_that_is_to_stop_raises_only_in_its_task(monkeypatch: pytest.Mo
             workers._do(15)
         warnings.warn(
             "a coroutine was never awaited", RuntimeWarning, stacklevel=1
-        )  # Would be told of, and nobody asked.
+        )  # It would be reported, although nobody asked.
     assert left == [1]
     assert not workers._BUSY
 
 
 def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> None:
-    """One that ends its workers is found among those that it was handed out with."""
+    """A task that ends its workers is found among the tasks of its group."""
     found = dict(workers.run(end_late, range(90), client, spare=True))
     assert {n: r for n, r in found.items() if n != 44} == {n: n * n for n in range(90) if n != 44}
     assert isinstance(found[44], stores.WorkerLost)
@@ -442,7 +443,7 @@ def test_a_scheduler_that_does_not_answer_is_named(error: Exception, monkeypatch
             raise error
 
         def __del__(self) -> None:
-            """Nothing began."""
+            """Do nothing, because nothing began."""
 
     monkeypatch.setattr("distributed.Client", Deaf)
     with pytest.raises(
@@ -452,7 +453,7 @@ def test_a_scheduler_that_does_not_answer_is_named(error: Exception, monkeypatch
 
 
 def read_limits(number: int) -> texrs.limits.Limits:
-    """Return the limits that a worker goes by."""
+    """Return the limits in force in a worker."""
     return texrs.limits.current()
 
 
@@ -462,7 +463,7 @@ def test_workers_go_by_the_limits_of_who_asks(scheduler: int | str | None, reque
     with texrs.limits.context(pixels=1000, voxels=2000, memory=3e8, seconds=60):
         ((_, found),) = workers.run(read_limits, [0], where)
     assert (found.pixels, found.voxels, found.memory) == (1000, 2000, 3 * 10**8)
-    # What is done for others is not held to them.
+    # Work for others does not have these limits.
     ((_, found),) = workers.run(read_limits, [0], where)
     assert (found.pixels, found.voxels) == (2**28, 2**28)
 

@@ -1,4 +1,4 @@
-"""The notices of what is linked into the extension are those of the crates that are locked."""
+"""The notices of the crates that are linked into the extension equal those of the locked crates."""
 
 import re
 import shutil

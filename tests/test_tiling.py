@@ -1,4 +1,4 @@
-"""Cyclic pictures: no jump across the wrap, a cut that closes on itself, every map in register."""
+"""Tileable images: no jump across the wrap, a cut that closes on itself, every map in register."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def picture(name: str, side: int = 256) -> np.ndarray:
 
 
 def jumps(image: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the differences of neighbours along an axis inside, and those across the wrap."""
+    """Return the differences of inner neighbours along an axis, and the differences across the wrap."""
     grey = guidance(as_image(image)).astype(np.float64)
     inner = np.abs(np.diff(grey, axis=axis)).mean(axis=-1)
     return inner, np.abs(np.take(grey, 0, axis) - np.take(grey, -1, axis)).mean(axis=-1)
 
 
 def worst_run(across: np.ndarray, length: int = 9) -> float:
-    """Return the largest mean of a run of the wrap, which is itself cyclic."""
+    """Return the maximum mean of a run along the wrap, which is periodic itself."""
     return float(np.convolve(np.r_[across, across[: length - 1]], np.ones(length) / length, "valid").max())
 
 
@@ -51,11 +51,11 @@ def test_no_jump_across_the_wrap(name):
     for axis in (0, 1):
         inner, across = jumps(made.image, axis)
         assert worst_run(across) <= 2 * np.percentile(inner, 99)
-        # Copies side by side: the line at the wrap is no outlier among all lines.
+        # In copies side by side, the line at the wrap is not an outlier.
         lines = inner.mean(axis=1 - axis)
         assert across.mean() <= lines.mean() + 3 * lines.std()
     assert max(texrs.check_tiling(made.image).seam) <= 1.5
-    # Neither does the cut show as a line of its own.
+    # The cut is not visible as a line either.
     for axis in (0, 1):
         lines = jumps(made.image, axis)[0].mean(axis=1 - axis)
         before = jumps(image, axis)[0].mean(axis=1 - axis)
@@ -88,7 +88,7 @@ def test_a_joint_followed_from_a_small_picture_is_about_as_cheap_as_the_cheapest
         for overlap in {*range(25, most + 1, 9), found.joint.width}
     }
     assert cost[found.joint.width] == pytest.approx(found.cuts[0].value, rel=1e-3)
-    # The cheapest of all may lose more of the picture, or not fit.
+    # The cheapest of all may lose more of the image, or not fit.
     assert found.cuts[0].value <= 1.3 * min(cost.values())
 
 
@@ -108,7 +108,7 @@ def test_few_cuts_are_made_at_the_full_size(monkeypatch):
 @pytest.mark.parametrize("name", ["beans", "pebbles"])
 def test_cuts_spare_the_inside_of_things(name):
     guide = guidance(as_image(picture(name)))
-    # Light elements on dark ground.
+    # There are light elements on a dark background.
     depth = np.clip((guide.mean(axis=-1) - 0.35) / 0.1, 0, 1).astype(np.float32)
     deep = []
     for given in (0 * depth, depth):
@@ -148,7 +148,7 @@ def test_a_lattice_is_cut_at_whole_periods_and_the_report_contains_the_reason(na
         made.report["resized"][key]
         == f"256 -> {length} pixels: {round(length / period)} whole periods of about {period}"
     )
-    # As large as possible: not even half of a period more would have been overlapped.
+    # The overlap is minimal: less than half a period longer.
     assert length > 256 - 1.5 * period
 
 
@@ -159,7 +159,7 @@ def test_a_lattice_closes_at_sizes_larger_than_the_picture():
     image = np.tile((unit - unit.min()) / np.ptp(unit), (5, 4))[:160, :170].astype(np.float32)
     made = texrs.tile(image, size=(205, 285))
     assert made.report["method"] == "quilt"
-    # Five of each, so 41 and 57 pixels long.
+    # There are five of each, so they are 41 and 57 pixels long.
     off = np.abs(made.image - np.roll(made.image, (41, 57), (0, 1))).mean()
     assert off < 0.15 * made.image.std(), off / made.image.std()
 
@@ -178,7 +178,7 @@ def test_a_seam_that_closes_costs_no_more_than_the_least_one_but_for_little():
 
 
 def sheared() -> np.ndarray:
-    """Return a smooth picture, cyclic along its columns, whose ends agree along a slope, and less along a ring."""
+    """Return a smooth image, periodic along its columns, whose ends agree along a slope, and less along a ring."""
     r, c = np.mgrid[:128, :64].astype(np.float32)
     image = 0.3 + 0.05 * np.sin(2 * np.pi * c / 64) + 0.05 * np.sin(2 * np.pi * r / 40)
     row, column = r[:16], c[:16]
@@ -189,7 +189,7 @@ def sheared() -> np.ndarray:
 
 
 def join_rows(guide: np.ndarray, closed: bool) -> texrs.SourceMap:
-    """Return the map of a picture whose rows are joined with an overlap of 16."""
+    """Return the map of an image whose rows are joined with an overlap of 16."""
     levels = make_levels(guide, np.zeros(guide.shape[:2], np.float32))
     found = find_joint(levels, 0, Choice(16, 16), closed=closed, progress=lambda share: None)
     line, piece = lay_out(guide.shape[1], found)
@@ -201,7 +201,7 @@ def test_an_open_second_cut_reopens_the_first_wrap():
     guide, run, torn = sheared(), {}, {}
     for closed in (False, True):
         source = join_rows(guide, closed)
-        # Rows in which the two sides of the wrap come from different ends of the picture.
+        # Rows where the two sides of the wrap come from different ends of the image.
         torn[closed] = int((source.label[:, 0] != source.label[:, -1]).sum())
         inner, across = jumps(source.render(guide), 1)
         run[closed] = worst_run(across) / np.percentile(inner, 99)
@@ -220,7 +220,7 @@ def test_the_size_is_kept_where_a_cover_shows_no_more(name):
     made = texrs.tile(image)
     assert made.image.shape == image.shape
     assert all(j["cover"] > 0 and j["overlap"] == 0 for j in made.report["joints"].values())
-    # What covers the ends is from elsewhere in the picture, and nothing but the ends is covered.
+    # The cover of the ends is from elsewhere in the image, and covers only the ends.
     assert 0.6 < (made.source_map.reuse().verbatim) <= 1
 
 

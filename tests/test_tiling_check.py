@@ -1,4 +1,4 @@
-"""What tiles already stays as it is, and everything else changes as little as possible."""
+"""Tileable images stay unchanged, and all others change as little as possible."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def pixel_art() -> np.ndarray:
 
 
 def multiply(image: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Return a picture that is lit unevenly across its width."""
+    """Return an image with uneven light across its width."""
     ramp = np.linspace(low, high, image.shape[1])[:, np.newaxis]
     return np.clip(np.rint(image * ramp), 0, 255).astype(np.uint8)
 
@@ -39,7 +39,7 @@ def test_crops_do_not_tile_and_textures_that_wrap_do(name):
     assert texrs.check_tiling(image).tiles == (False, False)
     wrapped = texrs.tile(image).image
     assert texrs.check_tiling(wrapped).tiles == (True, True)
-    # Wherever the border of a picture that tiles is put.
+    # The result does not depend on the position of the border in a tileable image.
     assert sum(sum(texrs.check_tiling(np.roll(wrapped, (k, 3 * k), (0, 1))).tiles) for k in (7, 23, 41)) >= 5
 
 
@@ -69,7 +69,7 @@ def test_light_that_differs_at_the_ends_does_not_tile():
 
 
 def test_a_lattice_out_of_step_does_not_tile():
-    # Any two lines of noise differ alike; only what is a period away tells.
+    # Any two lines of noise differ equally. Only lines a period apart give evidence.
     image = np.tile(np.random.default_rng(3).integers(0, 256, (20, 28, 3), dtype=np.uint8), (7, 6, 1))
     assert texrs.check_tiling(image).tiles == (True, True)
     assert texrs.check_tiling(image[:131, :150]).tiles == (False, False)
@@ -110,7 +110,7 @@ def test_only_pictures_are_checked():
 
 
 def split(image: np.ndarray, factor: float) -> tuple[np.ndarray, texrs.SourceMap]:
-    """Return an image whose right half is from other rows and in other light, and its source map."""
+    """Return an image whose right half has other rows and other light, and its source map."""
     rows, columns = image.shape[:2]
     at = np.stack(np.indices((rows, columns)), axis=-1).astype(np.float32)
     at[:, columns // 2 :, 0] = (at[:, columns // 2 :, 0] + rows // 2) % rows
@@ -130,7 +130,7 @@ def test_a_step_across_a_seam_inside_the_image_is_measured():
     assert texrs.check_tiling(made).step == (None, None)
     assert not texrs.check_tiling(made).visible
     assert found.report()["columns"]["step"] == found.step[1]
-    # The same seam in even light does not show.
+    # The same seam in even light is invisible.
     assert texrs.check_tiling(*split(picture("grit"), 1.0)).step[1] < 1
     material = texrs.Material({"albedo": made, "height": np.full(made.shape[:2], 9, np.uint16)})
     assert texrs.check_tiling(material, source).step == found.step

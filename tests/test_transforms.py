@@ -1,4 +1,4 @@
-"""Pictures to train on, with their labels and boxes."""
+"""Training images, with their labels and boxes."""
 
 import multiprocessing
 import pickle
@@ -17,7 +17,7 @@ SIDE = 96
 SAMPLE = texrs.samples.load("dots", size=(SIDE, SIDE))
 IMAGE, LABELS = SAMPLE.image, SAMPLE.labels
 ROWS, COLUMNS = np.indices((SIDE, SIDE)).astype(np.int32)
-# left, top, right, bottom and the label that the box is around.
+# left, top, right, bottom, and the label that the box surrounds.
 BOXES = np.array(
     [
         [
@@ -44,7 +44,7 @@ def test_labels_and_everything_else_follow():
     assert made.image.shape == IMAGE.shape
     assert made.image.dtype == IMAGE.dtype
     assert not np.array_equal(made.image, IMAGE)
-    # Where each pixel comes from, by maps of coordinates that went along.
+    # Maps of coordinates that were transformed too give the source of each pixel.
     rows, columns = (AUGMENT(IMAGE, each, seed=3).mask for each in (ROWS, COLUMNS))
     assert np.array_equal(made.image, IMAGE[rows, columns])
     assert np.array_equal(made.mask, LABELS[rows, columns])
@@ -65,7 +65,7 @@ def test_boxes_are_around_what_is_seen_of_them():
             size = (BOXES[int(label) - 1, 2:4] - BOXES[int(label) - 1, :2])[::-1]
             whole += own.shape == tuple(size) and own.sum() == (label == LABELS).sum()
             assert own.any()
-    # Most are whole things, in boxes as tight as theirs.
+    # Most are whole elements, in equally tight boxes.
     assert whole >= seen / 2
 
 
@@ -126,7 +126,7 @@ def test_things_of_large_pictures_are_found_on_half_of_the_samples(dtype: str):
     found = find_things(texrs.Exemplar(image)).labels
     assert found is not None
     assert found.shape == (160, 150)
-    # Nearly those of all samples, each with a number of its own.
+    # Nearly all elements of all samples are found, each with its own number.
     whole = texrs.Exemplar(image).segment().elements
     assert ((found > 0) == (whole > 0)).mean() > 0.93
     assert found.max() == pytest.approx(whole.max(), rel=0.2)
@@ -145,7 +145,8 @@ def test_what_keeps_to_lines_is_found_on_all_samples():
 def test_workers_make_the_same_however_they_are_started(start: str):
     if start not in multiprocessing.get_all_start_methods():
         pytest.skip(f"this system cannot {start}")
-    expected = [work(seed) for seed in range(3)]  # Here first: the pool of threads is there when workers are forked.
+    # Compute here first, so that the thread pool exists when workers are forked.
+    expected = [work(seed) for seed in range(3)]
     with multiprocessing.get_context(start).Pool(2) as pool:
         assert pool.map(work, range(3)) == expected
 

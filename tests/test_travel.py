@@ -1,4 +1,4 @@
-"""What a worker needs travels: small, and with the same bytes in whatever process."""
+"""Data for workers are small when pickled, and give the same bytes in every process."""
 
 import copy
 import hashlib
@@ -28,7 +28,7 @@ def digest(array: np.ndarray) -> str:
 
 
 def used() -> texrs.Exemplar:
-    """Return an exemplar of which much is known."""
+    """Return an exemplar with many cached facts."""
     exemplar = texrs.Exemplar(WEAVE, repeat=(False, True))
     exemplar.analyse()
     exemplar.segment()
@@ -51,7 +51,7 @@ TEXTURES = [name for name in THINGS if name not in ("exemplar", "volume")]
 
 
 def show(thing: Any) -> list[str]:
-    """Return digests of what a thing makes."""
+    """Return digests of an object's results."""
     if isinstance(thing, texrs.Exemplar):
         found = thing.analyse().arrays()
         return [digest(found[name]) for name in sorted(found)] + [repr((thing.labels, thing.repeat))]
@@ -93,7 +93,7 @@ def test_options_travel() -> None:
 
 
 def test_what_arrives_again_is_what_arrived_before() -> None:
-    """So that parts that are sent one by one share what the texture keeps."""
+    """This lets parts that are sent one by one share the texture's cache."""
     sent = pickle.dumps(texrs.PlaneTexture(WEAVE, seed=12))
     first = pickle.loads(sent)
     first[0:8, 0:8]
@@ -120,7 +120,8 @@ def test_workers_make_the_same(method: str) -> None:
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip("not on this system")
     things = [THINGS[name]() for name in ("plane with a field", "fast plane", "solid", "material")]
-    wanted = [show(thing) for thing in things]  # Here first: the pool of threads is there when workers are forked.
+    # Compute here first, so that the thread pool exists when workers are forked.
+    wanted = [show(thing) for thing in things]
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(method)) as pool:
         assert list(pool.map(show, things)) == wanted
 

@@ -1,4 +1,4 @@
-"""The same bytes as before: results against the digests stored of them (see `truth`)."""
+"""The same bytes as before: results compared with their stored digests (see `truth`)."""
 
 import os
 import subprocess
@@ -13,8 +13,8 @@ import texrs
 from truth import elements, grown, pictures, table  # noqa: F401  # The cases enter the table.
 from truth.table import CASES, differences, witness
 
-# One thread and several; of several few and many in their turn. Analyses are kept by content, so a case's first run makes them:
-# one and several come first in their turn too.
+# Use one thread and several, in both orders. Analyses are cached by content, so the first run of a case computes them.
+# Runs with one thread and with several therefore also take turns as the first.
 COUNTS = ((1, 2), (7, 1), (2, 1), (1, 7))
 RUNS = [(name, count) for i, name in enumerate(sorted(CASES)) for count in COUNTS[i % 4]]
 HOW = "if that is meant, run REGENERATE=1 python -m pytest tests/test_truth.py, and look at the diff of digests.json"
@@ -27,12 +27,12 @@ FUNCTIONS = {
     scipy.fft: "fft2 ifft2 rfft2 irfft2 fftn ifftn rfftn irfftn",
     skimage.color: "rgb2lab lab2rgb",
 }
-"""What ends in other bits on other processors: in the last of 53, which is seen nowhere, or of 24, which is."""
+"""Functions whose last bit differs between processors: of 53, which is never visible, or of 24, which is."""
 
 
 @pytest.fixture(autouse=True)
 def functions_in_double(monkeypatch):
-    """Refuse texrs whatever NumPy and the like would work out in single precision."""
+    """Refuse single-precision calls of these functions by texrs."""
     own = os.path.dirname(texrs.__file__)
 
     def watched(name, function):
@@ -44,7 +44,7 @@ def functions_in_double(monkeypatch):
             )
             return out
 
-        # Methods of ufuncs: np.subtract.outer.
+        # Replace methods of ufuncs too, such as np.subtract.outer.
         call.__dict__.update(
             {key: getattr(function, key) for key in ("outer", "reduce", "at") if hasattr(function, key)}
         )
@@ -57,7 +57,7 @@ def functions_in_double(monkeypatch):
 
 @pytest.fixture(scope="module")
 def stored():
-    """Return the stored table; with REGENERATE=1 in the environment, write it anew first."""
+    """Return the stored table. With REGENERATE=1 in the environment, write it first."""
     if os.environ.get("REGENERATE") == "1":
         table.write({name: witness(make()) for name, make in CASES.items()})
     return table.read()
@@ -73,7 +73,7 @@ def test_results_are_the_stored_ones(name, count, stored):
 
 
 def test_a_simpler_processor_gives_the_same_bytes():
-    """Without what NumPy and OpenBLAS do with wide registers, whose sums and functions differ in the last bits."""
+    """Disable wide registers in NumPy and OpenBLAS, whose sums and functions differ in the last bits."""
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
     wide = [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
@@ -116,7 +116,7 @@ def test_what_differs_is_named():
     assert [sentence.split(":")[0] for sentence in sentences] == ["frame", "image", "report shares", "stage"]
     assert "mean 0.000000, now" in sentences[1]
     assert sentences[2].endswith("stored [0.25, 0.75], now [0.25, 0.5]")
-    # Of what is long a digest is stored, which is of all of it; of arrays, whatever their mean is printed as.
+    # A digest covers all of a long value, and all of an array, whatever mean is printed.
     first, second = (witness({"log": [*range(100), last]}) for last in (1, 2))
     assert len(differences(first, second)) == 1
     assert differences({"image": "ab | mean 0.1"}, {"image": "ab | mean 0.2"}) == []

@@ -1,4 +1,4 @@
-"""What a type checker sees: verbs refuse options that they do not have, and values of other types."""
+"""Type checks of calls: verbs refuse options that they do not have, and values of other types."""
 
 import subprocess
 import sys
@@ -33,13 +33,13 @@ CALLS = {
     "Guide": "texrs.Guide(exemplar=image, output=image",
     "Exemplar": "texrs.Exemplar(image",
 }
-"""How each verb and each group of options is called, short of the last bracket."""
+"""Calls of each verb and each group of options, without the last bracket."""
 HEAD = "import numpy as np\nimport texrs\nimage = np.zeros((32, 32), np.uint8)\nsource = texrs.SourceMap.identity((32, 32))\n"
 
 
 @pytest.fixture(scope="module")
 def complaints(tmp_path_factory: pytest.TempPathFactory) -> dict[int, str]:
-    """Return what mypy says of each line: two a call, of which the second misspells an option."""
+    """Return mypy's errors by line. Each call has two lines, and the second misspells an option."""
     file = tmp_path_factory.mktemp("typing") / "calls.py"
     lines = [
         line

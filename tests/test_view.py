@@ -1,4 +1,4 @@
-"""What is said of a plane in a photograph: what is refused, what is settled, and all is checked before anything is found."""
+"""Views of planes in photographs: errors, conversions, and checks before anything is searched."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Volumes in a page: all voxels are there, in few bytes, and something is seen where scripts do not run."""
+"""Volumes in a page: all voxels are there, in few bytes, and there is an image without scripts."""
 
 import io
 import json
@@ -23,7 +23,7 @@ STRIPES = samples.stripes((32, 36, 40))
 
 
 def take_apart(page: str) -> tuple[np.ndarray, np.ndarray, dict[str, list[int]]]:
-    """Return the voxels in a page, the picture that stands for them, and what the script is told."""
+    """Return the voxels in a page, its static image, and the data of its script."""
     pictures = {kind: b64decode(code) for kind, code in re.findall(r"data:image/(\w+);base64,([^\"]+)", page)}
     sheet, still = (np.asarray(Image.open(io.BytesIO(pictures[kind]))) for kind in ("webp", "png"))
     told = {name: json.loads(re.search(rf"\b{name} = (\[[^]]*\]|\d+)", page)[1]) for name in ("n", "step", "wide")}
@@ -46,7 +46,7 @@ def test_all_voxels_are_there(shape: tuple[int, ...], channels: int) -> None:
     voxels, still, told = take_apart(page)
     shown = given if channels > 2 else np.repeat(given[..., :1], 3, axis=-1)
     if channels == 4:
-        solid = shown[..., 3] > 0  # What is clear has no colour.
+        solid = shown[..., 3] > 0  # Transparent voxels have no colour.
         assert_array_equal(voxels[solid], shown[solid])
     else:
         assert_array_equal(voxels, shown)

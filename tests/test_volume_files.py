@@ -1,4 +1,4 @@
-"""Volumes for other programs: written so that they and texrs read them back; what is damaged gets a sentence."""
+"""Volumes for other programs: written so that they and texrs read them back. Damaged files give an error message."""
 
 import base64
 import gzip
@@ -68,7 +68,7 @@ def test_nrrd_of_other_programs_is_read(tmp_path, encoding, endian):
     data = volume.astype(volume.dtype.newbyteorder("<>"[endian == "big"]))
     nrrd.write(str(tmp_path / "a.nrrd"), data.T, {"encoding": encoding, "endian": endian})
     assert_array_equal(tio.read_volume(tmp_path / "a.nrrd"), volume)
-    # Four axes of which the slowest is the channels.
+    # There are four axes, and the slowest is the channels.
     four = make.picture((6, 4, 5, 2), "float32")
     header = {"encoding": encoding, "kinds": ["domain", "domain", "domain", "list"]}
     nrrd.write(str(tmp_path / "b.nrrd"), np.moveaxis(four, -1, 0).T, header)
@@ -143,7 +143,7 @@ def test_surfaces(tmp_path):
     tio.write_surface(tmp_path / "a.stl", corners, faces)
     data = (tmp_path / "a.stl").read_bytes()
     assert len(data) == 84 + 50 * 4
-    assert not data.startswith(b"solid")  # which would say that it is text
+    assert not data.startswith(b"solid")  # otherwise the file would count as text
     assert struct.unpack("<I", data[80:84]) == (4,)
     facet = np.frombuffer(data[84:], [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])
     assert_array_equal(facet["c"], corners[faces])
@@ -329,7 +329,7 @@ def test_hostile_headers_get_a_sentence(tmp_path, name, content, error, says):
 
 
 def test_compressed_zeros_take_no_memory(tmp_path):
-    """A megabyte that unpacks to a gigabyte, of which the header asks for eight bytes."""
+    """A megabyte expands to a gigabyte, and the header requests eight bytes."""
     import tracemalloc
 
     bomb = gzip.compress(bytes(2**28), 9)

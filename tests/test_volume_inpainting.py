@@ -20,7 +20,7 @@ def make_ball(shape: tuple[int, ...], radius: float) -> np.ndarray:
 
 
 def measure_step(volume: np.ndarray, hole: np.ndarray) -> float:
-    """Return the mean difference across the border of a hole, in that of neighbours elsewhere."""
+    """Return the mean difference across the border of a hole, divided by that of neighbours elsewhere."""
     values = volume.astype(float).reshape(*hole.shape, -1)
     across, elsewhere = [], []
     for axis in range(3):
@@ -55,16 +55,16 @@ def test_a_hole_has_no_step_at_its_border(name: str) -> None:
     assert (result.image[~hole] == volume[~hole]).all()
     assert measure_step(result.image, hole) <= 1.2
     assert result.image.dtype == volume.dtype
-    # The map alone is exact, and looks nowhere into the hole.
+    # The map alone is exact, and never points into the hole.
     np.testing.assert_array_equal(result.source_map.render([given]), result.stages["before_blending"])
     places = np.rint(result.source_map.coordinates).astype(int)
     assert not hole[tuple(np.moveaxis(places, -1, 0))].any()
-    # What was in the hole does not matter.
+    # The former contents of the hole do not matter.
     assert (texrs.inpaint(volume, hole, seed=3).image == result.image).all()
 
 
 def make_cells(seed: int = 5) -> np.ndarray:
-    """Return labels of cells around random points, which wrap."""
+    """Return periodic labels of cells around random points."""
     points = np.random.default_rng(seed).uniform(0, 40, (60, 3))
     grid = np.moveaxis(np.indices((40, 40, 40)), 0, -1)[..., np.newaxis, :]
     away = np.abs(grid - points)
@@ -81,7 +81,7 @@ def test_smaller_patches_are_tried_if_the_border_of_a_hole_shows() -> None:
     assert steps[0] < 0.85 * steps[1]
     assert made.report["candidates"][0] == [usual, round(steps[1], 3)]
     assert least <= made.report["patch_size"] < usual
-    # The first size stays if its border does not show.
+    # The first size stays if its border is invisible.
     stripes = samples.stripes((40, 40, 40)).image
     assert len(texrs.inpaint(stripes, hole, seed=1).report["candidates"]) == 1
 

@@ -1,4 +1,4 @@
-"""Volumes as people have them: folders of slices, stacks of ImageJ, samples without a header, oriented scans."""
+"""Volumes from users: folders of slices, stacks of ImageJ, samples without a header, oriented scans."""
 
 from pathlib import Path
 
@@ -82,7 +82,7 @@ def test_imagej_states_the_spacing(tmp_path):
     tio.write_volume(tmp_path / "c.tif", coloured, spacing=(3, 2, 1))
     assert tio.read_volume(tmp_path / "c.tif").shape == coloured.shape
     assert tio.read_spacing(tmp_path / "c.tif") == (3, 2, 1)
-    # A stack that states nothing, and one of several planes without a spacing.
+    # One stack states nothing, and one has several planes without a spacing.
     tio.write_volume(tmp_path / "d.tif", volume)
     assert tio.read_spacing(tmp_path / "d.tif") is None
     tifffile.imwrite(tmp_path / "e.tif", volume, resolution=(72, 72))
@@ -96,7 +96,7 @@ def test_samples_without_a_header(tmp_path, dtype):
     np.testing.assert_array_equal(tio.read_volume(tmp_path / "scan.raw", shape=(6, 7, 8), dtype=dtype), volume)
     words = volume.dtype.name + (":big" if dtype.startswith(">") else "")
     np.testing.assert_array_equal(tio.read_volume(f"{tmp_path}/scan.raw:8x7x6:{words}"), volume)
-    # A fourth number is that of channels.
+    # A fourth number is the number of channels.
     assert tio.read_volume(f"{tmp_path}/scan.raw:4x7x6x2:{words}").shape == (6, 7, 4, 2)
 
 
@@ -148,7 +148,7 @@ def test_orientation_origin_and_units_of_nifti_go_through(tmp_path):
     # Another spacing keeps the directions.
     tio.write_volume(tmp_path / "c.nii", volume, spacing=(3.2, 0.7, 0.7), like=tmp_path / "a.nii.gz")
     np.testing.assert_allclose(nibabel.load(tmp_path / "c.nii").affine[:3, 2], (0, 0, 3.2), atol=1e-6)
-    # To another kind of file the spacing goes through.
+    # The spacing is kept in another kind of file.
     tio.write_volume(tmp_path / "c.nrrd", volume, like=tmp_path / "a.nii.gz")
     np.testing.assert_allclose(tio.read_spacing(tmp_path / "c.nrrd"), (1.6, 0.7, 0.7), rtol=1e-6)
 
@@ -189,7 +189,7 @@ def test_commands_read_folders_and_headerless_samples(tmp_path, capsys, monkeypa
         assert tio.read_volume("a.tif").shape == (20, 20, 20)
     assert main(["solid", "scan.raw:28x24x20:uint16:big", "-o", "scan.raw", "--size", "20", "-q"]) == 2
     assert "scan.raw is an input" in capsys.readouterr().err
-    # What a format cannot state is reported.
+    # Data that a format cannot state are reported.
     tio.write_volume("b.nrrd", volume, spacing=(2, 1, 1))
     assert main(["solid", "b.nrrd", "-o", "b.npy", "--size", "20", "--quality", "fast"]) == 0
     assert "b.nrrd: the spacing is not kept, because .npy of uint8 cannot state it" in capsys.readouterr().err

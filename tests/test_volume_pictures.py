@@ -1,4 +1,4 @@
-"""Pictures of volumes: what they show, where."""
+"""Images of volumes: their contents and positions."""
 
 import numpy as np
 import pytest
@@ -152,7 +152,7 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
     assert vertices.max(0)[0] > 45
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     _, shared = np.unique(edges, axis=0, return_counts=True)
-    assert (shared % 2 == 0).all()  # no edge has one triangle alone
+    assert (shared % 2 == 0).all()  # no edge has only one triangle
     io.write_surface(tmp_path / "particles.stl", vertices, faces)
     assert (tmp_path / "particles.stl").stat().st_size == 84 + 50 * len(faces)
     corner = np.zeros((4, 4, 4), bool)

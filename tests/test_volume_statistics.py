@@ -1,4 +1,4 @@
-"""Statistics of volumes: known answers, and the checks of a synthesis on what passes and what fails them."""
+"""Statistics of volumes: known answers, and the checks of a synthesis on good and bad results."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def particles():
 
 
 def warped(exemplar, field, side=56):
-    """What a perfect synthesis of a constant field would be: the exemplar, resampled."""
+    """Return the result of a perfect synthesis of a constant field: the resampled exemplar."""
     grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1) - (side - 1) / 2
     at = grid @ field.jacobians((0, 0, 0)).T.astype(float) + 31.5
     return map_coordinates(exemplar, np.moveaxis(at, -1, 0), order=5, mode="reflect").astype(np.float32)
@@ -82,13 +82,13 @@ def test_particles_are_counted(particles):
     inside = particles.labels > 0
     found = volume.component_statistics(inside)
     sizes = np.bincount(particles.labels.ravel())[1:]
-    # Pieces that the border cuts off from each other are counted each.
+    # Pieces that the border separates count separately.
     assert len(particles.centres) <= found.count <= 1.6 * len(particles.centres)
     assert found.density == pytest.approx(1e5 * found.count / inside.size)
     assert found.mean * found.count == pytest.approx(sizes.sum(), rel=0.02)
     assert found.deciles[0] <= found.deciles[4] <= found.deciles[8]
     blocks = np.zeros((9, 9, 9), bool)
-    blocks[0:2, 0:2, 0:2] = blocks[4:7, 4:7, 4:7] = blocks[7, 7, 7] = True  # the last touches by a corner alone
+    blocks[0:2, 0:2, 0:2] = blocks[4:7, 4:7, 4:7] = blocks[7, 7, 7] = True  # the last touches only at a corner
     three = volume.component_statistics(blocks, least=1)
     assert (three.count, three.mean, three.median) == (3, 12, 8)
     assert three.deciles == (1, 1, 1, 8, 8, 8, 27, 27, 27)
@@ -190,7 +190,7 @@ def test_copies_are_coherent_and_noise_is_not(axes):
     found = volume.cell_reuse(source_of(halves, shape))
     assert found.largest == 0.5
     assert found.coherent > 0.9
-    assert found.unused == pytest.approx(1 / 3)  # of the cells of 8, 16 to 24 are not used
+    assert found.unused == pytest.approx(1 / 3)  # of the cells of 8, pixels 16 to 24 are not used
     assert found.most_used == pytest.approx(2)
 
 
@@ -202,7 +202,7 @@ def test_coherence_under_a_field(name):
         field = fields.circular().over(shape)
         away = grid - np.array(shape) / 2 + 0.5
         angle = np.arctan2(away[..., 1], away[..., 2])
-        # Polar coordinates follow radial steps exactly, and tangential ones where the radius fits.
+        # Polar coordinates follow radial steps exactly, and tangential ones if the radius fits.
         radius = np.hypot(away[..., 1], away[..., 2])
         places = np.stack([grid[..., 0], angle * 15, radius], -1)
         source = source_of(places, (40, 100, 40))
@@ -213,7 +213,7 @@ def test_coherence_under_a_field(name):
         return
     field = fields.zigzag(20, 30, plane="xy") if name == "zigzag" else fields.constant(np.eye(3) * 2)
     if name == "zigzag":
-        # Each band a copy of its own, turned.
+        # Each band is a separate rotated copy.
         places = np.einsum("...ij,...j->...i", field.jacobians(grid), grid)
         found = volume.coherence(source_of(places, (99,) * 3), 2, field)
         edges = np.arange(29) % 10 == 9
@@ -247,7 +247,7 @@ def test_an_exemplar_is_like_itself(particles):
     assert_allclose(report.relative_shares, 1)
     assert report.frequency_ratio == 1
     assert report.values < 0.01
-    # The angle of a cosine that is 1 but for its last bits.
+    # The angle of a cosine that is 1 except for its last bits.
     assert report.turned == pytest.approx(0, abs=1e-5)
     assert report.particles[0] == report.particles[1]
     assert report.reuse == volume.CellReuse(1.0, 1.0, 1.0, 0.0)
@@ -267,7 +267,7 @@ def test_another_seed_is_much_the_same_and_another_texture_is_not(particles):
 
 
 def test_lost_particles_are_reported(particles):
-    """What synthesis of sparse textures is known for: the ground takes over, other measures hardly tell."""
+    """A known failure of sparse textures: the background takes over, and other measures hardly change."""
     emptied = particles.image.copy()
     gone = (particles.labels > 0) & (particles.labels % 4 != 0)
     emptied[gone] = particles.image[particles.labels == 0][: gone.sum()]
@@ -285,7 +285,7 @@ def test_reports_of_pictures_and_of_floats():
     report = volume.compare(one, other, field=fields.identity(2))
     assert report.two_point.shape == (2, 2, 13)
     assert report.values < 0.1
-    # A range of their own does not make floats another texture.
+    # Floats with another range are the same texture.
     grey = volume.lightness(one) * 900 - 200
     shifted = volume.compare(grey, grey)
     assert_allclose(shifted.relative_shares, 1)

@@ -1,4 +1,4 @@
-"""Volumes seen through: what is added up along rays is what a sum by hand gives, and the same whatever the threads."""
+"""Transparent volumes: the sums along rays are correct, and equal for any number of threads."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def test_what_lies_in_front_hides_what_is_behind() -> None:
 def test_by_default_what_stands_out_is_seen() -> None:
     image = PARTICLES.image
     seen = volume.render_volume(image, 96, **FRONT)
-    # A pixel is covered where there is a particle behind it, and hardly where there is none.
+    # A pixel is covered if a particle is behind it, and hardly otherwise.
     column = (PARTICLES.labels > 0).sum(axis=0)
     scale = seen.shape[0] / (48 * 1.04)
     rows, columns = np.mgrid[:48, :48]
@@ -67,7 +67,7 @@ def test_by_default_what_stands_out_is_seen() -> None:
     assert alpha[column >= 5].mean() > 4 * alpha[column == 0].mean()
     assert alpha[column >= 5].mean() > 0.4
     vivid = seen[seen[..., 3] > 150][:, :3].astype(int)
-    assert np.ptp(vivid, axis=1).mean() > 40  # Of the colours of particles, not of the grey around them.
+    assert np.ptp(vivid, axis=1).mean() > 40  # The colours are those of particles, not of the grey around them.
 
 
 @pytest.mark.parametrize("kind", ["uint8", "uint16", "float32"])
@@ -102,7 +102,7 @@ def test_transfer_functions() -> None:
     assert_array_equal(volume.render_volume(grey, 32, transfer=text), volume.render_volume(grey, 32, transfer=stops))
     seen = volume.render_volume(grey, 64, azimuth=90, elevation=0, transfer=text, shading=False)
     covered = np.flatnonzero(seen[32, :, 3])
-    assert (covered.max() - covered.min()) < 64 * 0.35  # A sheet of the values that are seen.
+    assert (covered.max() - covered.min()) < 64 * 0.35  # There is only a sheet of the visible values.
     assert seen[32, covered, 0].max() > 150
     assert parse_transfer("0.5:own:1") == [(0.5, None, 1.0)]
 

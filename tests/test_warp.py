@@ -1,4 +1,4 @@
-"""Warps of meshes and of points: they agree where both apply, and say what they cannot take."""
+"""Warps of meshes and of points: they agree where both apply, and refuse unsuitable input."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def grid(rows: int, columns: int) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def slow(target: Any, weight: Any, size: tuple[int, int]) -> tuple[Any, Any]:
-    """The slow twin: every triangle over every pixel, the heaviest, then the unturned, then the first."""
+    """Compute every triangle over every pixel: the heaviest wins, then the unturned, then the first."""
     rows, columns = target.shape[:2]
     best = np.zeros(size, int)
     found = np.zeros((*size, 2))
@@ -57,7 +57,7 @@ def test_meshes_are_those_of_the_slow_twin(seed: int, amount: float) -> None:
 
 
 def test_both_warps_agree_where_both_apply() -> None:
-    """A bend that is affine in each cell of a coarse lattice: the mesh of pixels and the lattice's triangles give the same."""
+    """A bend that is affine in each cell of a coarse lattice gives the same with pixel meshes and lattice triangles."""
     corners = grid(4, 4).reshape(-1, 2) * 15
     moved = corners @ np.array([[1.05, 0.1], [-0.08, 0.95]]) + (1.5, -2)
     loose = from_points(corners, moved, (46, 46))
@@ -65,7 +65,7 @@ def test_both_warps_agree_where_both_apply() -> None:
     both = (loose.triangle > 0) & dense.covered
     assert both.mean() > 0.7
     assert np.abs(loose.coordinates[both] - dense.coordinates[both]).max() < 1e-3
-    # A single raised corner: only the triangles around it move.
+    # A single corner is raised, so only the triangles around it move.
     bent = corners.copy()
     bent[5] += (4, 3)
     loose = from_points(corners, bent, (46, 46))
@@ -144,7 +144,7 @@ def test_several_factors_are_each_what_one_is() -> None:
 
 
 def test_energy_is_that_of_the_paper() -> None:
-    """Eq. 5, Table 1 and Figure 5 pixel by pixel, for the displacement along columns."""
+    """Compare with Eq. 5, Table 1 and Figure 5 pixel by pixel, for the displacement along columns."""
     from texrs.papers.splice.energy import weigh_neighbours
 
     rigid = np.random.default_rng(3).random((7, 8)) < 0.5

@@ -1,12 +1,12 @@
-"""The acceptance checks of DESIGN, D1 to D13: each measures a result by code of its own and compares it with a number.
+"""The acceptance checks of DESIGN, D1 to D13: each measures a result by its own code and compares it with a number.
 
-Nothing here is taken from the pipeline: gradients, patches, seams, histograms and elements are found anew with NumPy,
-SciPy and scikit-image, from the images and from the coordinates of the source map. Each function returns a small frozen
-record with what was measured, `passed`, and its figures as text. `applies` is False where the texture or the result has
-nothing to measure (no separate elements, no colour correction); `passed` is then True of nothing, so ask both.
+Nothing here uses the pipeline. Gradients, patches, seams, histograms and elements are found with NumPy, SciPy and
+scikit-image, from the images and the coordinates of the source map. Each function returns a small frozen record with
+the measured values, `passed`, and the values as text. `applies` is False if there is nothing to measure (no separate
+elements, no colour correction). `passed` is then True, so check both.
 
-Conventions: images are compared as floats in [0, 1], colour channels only; gradients are the mean absolute difference
-of the channels over an edge between neighbours; figures called "of 255" are multiplied by that.
+Conventions: images are compared as floats in [0, 1], colour channels only. Gradients are the mean absolute difference
+of the channels over an edge between neighbours. Values called "of 255" are multiplied by 255.
 """
 
 from ._content import D5, D6, D7, D8, census, d5, d6, d7, d8

@@ -1,4 +1,4 @@
-"""D5 to D8: different each time, with the exemplar's colours and elements."""
+"""D5 to D8: a different texture each time, with the exemplar's colours and elements."""
 
 from __future__ import annotations
 
@@ -19,17 +19,19 @@ from ._ground import MIRRORS, difference, ratio, seams, unit, variation
 
 @dataclass(frozen=True)
 class D5:
-    """Seeds give different textures, and none is the exemplar or its mirror image."""
+    """Seeds give different textures, and none of them equals the exemplar or its mirror image."""
 
     pairs: tuple[float, ...]
     exemplar: float
-    """Least difference of any part of the exemplar's size to the exemplar or its mirrors, each part in its place."""
+    """Minimum difference between any part of the exemplar's size and the exemplar or its mirror images, in place."""
     moved: float
-    """The same with the exemplar moved cyclically to where it fits the best."""
+    """The same for the exemplar after the cyclic shift that fits best."""
     applies: bool = True
     own: float = 1.0
-    """How much of its usual difference the exemplar has to itself where it repeats: two pictures of a lattice that fall in
-    step differ by no more."""
+    """Difference of the exemplar and its own repetition, as a share of the usual.
+
+    Two lattices in phase do not differ by more.
+    """
     least_median: float = 0.8
     least_pair: float = 0.5
     least_exemplar: float = 0.4
@@ -48,7 +50,7 @@ class D5:
 
 
 def d5(exemplar: np.ndarray, images: Sequence[np.ndarray], report: Mapping[str, Any] | None = None) -> D5:
-    """Compare results with each other and with the exemplar; the report of one says whether it lies on a lattice."""
+    """Compare results with each other and with the exemplar. The report states whether the exemplar has a lattice."""
     example = unit(exemplar)
     made = [unit(image, exemplar) for image in images]
     if np.ptp(example) == 0:
@@ -70,7 +72,7 @@ def d5(exemplar: np.ndarray, images: Sequence[np.ndarray], report: Mapping[str, 
 
 
 def repeats(example: np.ndarray) -> float:
-    """Return the least difference of an image to itself moved by a quarter to a half of its shorter side, over the usual."""
+    """Return the minimum difference of an image and itself, shifted by 1/4 to 1/2 of its shorter side, over the usual."""
     height, width = example.shape[:2]
     size = (2 * height, 2 * width)
     spectrum = fft.rfft2(example, size, axes=(0, 1))
@@ -93,7 +95,7 @@ def repeats(example: np.ndarray) -> float:
 
 
 def best_shift(part: np.ndarray, example: np.ndarray) -> float:
-    """Return the mean difference of a part to the exemplar, moved cyclically to where the squared difference is least."""
+    """Return the mean difference of a part and the exemplar, after the cyclic shift with the least squared difference."""
     height, width = part.shape[:2]
     padded = np.zeros_like(example)
     padded[:height, :width] = part
@@ -110,7 +112,7 @@ def best_shift(part: np.ndarray, example: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class D6:
-    """The colour correction keeps gradients away from seams, and the colours at large; of 255."""
+    """The colour correction keeps gradients away from seams, and the colours overall; of 255."""
 
     median: float
     p99: float
@@ -122,7 +124,7 @@ class D6:
 
     @property
     def passed(self) -> bool:
-        # Whole grey levels are read back from floats: a millionth is no excess.
+        # Grey levels are read back from floats, so allow an excess of 1e-6.
         kept = self.median <= self.most_median + 1e-6 and self.p99 <= self.most_p99 + 1e-6
         return self.applies and kept and self.shift <= self.most_shift
 
@@ -176,7 +178,7 @@ def d6(
 
 @dataclass(frozen=True)
 class D7:
-    """The largest distance of a channel's histogram to the exemplar's (Wasserstein), of 255."""
+    """The maximum distance between a channel's histogram and the exemplar's (Wasserstein), of 255."""
 
     distance: float
     applies: bool = True
@@ -202,15 +204,18 @@ def d7(exemplars: np.ndarray | Sequence[np.ndarray], image: np.ndarray) -> D7:
 
 @dataclass(frozen=True)
 class D8:
-    """Census of elements: how many an area of the result has, and their median area, against the exemplar."""
+    """Census of elements: their number for the area, and their median area, compared with the exemplar."""
 
     count: float
     area: float
     elements: int
-    """Elements that were counted in the exemplar."""
+    """Number of elements in the exemplar."""
     applies: bool
     sure: tuple[float, float] = (1.0, 1.0)
-    """Between which shares of it the median of the exemplar's elements is known: few of many sizes say little."""
+    """Range of the uncertainty of the exemplar's median area, as shares of it.
+
+    Few elements of many sizes give a wide range.
+    """
     count_range: tuple[float, float] = (0.6, 1.5)
     area_range: tuple[float, float] = (0.6, 1.4)
 
@@ -226,7 +231,7 @@ class D8:
 
 
 FEWEST = 6
-"""Elements below which a census says nothing."""
+"""Minimum number of elements of a valid census."""
 
 
 def d8(
@@ -236,12 +241,11 @@ def d8(
     labels: np.ndarray | None = None,
     report: Mapping[str, Any] | None = None,
 ) -> D8:
-    """Count elements: by their true labels, looked up through the source map, or by a classifier of two colours.
+    """Count elements by their true labels through the source map, or by a classifier of two colours.
 
-    The classifier is fitted to the exemplar and applied to both pictures alike, so that what it does badly it does
-    badly to both. The report of the result says where there is nothing to count, which is where it found no elements of
-    its own; and where elements lie on a lattice: there the half of one and the half of another make one, whole to the
-    eye, but two to the labels.
+    The classifier is fitted to the exemplar and applied to both images, so its errors are the same in both. According
+    to the report, some results have nothing to count, because no elements were found. Elements on a lattice are not
+    counted either: two halves of different elements form one, which looks whole but has two labels.
     """
     if report and "lattice" in report["reason"]:
         labels = None
@@ -267,7 +271,7 @@ def d8(
 
 
 def census(before: np.ndarray, size_before: int, after: np.ndarray, size_after: int) -> D8:
-    """Compare the areas of elements; crumbs below a quarter of the exemplar's median count in neither."""
+    """Compare the areas of elements. Crumbs below a quarter of the exemplar's median do not count in either."""
     if not len(before):
         return D8(np.nan, np.nan, 0, False)
     least = max(20.0, 0.25 * float(np.median(before)))
@@ -276,7 +280,7 @@ def census(before: np.ndarray, size_before: int, after: np.ndarray, size_after: 
         return D8(np.nan, np.nan, len(before), False)
     per_area = (len(after) / size_after) / (len(before) / size_before)
     median = float(np.median(after) / np.median(before)) if len(after) else 0.0
-    # Draws with return: between which values 2 of 3 other samples of as many elements would have their median.
+    # Draw with replacement: find the range of the median in 2 of 3 other samples of as many elements.
     draws = np.random.default_rng(0).choice(before, (400, len(before)))
     sure = np.quantile(np.median(draws, axis=1), (1 / 6, 5 / 6)) / np.median(before)
     return D8(per_area, median, len(before), True, (min(1.0, 1 / float(sure[1])), max(1.0, 1 / float(sure[0]))))
@@ -318,7 +322,7 @@ def classify(image: np.ndarray, colours: np.ndarray) -> np.ndarray:
 
 
 def split(mask: np.ndarray) -> np.ndarray:
-    """Label connected pieces of a mask, parted at their waists, so that two things that touch count as two."""
+    """Label connected pieces of a mask, divided at narrow places, so that two touching elements count as two."""
     opened = ndimage.binary_opening(np.pad(mask, 2, mode="edge"), np.ones((3, 3)))[2:-2, 2:-2]
     depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(np.pad(opened, 1))[1:-1, 1:-1], 1.0)
     peaks, _ = ndimage.label(h_maxima(depth, 0.6), np.ones((3, 3)))

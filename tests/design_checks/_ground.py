@@ -1,4 +1,4 @@
-"""What the checks have in common: images as floats, gradients, seams, patches."""
+"""Functions that the checks share: images as floats, gradients, seams, patches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ MIRRORS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
 def unit(image: np.ndarray, like: np.ndarray | None = None) -> np.ndarray:
-    """Return the colour channels as (H, W, C) float64; integers fill [0, 1], floats are scaled by the range of `like`."""
+    """Return the colour channels as (H, W, C) float64.
+
+    Integers fill [0, 1], and floats are scaled by the range of `like`.
+    """
     values = np.asarray(image)
     values = values[..., np.newaxis] if values.ndim == 2 else values
     if values.shape[-1] in (2, 4):
@@ -26,13 +29,13 @@ def unit(image: np.ndarray, like: np.ndarray | None = None) -> np.ndarray:
 
 
 def gradient(image: np.ndarray, axis: int, *, wrap: bool = False) -> np.ndarray:
-    """Return the gradient over each edge along an axis; with `wrap` the last one leads back to the start."""
+    """Return the gradient over each edge along an axis. With `wrap`, the last edge leads back to the start."""
     values = np.concatenate([image, image.take([0], axis)], axis) if wrap else image
     return np.abs(np.diff(values, axis=axis)).mean(axis=-1)
 
 
 def gradients(image: np.ndarray) -> np.ndarray:
-    """Return the gradients over all inner edges, in a row."""
+    """Return the gradients over all inner edges as one vector."""
     return np.concatenate([gradient(image, axis).ravel() for axis in range(2)])
 
 
@@ -46,8 +49,8 @@ def jacobians(source: Any) -> np.ndarray:
 def seams(source: Any, axis: int, *, wrap: bool = False, tolerance: float = 0.25) -> np.ndarray:
     """Mark the edges along an axis whose two pixels do not come from one piece of one exemplar.
 
-    The step between the two places in the exemplar is compared with the one that the mean of both frames foretells, so
-    that two patches that continue one another make no seam, whatever their labels.
+    The step between the two source coordinates is compared with the step that the mean of both frames predicts. Two
+    patches that continue each other therefore have no seam, for any labels.
     """
     places = np.asarray(source.coordinates, np.float64)
     frames = jacobians(source)[..., axis]
@@ -66,9 +69,9 @@ def seams(source: Any, axis: int, *, wrap: bool = False, tolerance: float = 0.25
 def nearest_patches(
     image: np.ndarray, at: np.ndarray, exemplar: np.ndarray, *, side: int = 9, own: int | None = None
 ) -> np.ndarray:
-    """Return the RMS distance of the patches whose corners are `at` to their nearest patch of the exemplar.
+    """Return the RMS distances of the patches with corners `at` to their nearest patches of the exemplar.
 
-    With `own`, the image is the exemplar, and patches that start within so many pixels of a corner do not count.
+    With `own`, the image is the exemplar, and patches that start within this many pixels of a corner do not count.
     """
     channels = image.shape[-1]
     views = np.lib.stride_tricks.sliding_window_view(exemplar.astype(np.float32), (side, side), axis=(0, 1))
@@ -76,7 +79,7 @@ def nearest_patches(
     size = channels * side * side
     mine = np.lib.stride_tricks.sliding_window_view(image.astype(np.float32), (side, side), axis=(0, 1))
     queries = mine[at[:, 0], at[:, 1]].reshape(len(at), size)
-    # Distances as |q|^2 + |p|^2 - 2 q p lose digits where colours share a large offset.
+    # Distances as |q|^2 + |p|^2 - 2 q p lose digits if colours share a large offset.
     centre = queries.mean()
     queries = queries - centre
     square = (queries.astype(np.float64) ** 2).sum(axis=1)
@@ -97,27 +100,27 @@ def nearest_patches(
 
 
 def corners(shape: Sequence[int], count: int, seed: int, side: int = 9) -> np.ndarray:
-    """Draw the corners of patches."""
+    """Draw random corners of patches."""
     rng = np.random.default_rng(seed)
     return np.stack([rng.integers(0, n - side + 1, count) for n in shape[:2]], axis=-1)
 
 
 def ratio(one: float, other: float) -> float:
-    """Divide; two numbers that are nothing in 8 bits are alike."""
+    """Divide. Two numbers that are nothing in 8 bits count as equal."""
     return 1.0 if max(one, other) < 1e-4 else float(one / max(other, 1e-4))
 
 
 ROLLS = ((0.5, 0.5), (0.38, 0.29), (0.23, 0.41))
-"""Shares of the sides that an image is moved by: several, for one may meet the period of a repetition."""
+"""Shifts of an image, as shares of the sides. There are several, because one may equal the period of a repetition."""
 
 
 def variation(image: np.ndarray) -> float:
-    """Return the mean difference of an image and itself, moved: what two textures that have nothing in common show."""
+    """Return the mean difference of an image and its shifted copies, which equals that of two unrelated textures."""
     height, width = image.shape[:2]
     rolled = (np.roll(image, (round(r * height), round(c * width)), (0, 1)) for r, c in ROLLS)
     return max(float(np.abs(image - other).mean()) for other in rolled)
 
 
 def difference(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the mean difference of two images over the variation of one."""
+    """Return the mean difference of two images over the variation of the first."""
     return ratio(float(np.abs(one - other).mean()), variation(one))

@@ -16,7 +16,7 @@ LOGISTIC_REFERENCE = (194, 41, 241, 202, 67, 219, 123, 135, 111, 157, 60, 226)
 
 @dataclass(frozen=True)
 class D9:
-    """Operations keep to their limits, each kind is used, the logistic map is the paper's, and frames agree."""
+    """Operations keep to their limits, each kind is used, the logistic map equals the paper's, and frames agree."""
 
     limits: bool
     least_share: float
@@ -38,7 +38,7 @@ class D9:
 
 
 def logistic(x: float, growth_rate: float, count: int) -> list[float]:
-    """Iterate Eq. 2, in the order of operations that every machine rounds alike."""
+    """Iterate Eq. 2, in an order of operations with the same rounding on every machine."""
     values = []
     for _ in range(count):
         values.append(255 * abs(x))
@@ -59,8 +59,8 @@ def d9(
 ) -> D9:
     """Check (kind, amount, axis) of many operations, and the logistic map from 0.76234783 on.
 
-    `source` is a map made with these limits: the singular values of its frames are bounded by the scales that
-    `per_element` operations can reach.
+    `source` is a map with these limits. The singular values of its frames are bounded by the scales that `per_element`
+    operations can reach.
     """
     counts = dict.fromkeys(kinds, 0)
     good, number = True, 0
@@ -88,7 +88,7 @@ def d9(
 
 @dataclass(frozen=True)
 class D10:
-    """Several exemplars: all are used alike, and each part looks like the one it comes from."""
+    """All exemplars are used equally, and each part looks like its own exemplar."""
 
     shares: tuple[float, ...]
     entropy: float
@@ -119,7 +119,7 @@ def d10(
         mine = (source.exemplar == number).astype(np.uint8)
         whole = np.argwhere(np.lib.stride_tricks.sliding_window_view(mine, (side, side)).all(axis=(-2, -1)))
         if not len(whole):
-            # Nothing of it is there to look at: the coherence of nothing is as bad as can be.
+            # Nothing of this exemplar is visible, so its coherence counts as the worst.
             coherence.append(np.inf)
             continue
         example = unit(exemplar)
@@ -132,7 +132,7 @@ def d10(
 
 @dataclass(frozen=True)
 class D11:
-    """The same bytes for any number of threads; another texture from a start that differs by 1e-8."""
+    """The same bytes for any number of threads, and another texture from a start that differs by 1e-8."""
 
     same: bool
     near: float
@@ -155,9 +155,10 @@ def d11(by_threads: Mapping[int, np.ndarray], start: np.ndarray, beside: np.ndar
 
 @dataclass(frozen=True)
 class D12:
-    """No kaleidoscope: lines on which a part of the exemplar meets its own mirror image, over height plus width.
+    """No mirror axes: total length of lines where the exemplar meets its own mirror image, over height plus width.
 
-    The eye finds such an axis at once, and no other check does: the seam is perfect, and every patch is the exemplar's.
+    The eye finds such an axis at once. No other check does, because the seam is perfect and every patch is from the
+    exemplar.
     """
 
     axes: float
@@ -174,7 +175,7 @@ class D12:
 
 
 def d12(source: Any, *, reach: int = 6, tolerance: float = 1.5) -> D12:
-    """Find the edges whose two sides show the same places, pixel by pixel, `reach` pixels far."""
+    """Find the edges whose two sides show the same source pixels, up to a distance of `reach` pixels."""
     places = np.asarray(source.coordinates, np.float64)
     length = 0
     for axis in range(2):
@@ -183,22 +184,22 @@ def d12(source: Any, *, reach: int = 6, tolerance: float = 1.5) -> D12:
             one, other = (np.roll(places, by, axis) for by in (-step, step - 1))
             of_one, of_other = (np.roll(source.exemplar, by, axis) for by in (-step, step - 1))
             same &= (np.abs(one - other).max(axis=-1) < tolerance) & (of_one == of_other)
-        # Within the tolerance two lines beside each other may both be axes: the first counts.
+        # Within the tolerance two neighbouring lines may both be axes. Count the first.
         length += int((same & ~np.roll(same, 1, axis)).sum())
     return D12(length / sum(places.shape[:2]))
 
 
 @dataclass(frozen=True)
 class D13:
-    """All of the exemplar is used: the effective share of its 8 x 8 cells, and how often the favourite is shown.
+    """All of the exemplar is used: effective share of its 8 x 8 cells, and how often the most frequent one is shown.
 
-    Patches of 3/4 of the side taken from anywhere, mirrored or not, have 0.66 to 0.72 and 2.9 to 3.7 at twice the size.
-    Those that are chosen for how well they fit show easy places more often: the bounds are the worst of what is made.
+    Random patches of 3/4 of the side, mirrored or not, have 0.66 to 0.72 and 2.9 to 3.7 at twice the size. Patches
+    that are chosen because they fit show easy places more often. The bounds are the worst real results.
     """
 
     share: float
     favourite: float
-    """Against the mean of all cells."""
+    """Compared with the mean of all cells."""
     applies: bool = True
     least: float = 0.49
     most: float = 5.35

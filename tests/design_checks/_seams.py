@@ -1,4 +1,4 @@
-"""D1 to D4: whole, without seams, cyclic, like the exemplar patch by patch."""
+"""D1 to D4: complete, without visible seams, tileable, and similar to the exemplar patch by patch."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ._ground import corners, gradient, gradients, nearest_patches, ratio, seams
 
 @dataclass(frozen=True)
 class D1:
-    """Whole, finite, of the size that was asked for, with colours and places of the exemplar; holes are reported."""
+    """Complete, finite, of the requested size, with colours and coordinates of the exemplar. Holes are reported."""
 
     size: bool
     finite: bool
     inside: bool
     holes: tuple[float, ...]
     full: bool = False
-    """Whether the report says that elements stay or only change places, which leaves nothing open."""
+    """If True, elements stay or only exchange places according to the report, which leaves no holes."""
     applies: bool = True
 
     @property
@@ -41,7 +41,7 @@ def d1(exemplar: np.ndarray, result: Any, size: tuple[int, int]) -> D1:
     places = source.coordinates
     inside = bool((places >= -1e-3).all() and (places <= bounds + 1e-3).all())
     if floats:
-        # Cubic look-ups may overshoot, but are kept within the exemplar's range.
+        # Cubic lookups may overshoot, but are limited to the exemplar's range.
         inside &= bool(image.min() >= exemplar.min() - 1e-6 and image.max() <= exemplar.max() + 1e-6)
     return D1(
         image.shape == (*size, *np.asarray(exemplar).shape[2:]) and image.dtype == exemplar.dtype,
@@ -55,7 +55,7 @@ def d1(exemplar: np.ndarray, result: Any, size: tuple[int, int]) -> D1:
 
 @dataclass(frozen=True)
 class D2:
-    """How seams show: their mean gradient against the exemplar's, and how many are above its 99th percentile."""
+    """Visibility of seams: their mean gradient over the exemplar's, and the share above its 99th percentile."""
 
     mean: float
     above: float
@@ -94,7 +94,7 @@ def d2(exemplar: np.ndarray, image: np.ndarray, source: Any, wrap: tuple[bool, b
 
 @dataclass(frozen=True)
 class D2b:
-    """The colour correction acts: seams were worse before it."""
+    """The colour correction has an effect: seams were worse before it."""
 
     before: float
     after: float
@@ -123,7 +123,7 @@ def d2b(
 
 @dataclass(frozen=True)
 class D3:
-    """Across each wrap: the mean jump against the inner gradient, and the worst run of nine against the usual worst."""
+    """Across each wrap: the mean jump over the inner gradient, and the worst run of nine over the usual worst."""
 
     mean: float
     run: float
@@ -150,7 +150,7 @@ def d3(image: np.ndarray, wrap: tuple[bool, bool] = (True, True)) -> D3:
         inner, across = jumps[:-1], jumps[-1]
         if not across.any():
             continue
-        # Runs of nine along the wrap against runs of nine along inner lines: like with like.
+        # Compare runs of nine along the wrap with runs of nine along inner lines.
         usual = np.percentile(ndimage.uniform_filter1d(inner, 9, axis=1, mode="wrap"), 99)
         means.append(float(across.mean() / max(inner.mean(), 1e-12)))
         runs.append(float(ndimage.uniform_filter1d(across, 9, mode="wrap").max() / max(usual, 1e-12)))
@@ -159,7 +159,7 @@ def d3(image: np.ndarray, wrap: tuple[bool, bool] = (True, True)) -> D3:
 
 @dataclass(frozen=True)
 class D3b:
-    """Tiled 2 x 2, the lines on which tiles meet are no outliers: deviations of their gradient, in sigmas."""
+    """After tiling 2 x 2, the lines where tiles meet are not outliers: deviations of their gradient, in sigmas."""
 
     rows: float
     columns: float
@@ -191,7 +191,7 @@ def d3b(image: np.ndarray, wrap: tuple[bool, bool] = (True, True)) -> D3b:
 
 @dataclass(frozen=True)
 class D4:
-    """How far patches of the result are from the exemplar's, against how far its own are from each other."""
+    """Distance of patches of the result to the exemplar's, over the distance of the exemplar's own patches."""
 
     mean: float
     p95: float

@@ -10,7 +10,7 @@ ONE = 4096
 
 
 def philox(counter, key):
-    """Philox4x32-10 of arrays of counters (n, 4)."""
+    """Return Philox4x32-10 of arrays of counters (n, 4)."""
     c = [np.uint64(counter[:, i]) for i in range(4)]
     k = [np.uint64(key[0]), np.uint64(key[1])]
     low = np.uint64(0xFFFFFFFF)
@@ -44,7 +44,7 @@ class Exemplar:
         self.border = [0 if w else appearance.radius for w in self.wrap]
 
     def inside(self, sample):
-        """Return the sample, around cyclic axes, or none if its window does not lie inside."""
+        """Return the sample, along periodic axes, or None if its window is not inside."""
         out = []
         for x, n, w, b in zip(sample, self.shape, self.wrap, self.border, strict=True):
             if not w and not b <= x < n - b:
@@ -56,13 +56,13 @@ class Exemplar:
         out = []
         for x, n, w, b in zip(place, self.shape, self.wrap, self.border, strict=True):
             near = (x + ONE // 2) // ONE
-            # Only from where the nearest sample is outside: fractions are kept.
+            # Only the nearest sample decides whether the window is outside. Fractions are kept.
             held = x if b <= near < n - b else min(max(near, b), n - 1 - b) * ONE
             out.append(x % (n * ONE) if w else held)
         return tuple(out)
 
     def vector(self, sample):
-        """Return the vector of a sample, of the nearest one whose window lies inside."""
+        """Return the vector of the nearest sample whose window is inside."""
         at = []
         for x, n, w, b in zip(sample, self.shape, self.wrap, self.border, strict=True):
             at.append(x % n if w else min(max(x, b), n - 1 - b))
@@ -92,7 +92,7 @@ def nearest(place):
 
 
 def corners(frame, compensated):
-    """(diagonal, step, J step, what is read beside) of each corner."""
+    """Return (diagonal, step, J step, neighbour) of each corner."""
     axes = len(frame)
     inverse = np.rint(np.linalg.inv(frame / ONE) * ONE).astype(np.int64)
     found = []

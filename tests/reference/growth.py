@@ -4,7 +4,7 @@ import numpy as np
 
 
 def cubic(x):
-    """Catmull-Rom."""
+    """Return the Catmull-Rom kernel."""
     x = abs(x)
     if x < 1:
         return (1.5 * x - 2.5) * x * x + 1
@@ -12,7 +12,7 @@ def cubic(x):
 
 
 def resized(line, m):
-    """Return m samples of a line, by a kernel that is as much wider as they are fewer."""
+    """Return m samples of a line. If there are fewer, the kernel is wider by the same factor."""
     n = len(line)
     stretch = max(1.0, n / m)
     out = []
@@ -28,7 +28,7 @@ def resized(line, m):
 
 
 def free(known, shape, spacing, radius):
-    """Tell at which samples of a level a window is made of known samples alone."""
+    """Return the samples of a level whose windows contain only known samples."""
     out = np.zeros(shape, bool)
     for row in range(shape[0]):
         for column in range(shape[1]):

@@ -1,4 +1,4 @@
-"""Slow, obvious twin of the look-up of exemplars at coordinates, and so of `SourceMap.render`."""
+"""Slow, obvious twin of the lookup of exemplars at coordinates, and so of `SourceMap.render`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 def look_up(exemplars, coordinates, which=None, *, interpolation="cubic", wrap=False):
     """Return samples of exemplars at coordinates: one tap after the other, in double precision.
 
-    Where all coordinates of a place are whole, the sample is copied, whatever the interpolation.
+    If all coordinates of a pixel are integers, the sample is copied with any interpolation.
     """
     several = exemplars if isinstance(exemplars, list | tuple) else [exemplars]
     axes = coordinates.shape[-1]
@@ -28,12 +28,12 @@ def look_up(exemplars, coordinates, which=None, *, interpolation="cubic", wrap=F
 
 
 def view(source, exemplars, interpolation="cubic"):
-    """Return what exemplars look like through a source map."""
+    """Return the exemplars looked up through a source map."""
     return look_up(exemplars, source.coordinates, source.exemplar, interpolation=interpolation)
 
 
 def indices(samples, shape, wraps):
-    """Return the indices of samples: around an axis that is cyclic, else the nearest that there is."""
+    """Return the indices of samples: wrapped along periodic axes, else clamped."""
     found = []
     for x, n, wrap in zip(samples.T.astype(np.int64), shape, wraps, strict=False):
         found.append(x % n if wrap else np.clip(x, 0, n - 1))
@@ -41,7 +41,7 @@ def indices(samples, shape, wraps):
 
 
 def weights(kind, t):
-    """Return the samples around a place, as steps from that below, each with its weight; ``t`` is what is above it."""
+    """Return the samples around a coordinate, as steps from the lower one, with their weights. ``t`` is the fraction."""
     if kind == "linear":
         return [(0, 1 - t), (1, t)]
     # Catmull-Rom: Keys's kernel with a = -1/2, by the distance of each sample.
@@ -51,7 +51,7 @@ def weights(kind, t):
 
 
 def sample(exemplar, places, kind, wraps):
-    """Return values between samples, in the dtype of the exemplar; cubic ones lie in the range of their samples."""
+    """Return values between samples, in the dtype of the exemplar. Cubic values stay in the range of their samples."""
     if kind == "nearest":
         return exemplar[indices(np.floor(places + 0.5), exemplar.shape, wraps)]
     below = np.floor(places)
@@ -63,7 +63,7 @@ def sample(exemplar, places, kind, wraps):
         values = exemplar[indices(below + steps, exemplar.shape, wraps)].astype(np.float64)
         weight = np.prod(parts, axis=0).reshape(-1, *[1] * (values.ndim - 1))
         total += weight * values
-        # What has no weight is no part of the range.
+        # Samples without weight do not count for the range.
         low = np.where(weight != 0, np.minimum(low, values), low)
         high = np.where(weight != 0, np.maximum(high, values), high)
     if kind == "cubic":

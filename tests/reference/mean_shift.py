@@ -6,7 +6,7 @@ import numpy as np
 
 
 def mean_shift(image, radius, limit, *, max_iterations, tolerance, wrap):
-    """(H, W, C) of small whole numbers, so that sums are exact; float64."""
+    """Filter (H, W, C) small integers, whose sums are exact; return float64."""
     height, width, _ = image.shape
     out = np.array(image, np.float64)
     for y0 in range(height):

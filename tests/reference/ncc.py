@@ -4,7 +4,7 @@ import numpy as np
 
 
 def maps(image, template):
-    """Correlation coefficients of all windows, channel by channel, (H - h + 1, W - w + 1, C)."""
+    """Return the correlation coefficients of all windows, channel by channel, (H - h + 1, W - w + 1, C)."""
     image, template = np.asarray(image, np.float64), np.asarray(template, np.float64)
     rows, columns = (image.shape[a] - template.shape[a] + 1 for a in range(2))
     found = np.zeros((rows, columns, image.shape[2]))

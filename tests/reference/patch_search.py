@@ -6,7 +6,7 @@ import numpy as np
 
 
 def costs(image, patch, weight):
-    """Every cost, (H - p + 1, W - q + 1), float64."""
+    """Return every cost, (H - p + 1, W - q + 1), float64."""
     image, patch = np.float64(image), np.where(weight[..., None] > 0, np.float64(patch), 0)
     p, q = weight.shape
     out = np.empty((image.shape[0] - p + 1, image.shape[1] - q + 1))
@@ -18,7 +18,7 @@ def costs(image, patch, weight):
 
 
 def best(images, patch, weight, *, allowed=None, count=1, separation=4, ratio=np.inf):
-    """(cost, exemplar, row, column) of the greedy choice."""
+    """Return (cost, exemplar, row, column) of the greedy choice."""
     everything = []
     for e, image in enumerate(images):
         for (r, c), cost in np.ndenumerate(costs(image, patch, weight)):

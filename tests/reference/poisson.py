@@ -8,7 +8,7 @@ from scipy.sparse.linalg import spsolve
 
 
 def solve(image, gradient_rows, gradient_columns, *, screening, boundary, mask=None):
-    """One channel, float64."""
+    """Solve one channel, float64."""
     height, width = image.shape
     free = np.ones(image.shape, bool) if mask is None else mask.copy()
     if boundary[0] == "dirichlet":

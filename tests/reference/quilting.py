@@ -1,4 +1,4 @@
-"""Slow, obvious twin of quilting: patches chosen and laid in NumPy, one by one."""
+"""Slow, obvious twin of quilting: patches chosen and cut in by NumPy, one by one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ IN_STEP, AS_WELL, MIRRORED, NEAR = 0.15, 1.3, 0.02, 8.0
 
 
 def stitch(pictures, size, wrap, fixed, first, waves, progress):
-    """As `texrs.quilting._quilt.stitch`, of which it has the arguments."""
+    """Do the same as `texrs.quilting._quilt.stitch`, with the same arguments."""
     quilt = Quilt(pictures, size, wrap, fixed, first[0].shape)
     window, which, (row, column) = first
     quilt.lay(window, Match(0.0, which, row, column))
@@ -157,7 +157,7 @@ def halve(image):
 
 
 def mark_known(window):
-    """Mark what other patches cover."""
+    """Mark the pixels that other patches cover."""
     known = np.zeros(window.shape, bool)
     for axis, span in enumerate((window.rows, window.columns)):
         lines = np.moveaxis(known, axis, 0)
@@ -167,7 +167,7 @@ def mark_known(window):
 
 
 def mark_core(window):
-    """Mark the middle: what no other patch covers, or else where its overlaps meet."""
+    """Mark the middle: pixels that no other patch covers, or else the place where overlaps meet."""
     rows, columns = (
         slice(min(s.before, s.extent - s.after - 1), max(s.before, s.extent - s.after - 1) + 1)
         for s in (window.rows, window.columns)
@@ -178,7 +178,7 @@ def mark_core(window):
 
 
 def surround(window, size, wrap):
-    """Return the index of a window and the pixels beside it, the window in it, and the axes around which it goes."""
+    """Return the index of a window and its neighbours, the window in it, and the axes that it goes around."""
     ends, inner, closed = [], [], []
     for span, length, cyclic in zip((window.rows, window.columns), size, wrap, strict=True):
         low, high = span.start - 1, span.start + span.extent + 1
@@ -194,6 +194,6 @@ def surround(window, size, wrap):
 
 
 def index(window, size):
-    """Return the index of a window's pixels, around the edges."""
+    """Return the index of a window's pixels, wrapped at the edges."""
     spans = (window.rows, window.columns)
     return np.ix_(*(np.arange(s.start, s.start + s.extent) % n for s, n in zip(spans, size, strict=True)))

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def reconstruct(seed, mask, *, wrap):
-    """(H, W); dilated until nothing changes."""
+    """Dilate (H, W) until nothing changes."""
     modes = ["wrap" if w else "constant" for w in wrap]
     out = np.minimum(seed, mask).astype(float)
     while True:

@@ -1,4 +1,4 @@
-"""Slow, obvious twin of the graph-based merge: all edges, sorted, taken twice."""
+"""Slow, obvious twin of the graph-based merge: all edges, sorted, in two passes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter1d
 
 
 def merge(image, scale, *, blur, least, wrap):
-    """(H, W, C); int labels in the order of their first pixels."""
+    """Return integer labels of (H, W, C) in the order of their first pixels."""
     smooth = np.array(image, np.float64)
     for axis in range(2):
         if blur:

@@ -10,7 +10,7 @@ ONE, KEEP, MASK = 4096, 24, 0xFFFFFFFF
 
 
 def philox(counter, key):
-    """Philox4x32-10 of Salmon, Moraes, Dror and Shaw (2011)."""
+    """Return Philox4x32-10 of Salmon, Moraes, Dror and Shaw (2011)."""
     (a, b, c, d), (k, m) = counter, key
     for _ in range(10):
         p, q = 0xD2511F53 * a, 0xCD9E8D57 * c
@@ -39,7 +39,7 @@ class Twin:
         self.frames = np.broadcast_to(frames.astype(np.int64), (len(self.points), self.axes, self.axes))
 
     def step(self, point, step):
-        """Return the number of the point a step away, around cyclic axes; none beyond an end."""
+        """Return the number of the point one step away, wrapped along periodic axes, or None beyond an end."""
         q = point + step
         size = np.array(self.region.shape)
         q = np.where(self.region.wrap, q % size, q)
@@ -49,7 +49,7 @@ class Twin:
         return tuple(np.where(self.wrap, sample % self.shape, np.clip(sample, 0, self.shape - 1)).tolist())
 
     def inside(self, sample):
-        """Return the sample, if all its window lies inside the exemplar."""
+        """Return the sample, if its whole window is inside the exemplar."""
         near = np.where(self.wrap, 0, self.radius)
         i = np.where(self.wrap, sample % self.shape, sample)
         return tuple(i.tolist()) if ((i >= near) & (i < self.shape - near)).all() else None
@@ -62,14 +62,14 @@ class Twin:
         return np.where(self.wrap, places % (self.shape * ONE), kept)
 
     def same(self, a, b):
-        """Return whether two places for one point are of one piece."""
+        """Return whether two coordinates for one point belong to one piece."""
         d = np.abs(a - b)
         around = d % (self.shape * ONE)
         d = np.where(self.wrap, np.minimum(around, self.shape * ONE - around), d)
         return bool((d <= 3 * ONE // 4).all())
 
     def meet(self, places, p):
-        """Return whether pieces meet beside a point."""
+        """Return whether pieces meet next to a point."""
         for step in product((-1, 0, 1), repeat=self.axes):
             q = self.step(self.points[p], np.array(step))
             if q is not None and not self.same(places[p] + self.frames[p] @ np.array(step), places[q]):
@@ -77,14 +77,14 @@ class Twin:
         return False
 
     def near(self, p, changed):
-        """Return whether a point or one beside it changed."""
+        """Return whether a point or a neighbour changed."""
         away = np.abs(self.points[changed] - self.points[p])
         size = np.array(self.region.shape)
         away = np.where(self.region.wrap, np.minimum(away, size - away), away)
         return bool((away <= 1).all(axis=1).any())
 
     def window(self, places, p):
-        """Return the appearance vector of the window round a point: what is at F o belongs at o."""
+        """Return the appearance vector of the window around a point: the sample at F o belongs at o."""
         frame = self.frames[p]
         back = np.rint(np.linalg.inv(frame / ONE) * ONE).astype(np.int64)
         numbers = []
@@ -98,7 +98,7 @@ class Twin:
         return np.clip(scaled, -2047, 2047)
 
     def improve(self, places, p, reach, limit, coherence, number, seed, exhaustive):
-        """Return the best of a point's own match, those of its neighbours, and some that are drawn."""
+        """Return the best of a point's own match, its neighbours' matches, and some random ones."""
         feature = self.window(places, p)
 
         def cost(at):
@@ -185,7 +185,7 @@ class Twin:
         seed=0,
         held=None,
     ):
-        """Return the places after each pass."""
+        """Return the coordinates after each pass."""
         now = self.bring_inside(places.astype(np.int64).reshape(-1, self.axes))
         limit, alone = int(acceptance * self.spacing), int(coherence * self.spacing)
         done = [now]

@@ -1,8 +1,8 @@
-"""Stored digests of results: what a change that promises the same bytes is held to.
+"""Stored digests of results, for changes that must keep the same bytes.
 
-Each case is a small function that makes something through the public interface and returns its parts; `digests.json`
-keeps what every part came to. `tests/test_truth.py` compares them, for several numbers of threads. A change that is
-meant to alter results rewrites the whole table, which shows in the diff what it altered:
+Each case is a small function that computes a result through the public interface and returns its parts. `digests.json`
+contains the digest of every part. `tests/test_truth.py` compares them, for several numbers of threads. A change that
+intentionally alters results rewrites the whole table, and the diff shows the altered parts:
 
     REGENERATE=1 python -m pytest tests/test_truth.py
 """

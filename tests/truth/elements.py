@@ -1,4 +1,4 @@
-"""What moves elements: DESIGN and SPLICE, and how elements are found."""
+"""Cases with moved elements: DESIGN and SPLICE, and the search for elements."""
 
 from __future__ import annotations
 
@@ -88,12 +88,12 @@ SPLICED = ("layout", "holes", "triangles", "flipped", "flipped_rigid", "matches"
 
 
 def entry(name: str, *size: int, seed: int = 0) -> ElementAnalysis:
-    """Return what is known of a sample's elements."""
+    """Return the known elements of a sample."""
     return ElementAnalysis.of_sample(sample(name, *size, seed=seed))
 
 
 def moved_parts_of(result: texrs.Synthesis, stages: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the parts of what a splice returns, of the matches where each element went."""
+    """Return the parts of a splice, with the final position of each element."""
     matches = [{"target": m["found"], "element": m["element"], "point": m["point"]} for m in result.report["matches"]]
     return parts_of(replace(result, report={**result.report, "matches": matches}), report=SPLICED, stages=stages)
 
@@ -154,7 +154,7 @@ def splice_a_picture_of_16_bits() -> Parts:
 
 @case
 def splice_across_borders() -> Parts:
-    """Both textures repeat."""
+    """Splice two periodic textures."""
     entries = [
         elements.analyse(known.image, mask=known.mask, layout="disjoint", wrap=True)
         for known in (sample(name, 112, 112, seed=2, wrap=True) for name in ("dots", "pebbles"))
@@ -205,7 +205,7 @@ def self_splice_in_another_size() -> Parts:
 def segments() -> Parts:
     parts: dict[str, object] = {}
     pictures = {name: colour(name, 96, 96) for name in SEGMENTED}
-    # Of few colours, among which much ties.
+    # Few colours give many ties.
     pictures["few colours"] = colour("pebbles", 64, 64) & 0xE0
     for name, picture in pictures.items():
         found = segment(picture, SEGMENTED.get(name, ElementOptions()))
@@ -230,7 +230,7 @@ SEGMENTED = {
 
 
 def found_in(entry: ElementAnalysis) -> Parts:
-    """Return what an analysis finds; similarities come of Fourier transforms."""
+    """Return the result of an analysis. Similarities come from Fourier transforms."""
     return {
         "points": entry.points,
         "mask": entry.mask,

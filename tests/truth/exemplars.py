@@ -1,4 +1,4 @@
-"""Exemplars of all types, from the generated samples alone. They are made once and are not to be changed."""
+"""Exemplars of all types, from generated samples only. They are created once, and must not be changed."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Array = NDArray[Any]
 
 @cache
 def sample(name: str, *size: int, **options: Any) -> Sample:
-    """Return a generated sample; the options are its seed and whether it repeats."""
+    """Return a generated sample for a seed, periodic or not."""
     return samples.load(name, size=size, **options)
 
 
 def colour(name: str, *size: int, **options: Any) -> Array:
-    """Return it as it is: RGB of 8 bits."""
+    """Return it unchanged: RGB of 8 bits."""
     return sample(name, *size, **options).image
 
 
@@ -48,7 +48,7 @@ def floats(name: str, *size: int, **options: Any) -> Array:
 
 
 def clear(name: str, *size: int, **options: Any) -> Array:
-    """Return it with a channel of transparency."""
+    """Return it with an alpha channel."""
     image = colour(name, *size, **options)
     return np.concatenate([image, 255 - image[..., :1] // 2], axis=-1)
 
@@ -59,7 +59,7 @@ def channels(name: str, *size: int, seed: int = 0) -> Array:
 
 
 def normals(name: str, *size: int, **options: Any) -> Array:
-    """Return a normal map of 8 bits that is in register with it."""
+    """Return an 8-bit normal map in register with it."""
     down, across = np.gradient(grey(name, *size, **options).astype(np.float64) / 64)
     vectors = np.stack([-across, down, np.ones_like(down)], axis=-1)
     vectors /= np.sqrt((vectors**2).sum(axis=-1, keepdims=True))

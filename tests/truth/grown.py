@@ -1,4 +1,4 @@
-"""What is grown by corrected coordinates: pictures and volumes under fields, windows, and the figures that judge them."""
+"""Cases grown by corrected coordinates: images and volumes under fields, windows, and their quality measures."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def synthesize_around_what_is_held() -> Parts:
 
 @case
 def synthesize_by_optimising() -> Parts:
-    """An exemplar with separate elements, and one without."""
+    """Use an exemplar with separate elements, and one without."""
     parts: dict[str, object] = {}
     for name, exemplar in {"accepted": clear("scales", 64, 64, wrap=True), "refused": deep("bricks", 64, 64)}.items():
         result = texrs.synthesize(exemplar, (96, 80), quality="optimise", wrap=True)
@@ -197,7 +197,7 @@ def pictures_of_volumes() -> Parts:
 
 @case
 def analyses() -> Parts:
-    """Analyses are kept by content: here they are dropped first, so that each number of threads makes them."""
+    """Clear the cache of analyses first, so that each number of threads computes them."""
     exemplars = {
         "colours": (colour("weave", 48, 64), 2),
         "channels": (channels("grit", 48, 48), 2),

@@ -1,4 +1,4 @@
-"""What is done with pictures as a whole: PERSPECTIVE, scale maps, tiling, completion, colours and source maps."""
+"""Cases with whole images: PERSPECTIVE, scale maps, tiling, inpainting, colours and source maps."""
 
 from __future__ import annotations
 
@@ -221,7 +221,7 @@ def inpaint_with_a_source() -> Parts:
 
 
 def designed(name: str, seed: int) -> texrs.Synthesis:
-    """Return a texture with turned and mirrored elements, seams and all."""
+    """Return a texture with rotated and mirrored elements, including seams."""
     return texrs.design(colour(name, 96, 96, seed=seed), (112, 128), seed=seed, screening=None, copies=2)
 
 

@@ -1,4 +1,4 @@
-"""The table: its cases by name, and the line that is stored of each part of a result."""
+"""The table: its cases by name, and the stored line of each part of a result."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ import numpy as np
 from texrs import Synthesis
 
 Parts = Mapping[str, Any]
-"""Arrays, and what JSON can hold, by name."""
+"""Arrays and JSON values, by name."""
 Lines = dict[str, dict[str, str]]
-"""What is stored: of each case, a line of each of its parts."""
+"""Stored lines: for each case, a line for each of its parts."""
 BAR = " | "
-"""Between a digest and what it is of."""
+"""Separator between a digest and its description."""
 LONG = 120
-"""Characters up to which a part that is no array is stored whole."""
+"""Maximum length of a part that is not an array and is stored whole, in characters."""
 
 STORED = Path(__file__).with_name("digests.json")
 CASES: dict[str, Callable[[], Parts]] = {}
 
 
 def case(make: Callable[[], Parts]) -> Callable[[], Parts]:
-    """Enter a function into the table under its own name."""
+    """Add a function to the table under its own name."""
     assert make.__name__ not in CASES, f"two cases are named {make.__name__}"
     CASES[make.__name__] = make
     return make
 
 
 def parts_of(result: Synthesis, *, report: Sequence[str] = (), stages: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the parts of what a verb returns: the image, the source map, and the stages and figures that are named."""
+    """Return the parts of a verb's result: the image, the source map, and the named stages and report values."""
     source = result.source_map
     return {
         "image": result.image,
@@ -48,12 +48,12 @@ def parts_of(result: Synthesis, *, report: Sequence[str] = (), stages: Sequence[
 
 
 def witness(parts: Parts) -> dict[str, str]:
-    """Return the line that is stored of each part of a result."""
+    """Return the line to store for each part of a result."""
     return {name: line(part) for name, part in parts.items()}
 
 
 def line(part: Any) -> str:
-    """Return a part in short: whole where that is short, else a digest, and after it, for people, what it is of."""
+    """Return a part in short: whole if it is short, else a digest with a description for people."""
     if isinstance(part, np.ndarray):
         little = np.ascontiguousarray(part, part.dtype.newbyteorder("<"))
         mean = f"{part.mean(dtype=np.float64):.6f}" if part.size else "none"
@@ -64,12 +64,12 @@ def line(part: Any) -> str:
 
 
 def digest(kind: str, content: bytes) -> str:
-    """Return a digest of bytes and of what they are."""
+    """Return a digest of bytes and their description."""
     return hashlib.blake2b(kind.encode() + b"\0" + content, digest_size=16).hexdigest()
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON knows it: floats to six significant digits, of mappings the values, for keys are only words."""
+    """Return a value as JSON: floats to six significant digits, and only values of mappings, whose keys are words."""
     if isinstance(value, Mapping):
         value = list(value.values())
     if isinstance(value, list | tuple):
@@ -84,20 +84,20 @@ def differences(stored: Mapping[str, str], found: Mapping[str, str]) -> list[str
     for name in sorted(stored.keys() | found.keys()):
         if name not in found or name not in stored:
             sentences.append(f"{name}: {'is gone' if name not in found else 'is not stored'}")
-        # What is there for people does not count: how a mean is summed hangs on the processor.
+        # Ignore the description for people, because the sum of a mean depends on the processor.
         elif stored[name].split(BAR)[0] != found[name].split(BAR)[0]:
             sentences.append(f"{name}: stored {stored[name]}, now {found[name]}")
     return sentences
 
 
 def read() -> Lines:
-    """Return the stored table; an empty one where there is none."""
+    """Return the stored table, or an empty one."""
     return json.loads(STORED.read_text(encoding="utf-8")) if STORED.exists() else {}
 
 
 def write(lines: Lines) -> None:
-    """Store the table in the place of the former one."""
-    # Several processes may do so at once; each writes the same.
+    """Store the table, replacing the former one."""
+    # Several processes may do this at once. Each writes the same.
     whole = STORED.with_name(f"{STORED.name}.{os.getpid()}")
     whole.write_text(json.dumps(lines, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     whole.replace(STORED)
