@@ -33,7 +33,7 @@ def test_three_options_come_first_and_groups_hold_all(capsys: Capture, command: 
     out = capsys.readouterr().out
     titles = re.findall(r"^(\S.*):$", out, re.MULTILINE)
     assert titles[0] in ("Arguments", "Options")
-    assert titles[-1] == "How it is done" or command == "info"
+    assert titles[-1] == "Execution" or command == "info"
     if command not in ("info", "database"):
         first = out[out.index("Options:\n") :].split("\n\n")[0]
         assert 1 <= len(re.findall(r"^  -", first, re.MULTILINE)) <= 3

@@ -249,9 +249,19 @@ def test_a_word_means_the_same_in_every_command() -> None:
                 forms.setdefault(max(parameter.opts, key=len), set()).add(form)
     # These options differ on purpose: outputs are folders, entries or images; commands have their own algorithms; an
     # image of a volume is a square; a photograph may show several planes; check reads the source map that other
-    # commands write.
+    # commands write; tiles have two axes.
     several = {flag for flag, found in forms.items() if len(found) > 1}
-    assert several == {"--out", "--method", "--size", "--slant", "--tilt", "--fov", "--source-map"}
+    assert several == {
+        "--out",
+        "--method",
+        "--size",
+        "--slant",
+        "--tilt",
+        "--fov",
+        "--source-map",
+        "--chunks",
+        "--origin",
+    }
     assert not {"--source", "--source-image", "--held", "--rim", "--children"} & set(forms)
     assert forms["--source-map"] == {"OUT.npz", "MAP.npz"}
 

@@ -116,7 +116,7 @@ def test_maps_to_follow_come_from_files(here: Path, capsys: Capture) -> None:
     np.testing.assert_array_equal(iio.imread("out.png"), expected.image)
     wrong = "synthesize in.png -o no.png --size 32 --guide-exemplar mine.tif --guide-output theirs.tif -q"
     assert main(wrong.split()) == 2
-    assert "mine.tif and theirs.tif: the map of the output needs" in capsys.readouterr().err
+    assert "mine.tif and theirs.tif: the map of the output must be" in capsys.readouterr().err
 
 
 def test_frames_come_from_a_file_and_sizes_from_the_example(here: Path) -> None:
@@ -183,7 +183,7 @@ def test_thin_and_broken_volumes(here: Path, capsys: Capture) -> None:
     io.write_volume("nan.npy", np.full((20, 20, 20), np.nan, np.float32))
     for name, says in (
         ("thin", "each side must be at least 16, got shape 32 x 32 x 1"),
-        ("nan", "8000 of 8000 values"),
+        ("nan", "must be finite, but 8000 of 8000 values"),
     ):
         assert main(["solid", f"{name}.npy", "-o", "out.tif", "-q"]) == 2
         assert f"{name}.npy: {says}" in capsys.readouterr().err

@@ -143,9 +143,9 @@ def test_fields_in_words_and_in_files(here):
 def test_volumes_of_other_dtypes(here, capsys):
     io.write_volume("f.npy", VOLUME[..., 0] / np.float32(255))
     assert main(["slice", "f.npy", "-o", "a.png"]) == 2
-    assert "a.png: .png cannot hold float32 with 1 channel; .exr" in capsys.readouterr().err
+    assert "a.png: .png cannot store float32 with 1 channel" in capsys.readouterr().err
     assert main(["slice", "f.npy", "-o", "a.exr", "--at", "row=3"]) == 0
     assert main(["slice", "f.npy", "-o", "a.png", "--cube", "--size", "32"]) == 0
     io.write_volume("n.npy", np.full((4, 4, 4), np.nan))
     assert main(["slice", "n.npy", "-o", "b.png"]) == 2
-    assert "n.npy: 64 of 64 values are NaN" in capsys.readouterr().err
+    assert "n.npy: must be finite, but 64 of 64 values are NaN" in capsys.readouterr().err

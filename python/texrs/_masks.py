@@ -55,16 +55,16 @@ class Mask:
         contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency varies is
         a layer of a paint program: each pixel that is at least half opaque is marked.
     invert : bool
-        If True, the other pixels are marked.
+        If True, the pixels that the mask does not mark are marked instead. Default: False.
     threshold : float, optional
-        Least share of white, or of the full opacity of a layer, that marks a pixel, 0 to 1. The value 0 marks each pixel that
-        is not black. For the marks "alpha", it is the share of transparency, and any transparency by default. Default: 0.5,
-        which noise of JPEG does not reach.
+        Minimum brightness of marked pixels, or minimum opacity in an image with transparency, 0 to 1. The value 0
+        marks each pixel that is not black. For the marks "alpha", it is the share of transparency, and any
+        transparency by default. Default: 0.5, which is above the noise of JPEG.
     grow : int
-        Growth of the marked area on all sides in pixels, -4096 to 4096. A negative number shrinks it.
+        Growth of the marked area on all sides in pixels, -4096 to 4096. A negative number shrinks it. Default: 0.
     feather : int
-        Width in pixels of the band around the marked area where the filling fades into the image, 0 to 4096. The marked
-        area is replaced completely. Only for a hole that is filled.
+        Width in pixels of the band around the marked area where the filling fades into the image, 0 to 4096. The
+        marked area is replaced completely. Only for a hole that is filled. Default: 0.
 
     Raises
     ------

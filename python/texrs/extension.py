@@ -51,12 +51,19 @@ def extend(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        The photograph, any real dtype, each side at least 64.
-    top, bottom, left, right : int
-        Pixels to add on this side, 0 to 8192. One side or more must be above 0. Nothing is added beyond the horizon.
+        The photograph, of any real dtype, at least 64 pixels a side.
+    top : int
+        Pixels to add at the top, 0 to 8192. One side or more must be above 0. Nothing is added beyond the horizon.
+        Default: 0.
+    bottom : int
+        Pixels to add at the bottom, 0 to 8192. Default: 0.
+    left : int
+        Pixels to add on the left, 0 to 8192. Default: 0.
+    right : int
+        Pixels to add on the right, 0 to 8192. Default: 0.
     size : int or (rows, columns), optional
-        Size of the larger image, in pixels. Pixels that the sides above do not add are added evenly, but not beyond
-        the horizon: the other side then takes the rest.
+        Size of the larger image, in pixels. Pixels that the four sides do not add are distributed evenly over opposite
+        sides. If one side would pass the horizon, the other side takes the rest.
     view : PlaneView or Plane, or a sequence of them, optional
         Position of the plane in the photograph, as far as it is known. The rest is found. If the result is uncertain,
         or the plane is seen from the front, elements have the size that they have anywhere in the image. Background
@@ -65,13 +72,13 @@ def extend(
     boundary_width : int
         Width in pixels of the band at the border that may change to hide it, 0 to 64. Default: 0.
     screening : float, optional
-        Weight of the values in the colour correction of the added pixels, as in `texrs.inpaint`. None or 0: no
-        correction.
+        Weight of the original values in the colour correction of the added pixels, as in `texrs.inpaint`. None or 0:
+        no correction. Default: 0.1.
     match_lighting : bool
-        If True, slow changes of light are followed, such as towards a window. Beyond the photograph the light stays as
-        at the border.
+        If True, the added pixels follow gradual changes of light, such as towards a window. Beyond the photograph the
+        light stays as at the border. Default: True.
     seed : int
-        Seed that chooses among the possible results.
+        Seed that chooses among the possible results. Default: 0.
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
         the work. True shows a bar.

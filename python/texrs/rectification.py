@@ -63,19 +63,19 @@ def rectify(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        The photograph, any real dtype, each side at least 64.
+        The photograph, of any real dtype, at least 64 pixels a side.
     view : PlaneView or Plane, optional
         Position of the plane in the photograph, as far as it is known. The rest is found.
     resolution : float, optional
         Pixels of the texture for one pixel in the middle of the photograph, 0.05 to 8. Default: the median scale of
         the visible plane, or less if the flattened plane would be too large.
     size : int or (rows, columns), optional
-        Size of the texture, in pixels. A larger size than the largest sharp rectangle is grown by example, and a
-        smaller one is its middle. Default: the rectangle.
+        Size of the texture, in pixels. A size above that of the largest sharp rectangle is synthesised from it. A
+        smaller size is the middle of the rectangle. Default: the size of the rectangle.
     wrap : bool or (rows, columns), optional
         Axes along which the texture will be tileable (`texrs.tile`). Default: none.
     seed : int
-        Seed of the growth. Default: 0.
+        Seed of the random choices of the synthesis. Default: 0.
     interpolation : {"cubic", "linear", "nearest"}
         Interpolation between pixels of the photograph. Default: "cubic".
     progress : callable or True, optional

@@ -56,10 +56,10 @@ def remove(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
-        The photograph, any real dtype, each side at least 64.
+        The photograph, of any real dtype, at least 64 pixels a side.
     mask : (H, W) array, path or Mask
-        Mask of the object to remove and of its shadow, white where it marks. See `texrs.Mask` for how a mask is read,
-        inverted, grown and feathered.
+        Mask of the object to remove and of its shadow. See `texrs.Mask` for how a mask is read, inverted, grown and
+        feathered.
     view : PlaneView or Plane, or a sequence of them, optional
         Position of the plane behind the object in the photograph, as far as it is known. The rest is found. If the
         result is uncertain, or the plane is seen from the front, the filling has the size of elements anywhere in the
@@ -67,17 +67,18 @@ def remove(
     margin : int, optional
         Growth of the mask in pixels, 0 to 64. Default: 1/150 of the shorter side.
     boundary_width : int, optional
-        Width in pixels of the band around the mask that may also change, 0 to 64, so that seams run where they are
-        least visible. Default: 1/40 of the shorter side, or 1/12 for planes with separate elements. Only pixels that a
-        seam encloses change.
+        Width in pixels of the band around the mask that may also change, 0 to 64, so that seams are least visible.
+        Only pixels that a seam encloses change. Default: 1/40 of the shorter side, or 1/12 for planes with separate
+        elements.
     patch_size : int, optional
-        Side of the patches in pixels, 4 to the shorter side, as in `texrs.inpaint`. Default: chosen as there.
+        Side of the patches in pixels, from 4 to the shorter side, as in `texrs.inpaint`. Default: as in
+        `texrs.inpaint`.
     screening : float, optional
-        Weight of the values in the colour correction of the filled pixels, as in `texrs.inpaint`. None or 0: no
-        correction. Default: 0.1.
+        Weight of the original values in the colour correction of the filled pixels, as in `texrs.inpaint`. None or 0:
+        no correction. Default: 0.1.
     match_lighting : bool
-        If True, slow changes of light are followed, such as towards a window. The light of the source is divided out,
-        and the light of the target is multiplied in. Default: True.
+        If True, the filled pixels follow gradual changes of light, such as towards a window. The light of the source
+        is divided out, and the light of the target is multiplied in. Default: True.
     seed : int
         Seed that chooses among the possible results. Default: 0.
     progress : callable or True, optional

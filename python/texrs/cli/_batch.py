@@ -99,7 +99,7 @@ def batch_command(
         ),
     ] = None,
     seeds: Annotated[
-        str | None, make_option("A:B", "Seeds from A to B - 1, such as 0:32, or a list, such as 1,5,9.")
+        str | None, make_option("A:B", "Seeds from A to B - 1, such as 0:32, or a list such as 1,5,9.")
     ] = None,
     options: Annotated[
         list[str] | None,
@@ -123,7 +123,7 @@ def batch_command(
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Address of a Dask cluster whose workers share the work, on the same disk.",
+            help="Address of a Dask cluster that shares the work. Its workers must use the same disk.",
             show_default=False,
             rich_help_panel=WORK,
         ),

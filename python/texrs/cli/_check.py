@@ -36,7 +36,7 @@ def check_command(
             show_default="only the borders are checked",
         ),
     ] = None,
-    out: Annotated[str | None, to_write("out", text="Image of 2 x 2 copies to write.")] = None,
+    out: Annotated[str | None, to_write("out", text="Image file for 2 x 2 copies of the image.")] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:

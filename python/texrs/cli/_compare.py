@@ -24,15 +24,15 @@ def compare_command(
     pictures: Annotated[
         list[str] | None, make_argument("FILE", "Images, or sample:NAME. Default: ten built-in examples.")
     ] = None,
-    out: Annotated[str, to_write("out", "OUT.html", "Page to write, as one file.")] = "",
+    out: Annotated[str, to_write("out", "OUT.html", "HTML page to write.")] = "",
     task: Annotated[
         list[str] | None, make_option("|".join(SHOWN), "Task to compare. May be repeated. Default: all.")
     ] = None,
-    crop: Annotated[int, typer.Option(help="Side of the crop from the middle of each image, in pixels.")] = 128,
+    crop: Annotated[int, typer.Option(help="Side in pixels of the crop from the middle of each image.")] = 128,
     larger: Annotated[
         int | None, make_option(None, "Side of the larger textures in pixels. Default: 1.5 times the example.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of all methods that have one.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of all methods that use random numbers.")] = 0,
     program: Annotated[
         list[str] | None,
         make_option("NAME=PATH", "Path of another program: embark or resynthesizer. May be repeated."),
@@ -41,7 +41,7 @@ def compare_command(
         bool,
         typer.Option(
             "--seconds/--no-seconds",
-            help="Report the time of each method. Without times the page has the same bytes each time.",
+            help="If --seconds, the page contains the time of each method. Otherwise its bytes are the same each time.",
         ),
     ] = True,
     count: Threads = None,

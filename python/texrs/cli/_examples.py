@@ -22,7 +22,9 @@ from texrs.errors import InvalidInput
 
 
 def demo_command(
-    out: Annotated[str, to_write("out", "DIR", "Folder for index.html.")], count: Threads = None, quiet: Quiet = False
+    out: Annotated[str, to_write("out", "DIR", "Folder for the page, index.html.")],
+    count: Threads = None,
+    quiet: Quiet = False,
 ) -> None:
     """Write a page of results of texrs on built-in examples."""
     # Import here, because this loads all verbs.
@@ -44,7 +46,10 @@ def demo_command(
 def samples_command(
     names: Annotated[list[str] | None, make_argument("NAME", "Names of samples. Default: all.")] = None,
     out: Annotated[str | None, to_write("out", "DIR", "Folder for the samples, as .png and .tif.")] = None,
-    size: Annotated[str | None, make_option("SIZE", "Size of generated samples: 256, 256x192, 64x64x64.")] = None,
+    size: Annotated[
+        str | None,
+        make_option("SIZE", "Size of generated samples in pixels or voxels, such as 256, 256x192 or 64x64x64."),
+    ] = None,
     seed: Annotated[int | None, make_option(None, "Seed of generated samples.")] = None,
     quiet: Quiet = False,
 ) -> None:

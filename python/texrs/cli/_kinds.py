@@ -96,7 +96,7 @@ ENTRY = Kind(
 LAYOUT = Kind(
     "FILE|JSON",
     read_layout,
-    "As the first, or a layout: JSON, or a file of it (.json).",
+    "The same kinds of files as ELEMENTS, or a layout as JSON or in a .json file.",
     file=True,
 )
 ENTRIES = replace(
@@ -105,8 +105,8 @@ ENTRIES = replace(
     note="Files, folders of the maps of a material, sample:NAME, or entries that texrs analyse wrote (.npz).",
     many=True,
 )
-WHITE = "White is marked; of a layer, its opaque pixels."
-WORDS = f"{WHITE} FILE:invert marks the other pixels; FILE:threshold=0.2,grow=4 as the options of remove."
+WHITE = "White pixels are marked. In an image with transparency, opaque pixels are marked."
+WORDS = f"{WHITE} FILE:invert marks the other pixels. FILE:threshold=0.2,grow=4 sets options of texrs remove."
 """Description of masks."""
 MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WORDS, file=True)
 GROUNDS = replace(
@@ -117,21 +117,26 @@ GROUNDS = replace(
     note=f"{WORDS} Repeat the option for several planes, one of which may be {FOUND}.",
     many=True,
 )
-QUOTED = "Four places in quotes, as in '20,20 104,24 110,100 14,112'."
+QUOTED = "Four points in quotes, such as '20,20 104,24 110,100 14,112'."
 CORNERS = Kind(
     "X,Y ...",
     lambda texts, about: [None if text == FOUND else parse_corners(text, about) for text in texts],
-    f"{QUOTED} Of several planes in the order of their grounds, or {FOUND}.",
+    f"{QUOTED} For several planes, repeat the option in the order of --ground. One may be {FOUND}.",
     many=True,
 )
-EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grounds, or {FOUND}.", many=True)
+EACH = Kind(
+    "NUMBER",
+    parse_each,
+    f"For several planes, repeat the option in the order of --ground. One may be {FOUND}.",
+    many=True,
+)
 """One value for each plane of a photograph."""
 OBJECT = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
 """Mask that the function reads, as its other options describe."""
 FILLED = Kind(
     "FILE|alpha|nan|nodata|VALUE",
     read_hole,
-    "nan: pixels that are NaN or infinite; nodata: the value that the file states; or a value.",
+    "nan: NaN or infinite pixels. nodata: pixels of the value that the file states. VALUE: pixels of this value.",
     file=True,
     words=("alpha", "nan", "nodata"),
 )
@@ -139,7 +144,7 @@ MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs 
 SEEN = Kind(
     "FILE|auto",
     lambda text, about: text if text.startswith(PLANE) else read_scale_map(text),
-    "A file that texrs scale-map wrote; or front; or plane:slant=50,tilt=90.",
+    "A file that texrs scale-map wrote, front (no perspective), or a plane such as plane:slant=50,tilt=90.",
     file=True,
     words=("auto", "front"),
 )
@@ -152,11 +157,11 @@ TARGET = Kind(
 DIRECTION = Kind(
     "DEGREES|WORDS|FILE",
     read_direction,
-    "Or a file of degrees (.npy, .tif), or a field: words such as circular, or frames (.npz).",
+    "A file of degrees (.npy, .tif), or a field: a name such as circular, or frames (.npz).",
     file=True,
 )
 MAP_OR_AUTO = replace(MAP, metavar="FILE|auto", words=("auto",))
-NUMBERS = Kind("FILE", read_numbers, "Of several channels the mean counts.", file=True)
+NUMBERS = Kind("FILE", read_numbers, "The mean of several channels is used.", file=True)
 AXES = Kind(
     ("default|xy|x|y|none", "default|xyz|...|none"),
     lambda text, about: parse_axes(text, about.option, axes=about.axes),
@@ -174,6 +179,8 @@ SIZE = Kind(
 )
 SHARES = Kind("A:B:...", lambda text, about: parse_numbers(text, about.option, "numbers such as 2:1:1"))
 
+STEPS = "Names of steps, JSON, or a JSON file. The report of an earlier run repeats its steps."
+
 KINDS = {
     "size": SIZE,
     "to": SIZE,
@@ -181,23 +188,25 @@ KINDS = {
     "wrap": AXES,
     "repeat": AXES,
     "weights": SHARES,
-    "density": Kind("A:B:...|FILE", read_density, "Or a picture, white where all is to be covered.", file=True),
+    "density": Kind(
+        "A:B:...|FILE", read_density, "A map is an image whose white pixels are covered completely.", file=True
+    ),
     "scales": replace(SHARES, show=lambda numbers: ":".join(f"{n:g}" for n in numbers)),
     "scale": Kind("LEAST:LARGEST", parse_range, show=lambda numbers: ":".join(f"{n:g}" for n in numbers)),
     "augment_scales": Kind("auto|yes|no|A:B:...", parse_sizes),
     "memory_limit": Kind(
-        "BYTES", lambda text, about: parse_bytes(text, about.option), "As in 900M or 16G.", plain=True
+        "BYTES", lambda text, about: parse_bytes(text, about.option), "For example 900M or 16G.", plain=True
     ),
     "field": Kind(
         "WORDS|FILE",
         read_field,
-        "As in circular:axis=z,centre=16x24x0 (x first) or zigzag:period=64, or a file of frames or directions.",
+        "For example circular:axis=z,centre=16x24x0 (x first) or zigzag:period=64, or a file of frames or directions.",
         file=True,
     ),
     "spacing": Kind(
         ("WIDTHxHEIGHT", "WIDTHxHEIGHTxDEPTH"),
         parse_spacing,
-        ("Of a pixel, as in 0.7x1.6.", "Of a voxel, as in 0.7x0.7x1.6."),
+        ("For example 0.7x1.6.", "For example 0.7x0.7x1.6."),
     ),
     "scale_map": MAP,
     "target": MAP,
@@ -206,16 +215,14 @@ KINDS = {
     "ground": MASK,
     "allowed": MASK,
     "corners": Kind("X,Y ...", parse_corners, QUOTED, plain=True),
-    "labels": Kind("FILE", read_labels, "Or an entry that texrs analyse wrote (.npz).", file=True),
+    "labels": Kind("FILE", read_labels, "A label image, or an entry that texrs analyse wrote (.npz).", file=True),
     "values": Kind("FILE", read_values, file=True),
     "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),
     "background": Kind("X,Y", parse_places, "The option may be repeated.", many=True),
-    "box": Kind("X,Y,WIDTH,HEIGHT", parse_box, "X,Y is the middle of the box."),
-    "points": Kind(
-        "POINTS.csv", read_points, "A file of x,y a line; a first line may say x,y or row,column.", file=True
-    ),
-    "corrections": Kind("JSON|FILE.json", read_corrections, "As the page of texrs analyse --page lists them."),
-    "edit": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
-    "steps": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
+    "box": Kind("X,Y,WIDTH,HEIGHT", parse_box, "X,Y is the centre of the box."),
+    "points": Kind("POINTS.csv", read_points, "Each line is x,y. A header line may be x,y or row,column.", file=True),
+    "corrections": Kind("JSON|FILE.json", read_corrections, "The page that texrs analyse --page writes lists them."),
+    "edit": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
+    "steps": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
 }
 """Kinds of parameters by name, if their type is not enough: a name has the same meaning everywhere."""

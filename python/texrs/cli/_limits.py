@@ -19,9 +19,9 @@ from texrs.cli._texts import parse_bytes
 __all__ = ["limit", "list_parameters"]
 
 OPTIONS: dict[str, tuple[Any, str, str, str]] = {
-    "memory_limit": (str, "BYTES", "Memory that it may take, as in 900M or 16G.", "what there is"),
-    "pixel_limit": (int, "N", "Pixels, or voxels, that may be made or read at once.", "268435456"),
-    "time_limit": (float, "SECONDS", "How long it may take.", "no limit"),
+    "memory_limit": (str, "BYTES", "Maximum memory in bytes, such as 900M or 16G.", "available memory"),
+    "pixel_limit": (int, "N", "Maximum number of pixels or voxels that are computed or read at once.", "268435456"),
+    "time_limit": (float, "SECONDS", "Maximum duration of the command in seconds.", "no limit"),
 }
 
 

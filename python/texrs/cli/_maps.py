@@ -48,9 +48,12 @@ APPLIED = Options(
 
 @take_options(APPLIED)
 def apply_command(
-    source: Annotated[str, make_argument("MAP.npz", "A source map that --source-map wrote.")],
-    maps: Annotated[list[str], make_argument("IMAGE", "Images in register with the exemplar.")],
-    out: Annotated[str, to_write("out", text="Image file or .zarr to write. A folder for several images.")],
+    source: Annotated[str, make_argument("MAP.npz", "Source map that the option --source-map of a command wrote.")],
+    maps: Annotated[
+        list[str],
+        make_argument("IMAGE", "Images with the same pixels as the exemplar, such as its heights or normals."),
+    ],
+    out: Annotated[str, to_write("out", text="Image or .zarr file to write, or a folder for several images.")],
     given: dict[str, Any],
     count: Threads = None,
     quiet: Quiet = False,

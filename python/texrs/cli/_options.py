@@ -233,6 +233,8 @@ class Options:
             both = f"{flag}/--no-{flag.removeprefix('--')}" if type_ is bool else flag
             metavar = kind.pick(kind.metavar, self.axes) if kind else None
             panel = path[0].replace("_", " ").capitalize() if len(path) == 2 else None
+            # The word default says nothing. The text contains the default.
+            shown = False if default == "default" else shown
             info = typer.Option(both, metavar=metavar, help=help_, show_default=shown, rich_help_panel=panel)
         return Option(path, flag, type_, kind, default, required, info)
 
@@ -369,10 +371,11 @@ def _shorten(
 
     A last sentence "Default: ..." is kept, unless the option shows its default.
     """
-    # References are for readers of the documentation only.
+    # References and types of arrays are for readers of the documentation only.
     text = re.sub(r"\s*\((?:see )?(?:`|section|Eq\.)[^)]*\)|\s*\[\d+\]_|[:;,] see `texrs[^`]*`", "", text)
+    text = re.sub(r",? of any real dtype(?: and number of channels)?|, any real dtype", "", text)
     # Drop the description of None, unless it is the default: users cannot request it.
-    beside = ("See ", "`texrs.") if default is None else ("See ", "`texrs.", "None")
+    beside = ("See ", "Python ", "`texrs.", "A `texrs.", *(() if default is None else ("None",)))
     first, *further = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
     last = [further.pop()] if further and further[-1].startswith("Default: ") else []
     if "yes" in words:
@@ -385,6 +388,7 @@ def _shorten(
     short = [first, second] if second and len(first + second) < LONGEST else [first]
     chosen = " ".join([*([first, *of_words] if of_words else short), *([] if shown else last)])
     chosen = re.sub(r"``(\w+)``", lambda found: flags.get(found[1], found[1]), chosen)
+    chosen = re.sub(r"``(\w+)=\"([\w-]+)\"``", lambda found: f"{flags.get(found[1], found[1])} {found[2]}", chosen)
     if flag:
         chosen = re.sub(r"\bFalse\b", f"--no-{flag[2:]}", re.sub(r"\bTrue\b", flag, chosen))
     chosen = re.sub(r"(?<=[;:] )None\b", "the default", re.sub(r"(^|(?<=[.] ))None\b", "The default", chosen))

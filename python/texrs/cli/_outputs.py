@@ -41,7 +41,7 @@ LONGEST_PROBE = 2**17
 STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask|numbers)\.png|report\.json")
 """Names of files in a folder of stages."""
 
-MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "How it is done"
+MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "Execution"
 """Groups of options in the help."""
 NO_MATERIALS = ("batch", "samples")
 """Commands that do not read folders of maps. They refuse a folder as an input."""
@@ -53,7 +53,7 @@ OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "source_map": (("--source-map",), "OUT.npz", "File for the source map, for texrs apply."),
     "stages": (("--stages",), "DIR", "Folder for images of the stages and report.json."),
     "sheet": (("--sheet",), "OUT.png", "Contact sheet of all results."),
-    "preview": (("--preview",), "OUT.png", "Image of the lit material, tiled 2 x 2."),
+    "preview": (("--preview",), "OUT.png", "Image of the lit material: 2 x 2 copies."),
     "mipmaps": (("--mipmaps",), "DIR", "Folder for the mipmaps of a material."),
     "gltf": (("--gltf",), "OUT.glb", "Material on a plane and on a sphere, as one glTF 2.0 file."),
     "materialx": (("--materialx",), "DIR", "Folder for the material as MaterialX: material.mtlx and its maps."),

@@ -38,9 +38,14 @@ def read_block(text: str, about: About) -> Any:
         return Material.read(text, roles=about.roles, axes=3)
 
 
-BLOCK = Kind("FILE|FOLDER", read_block, "A volume, a folder of volumes that are maps, or sample:NAME.", file=True)
+BLOCK = Kind(
+    "FILE|FOLDER",
+    read_block,
+    "A volume file, a folder of volumes that are the maps of a material, or sample:NAME.",
+    file=True,
+)
 TEXTURE = Options(SolidTexture, arguments={"exemplar": BLOCK}, leave={"cache_bytes": "one process makes all"}, axes=3)
-MESH = Kind("FILE", lambda text, about: text, ".obj, .ply, .stl or .glb.")
+MESH = Kind("FILE", lambda text, about: text)
 PAINTED = Options(
     texture_mesh,
     only=("mesh", "scale", "atlas", "padding", "unwrap"),
@@ -58,12 +63,12 @@ FOLLOWED = Options(
 @take_options(PAINTED, TEXTURE, FOLLOWED)
 def paint_command(
     out: Annotated[
-        str, to_write("out", "OUT.glb", "Mesh to write: .glb, .gltf or .obj with .mtl; .ply for vertex colours.")
+        str, to_write("out", "OUT.glb", "Mesh to write: .glb, .gltf, .obj (with .mtl), or .ply for vertex colours.")
     ],
     given: dict[str, Any],
-    corners: Annotated[bool, typer.Option("--vertices", help="Write colours of vertices instead of an atlas.")] = False,
+    corners: Annotated[bool, typer.Option("--vertices", help="Write vertex colours instead of an atlas.")] = False,
     bits: Annotated[
-        int | None, make_option("8|16", "Bits of the images. Default: 8 if all maps have 8, else 16.")
+        int | None, make_option("8|16", "Bits per channel of the images. Default: 8 if all maps have 8, else 16.")
     ] = None,
     role: Roles = None,
     count: Threads = None,

@@ -34,8 +34,16 @@ from texrs.papers.solid.window import PlaneTexture, SolidTexture
 __all__ = ["BEYOND", "OPTIONS", "Asked", "InParts", "is_stored", "make_options", "read_scheduler", "write_part"]
 
 OPTIONS: dict[str, tuple[Any, str, str]] = {
-    "origin": (str, "X,Y[,Z]", "First pixel or voxel of a window of the unbounded texture, integers within 10^9."),
-    "chunks": (str, "WIDTHxHEIGHT", "Chunk size, for results that are larger than memory."),
+    "origin": (
+        str,
+        "X,Y[,Z]",
+        "First pixel or voxel of a window of the unbounded texture: integers from -10^9 to 10^9.",
+    ),
+    "chunks": (
+        str,
+        "WIDTHxHEIGHT[xDEPTH]",
+        "Size of a chunk in pixels or voxels, for results that are larger than memory.",
+    ),
     "workers": (int, "N", "Number of processes that compute the chunks."),
     "scheduler": (str, "ADDRESS", "Address of a Dask cluster that computes the chunks."),
 }

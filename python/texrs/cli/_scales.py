@@ -44,13 +44,14 @@ def scale_map_command(
     image: Annotated[str, make_argument("IMAGE", "The texture: an image file, or sample:NAME.")],
     out: Annotated[str, to_write("out")],
     given: dict[str, Any],
-    mask: Annotated[str | None, make_option("FILE", f"Mask of the elements, for the measurement. {WORDS}")] = None,
+    mask: Annotated[str | None, make_option("FILE", f"Mask of the elements to measure. {WORDS}")] = None,
     auto: Annotated[bool, typer.Option("--auto", help="Find the mask of the elements in the image.")] = False,
-    scale_map: Annotated[str | None, make_option("FILE", "An existing scale map, to edit or to resize.")] = None,
+    scale_map: Annotated[str | None, make_option("FILE", "Existing scale map to edit or resize.")] = None,
     hole: Annotated[
         str | None,
         make_option(
-            "FILE", f"With --mask or --auto: mask of the part without texture, into which the map is continued. {WORDS}"
+            "FILE",
+            f"Mask of the part without texture, into which the map is continued. Requires --mask or --auto. {WORDS}",
         ),
     ] = None,
     stages: Annotated[str | None, to_write("stages")] = None,

@@ -68,29 +68,41 @@ ACROSS = Options(
     slices,
     only=("at",),
     kinds={
-        "at": Kind("AXIS=N|X,Y,Z", parse_at, "As in 10,20,30; or one slice: z=30 (a plane), y=-1 (the last row), x=7.")
+        "at": Kind(
+            "AXIS=N|X,Y,Z",
+            parse_at,
+            "A point such as 10,20,30, or one slice: z=30 (a plane), y=-1 (the last row), x=7.",
+        )
     },
 )
 CUT = Options(
     oblique_slice,
     only=("normal", "interpolation"),
     names={"normal": "oblique"},
-    kinds={"normal": Kind("X,Y,Z/X,Y,Z", parse_oblique, "A point and a normal; /0,1,1 is through the middle.")},
+    kinds={
+        "normal": Kind(
+            "X,Y,Z/X,Y,Z",
+            parse_oblique,
+            "A point and a normal, such as 10,20,30/0,1,1. Without a point, /0,1,1 is through the middle.",
+        )
+    },
 )
-BLOCK = Options(render_block, only=("size", "azimuth", "elevation", "interpolation"))
+_SHOWN = {"size": "512, or 320 for --turntable", "elevation": "30, or 25 for --turntable"}
+BLOCK = Options(render_block, only=("size", "azimuth", "elevation", "interpolation"), optional=_SHOWN)
 CLEAR = Options(
     render_volume,
     only=("size", "azimuth", "elevation", "transfer", "shading"),
+    optional=_SHOWN,
     kinds={
         "transfer": Kind(
             "V:COLOUR:ALPHA,...",
             lambda text, about: parse_transfer(text),
-            "As in 0:own:0,0.4:own:0,0.6:#cc3322:0.2; own is the colour of the voxel.",
+            "For example 0:own:0,0.4:own:0,0.6:#cc3322:0.2, where own is the colour of the voxel.",
         )
     },
 )
 APART = Options(cubes, only=("spacing",), optional={"spacing": "as the file states"}, axes=3)
-TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "interpolation"))
+TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "interpolation"), optional=_SHOWN)
 
 
 @take_options(ACROSS, CUT, BLOCK, CLEAR, TURNED, APART)
@@ -101,7 +113,9 @@ def slice_command(
     as_cube: Annotated[
         bool, typer.Option("--cube", help="Draw a block of the material on a transparent background.")
     ] = False,
-    as_clear: Annotated[bool, typer.Option("--transparent", help="Draw the block as transparent.")] = False,
+    as_clear: Annotated[
+        bool, typer.Option("--transparent", help="Draw the block with the transparency of --transfer.")
+    ] = False,
     as_turntable: Annotated[
         bool, typer.Option("--turntable", help="Draw the rotating block as an animated GIF.")
     ] = False,

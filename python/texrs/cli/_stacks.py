@@ -55,25 +55,29 @@ OPTIONS: dict[str, Any] = {
         int,
         "--depth",
         "8|16|32",
-        "Bits of each map of a material: integers of 8 or 16, floats of 32.",
-        "as each map has",
+        "Bits per channel of the maps of a material: 8 or 16 (integers), or 32 (floats).",
+        "those of each map",
     ),
     "format": _option(
-        str, "--format", "png|tif|exr", "File format of the maps of a material.", "png, or what holds the map"
+        str,
+        "--format",
+        "png|tif|exr",
+        "File format of the maps of a material.",
+        "png, or a format that can store the map",
     ),
     "pack": _option(
         str,
         "--pack",
         "orm|none",
-        "Packing of occlusion, roughness and metallic: one map, or separate maps.",
-        "as they came",
+        "Packing of occlusion, roughness and metallic: orm for one map, none for separate maps.",
+        "as in the input",
     ),
     "convention": _option(
         str,
         "--convention",
         "NAME",
         f"Convention for names, packing and y direction of the maps: {', '.join(CONVENTIONS)}.",
-        "those that came in",
+        "those of the input",
     ),
 }
 """Options for reading and writing materials."""

@@ -41,19 +41,28 @@ PANEL = "Larger than memory"
 def tiles_command(
     out: Annotated[
         str,
-        to_write("out", "DIR|OUT", "Folder for the atlas, its index and shaders; or an image or .zarr of a window."),
+        to_write(
+            "out", "DIR|OUT", "Folder for the atlas, its index and shaders, or an image or .zarr file for a window."
+        ),
     ],
     given: dict[str, Any],
     size: Annotated[
-        str | None, make_option("WIDTHxHEIGHT", "Size of a window to write instead of the tile set.")
+        str | None, make_option("WIDTHxHEIGHT", "Size in pixels of a window to write instead of the tile set.")
     ] = None,
-    origin: Annotated[str | None, make_option("X,Y[,Z]", "First pixel of the window, integers within 10^15.")] = None,
+    origin: Annotated[
+        str | None, make_option("X,Y", "First pixel of the window: integers from -10^15 to 10^15.")
+    ] = None,
     index: Annotated[
-        str | None, make_option("WIDTHxHEIGHT", f"Cells of the index texture. Default: {CELLS} a side.")
+        str | None, make_option("WIDTHxHEIGHT", f"Size of the index texture in cells. Default: {CELLS}x{CELLS}.")
     ] = None,
     chunks: Annotated[
         str | None,
-        typer.Option(metavar="WIDTHxHEIGHT", help="Chunk size of a window.", show_default=False, rich_help_panel=PANEL),
+        typer.Option(
+            metavar="WIDTHxHEIGHT",
+            help="Size of a chunk of the window in pixels.",
+            show_default=False,
+            rich_help_panel=PANEL,
+        ),
     ] = None,
     workers: Annotated[
         int | None,

@@ -34,15 +34,15 @@ from texrs.materials._single import SingleMap
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
-    help="Number of variants, written as OUT-SEED, with OUT as their contact sheet.",
-    show_default="one, in OUT",
+    help="Number of variants. They are written as OUT-SEED, and OUT becomes their contact sheet.",
+    show_default="1, written to OUT",
     metavar="N",
 )
 PALETTE = Annotated[
     bool | None,
     typer.Option(
         "--palette/--no-palette",
-        help="Use only the colours of the input: nearest pixels, without seam correction.",
+        help="If --palette, only colours of the input are used: nearest pixels without seam correction.",
         show_default="if the input is indexed or has few colours",
     ),
 ]

@@ -79,18 +79,18 @@ def analyse(
         background.
     layout : Layout or str, optional
         Layout of the elements: separate ("disjoint"), a connected foreground ("connected"), or separated by joints
-        ("jointed"). The paper's "F=d", "F=c" and "B=c" are accepted.
+        ("jointed"). The paper's "F=d", "F=c" and "B=c" are accepted. Default: the layout that is found.
     points : (n, 2) array, optional
         Centres of the elements (row, column). They replace the search.
     search : ElementSearch
         Options of the search: directions, sizes, minimum similarity and colour model.
     method : {None, "paper"}
         Method of the analysis. "paper" is the published algorithm with its misprints corrected: one channel, no cut,
-        nearest samples, no cleaning.
+        nearest samples, no cleaning. Default: the algorithm with departures from the paper.
     wrap : bool or (rows, columns)
-        Axes along which the texture is tileable. A single bool applies to both.
+        Axes along which the texture is tileable. Python also accepts a single bool for both. Default: none.
     seed : int
-        Seed for the samples of the mixtures.
+        Seed of the random samples that the colour models are fitted to. Default: 0.
     corrections : sequence of dict, optional
         Corrections of the result (`texrs.elements.correct`).
     progress : callable or True, optional

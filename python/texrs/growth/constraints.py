@@ -39,9 +39,9 @@ class Constraints:
     Attributes
     ----------
     mask : (rows, columns) or (planes, rows, columns) bool or int array
-        Mask of the given points: those that are not 0.
+        Mask of the given points. Python marks points by values other than 0.
     values : (size[, C]) array, optional
-        Values of the given points, in the exemplar's dtype and channels; the output shows them exactly. Values of
+        Values of the given points, in the exemplar's dtype and channels. The output shows them exactly. Values of
         other points are ignored.
     coordinates : (size, A) array, optional
         Source coordinates of the given points, instead of values: (row, column) or (plane, row, column) in samples,
@@ -87,10 +87,11 @@ class Guide:
     Attributes
     ----------
     exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
-        Finite numbers that broadcast to the exemplar's axes: the guided quantity at each sample, such as its depth.
+        Guided quantity at each sample of the exemplar, such as its depth. Python accepts finite numbers that broadcast
+        to the exemplar's axes.
     output : (rows, columns[, C]) or (planes, rows, columns[, C]) array_like
-        Finite numbers in the same unit, which broadcast to the size of the output: the requested quantity at each
-        point.
+        Requested quantity at each point of the output, in the same unit. Python accepts finite numbers that broadcast
+        to the size of the output.
     weight : float
         Weight of the guide compared with similarity to the exemplar, 0 to 100. If it is 1, a difference of a third of
         the range of the exemplar's map costs as much as two unrelated windows.

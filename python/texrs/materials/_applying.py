@@ -53,10 +53,10 @@ def apply(
         itself.
     map_type : {"colour", "normal", "vector", "label"}, optional
         Type of the map. "colour": also heights and other values that may be mixed. If the finish removes uneven light,
-        it does so here. "normal", "vector": tangent-space normals, directions on the surface, as in
-        `SourceMap.render`. "label": values without a meaning between them. The nearest sample is used, and nothing is
-        corrected. Default: from the file name. Without a role: "label" for integers that form regions of unrelated
-        values, else "colour".
+        it does so here. "normal", "vector": normals in tangent space, or directions on the surface. They are rotated
+        as in `SourceMap.render`. "label": unordered classes. The nearest sample is used, and nothing is corrected.
+        Default: from the file name. Without a role: "label" for integers that form regions of unrelated values, else
+        "colour".
     green : {"up", "down"}, optional
         Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: from the file name,
         else "up".

@@ -158,17 +158,17 @@ def texture_mesh(
     Parameters
     ----------
     mesh : path_like, trimesh.Trimesh, or (vertices, faces)
-        Triangles: a file (.obj, .ply, .stl, .glb), a mesh, or arrays (N, 3) and (M, 3). Existing UVs are kept. Faces
-        without UVs are laid out by xatlas. x, y and z are the axes of columns, rows and planes. Materials share one
-        atlas, or have one atlas each if their UVs overlap. Each tile of UVs beyond 0 to 1 (UDIM)
-        also has its own atlas.
+        Triangle mesh: a file (.obj, .ply, .stl or .glb). Existing UVs are kept. Python also accepts a mesh of trimesh,
+        or arrays (N, 3) and (M, 3). Faces without UVs are laid out by xatlas. x, y and z are the axes of columns, rows
+        and planes. Materials share one atlas, or have one atlas each if their UVs overlap. Each tile of UVs beyond 0
+        to 1 (UDIM) also has its own atlas.
     texture : SolidTexture
         Solid texture of an array, or of a material, all of whose maps are sampled. The normals of a material specify
         the slope of its relief along columns and rows: (0, 0, 1) is flat. The surface gets this slope wherever it cuts
         the texture.
     scale : float, optional
-        Number of voxels in a unit of the mesh, or of units of the texture's spacing. Default: the longest side shows
-        the exemplar four times, or fewer times if a voxel would be smaller than a texel of the atlas.
+        Number of voxels per unit of the mesh, or of units of the spacing if the texture has one. Default: the longest
+        side shows the exemplar four times, or fewer times if a voxel would be smaller than a texel of the atlas.
     atlas : int, optional
         Side of the atlas in texels, 16 to 16384. Without an atlas, vertices get colours instead. Default: 1024.
     padding : int

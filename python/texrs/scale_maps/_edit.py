@@ -53,7 +53,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
     scale : array_like
         Scale map, (H, W). It is not changed.
     steps : sequence of mappings, or str
-        Steps in their order, or their JSON text.
+        Steps of the edit, in order. Python also accepts their JSON text.
 
     Returns
     -------

@@ -33,7 +33,7 @@ def resample(
     scale : array_like
         Scale map of the exemplar, (H, W). The modes ``"user"`` and ``"angles"`` ignore it, so it may be None.
     size : (int, int) or int
-        Size of the output in pixels: (rows, columns), or one number for a square.
+        Size of the output in pixels (rows, columns), or one number for a square.
     mode : {"stretch", "extend", "user", "angles"}
         Method. ``"stretch"``: stretch the map so that its borders stay at the borders, linearly in log S.
         ``"extend"``: put the map in the middle and continue it by the plane that fits it (`extend`); for a smaller

@@ -97,25 +97,28 @@ def tile(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array, or Exemplar
-        The image, any real dtype, at least 2 pixels along an axis that wraps.
+        The image, of any real dtype, at least 2 pixels along an axis that wraps.
     wrap : bool or (rows, columns), optional
-        Axes along which the result repeats; None: both.
+        Axes along which the result repeats. Default: both.
     size : int or (rows, columns), optional
-        Size of the result in pixels, at least 2 along an axis that wraps. By default the size of the image, or less along an
-        axis if the joint is then clearly less visible: the report contains the reason. A result larger than the image,
-        at least 8 pixels a side, is a quilt of it. A lattice is then stretched so that it closes.
+        Size of the result in pixels, at least 2 along an axis that wraps. A result larger than the image, at least 8
+        pixels a side, is a quilt of it. A lattice is then stretched so that it closes. If the default size is smaller
+        than the image, the report contains the reason. Default: the size of the image, or less along an axis if the
+        joint is then clearly less visible.
     overlap : int or (rows, columns), optional
-        Overlap of two opposite edges in pixels, 1 to half the side, instead of a size. By default the least visible one.
+        Overlap of two opposite edges in pixels, from 1 to half the side. It cannot be combined with ``size``. Default:
+        the overlap with the least visible joint.
     screening : float, optional
-        Weight of the values in the correction of colours at seams, 0 to 1e6. A smaller weight gives a wider correction.
-        None or 0: no correction, so that each pixel is a pixel of the image. See `texrs.blend`.
+        Weight of the original values when colours are corrected to hide seams, 0 to 1e6. A smaller weight spreads the
+        correction wider. None or 0: no correction, so that each pixel is a pixel of the image. See `texrs.blend`.
+        Default: no correction.
     flatten_lighting : bool, optional
-        If True, uneven light is evened out first, as far as there is evidence of it. By default only if one part is lit at
-        least 1.6 times brighter than another part, and no side is shorter than 128 pixels. Only the colours
-        of a material are changed. See `texrs.materials.flatten_lighting`.
+        If True, uneven light is evened out first, as far as there is evidence of it. Only the colours of a material
+        are changed. See `texrs.materials.flatten_lighting`. Default: True if one part is lit at least 1.6 times
+        brighter than another part, and no side is shorter than 128 pixels.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the finished share of the stage; raising stops the work.
-        True shows a bar.
+        Called as ``progress(stage, share)``, with the finished share of the stage. If it raises an exception, the work
+        stops. True shows a bar.
 
     Returns
     -------

@@ -42,7 +42,7 @@ def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) 
     volume : array_like
         Volume of shape (D, H, W) or (D, H, W, C).
     at : sequence of 3 int, optional
-        Plane, row and column of the slices. By default the middle. Negative numbers count from the end.
+        Plane, row and column of the slices. Negative numbers count from the end. Default: the middle.
     gap : int
         Pixels between the slices. These, and the rest next to unequal slices, are white (the largest value).
 
@@ -171,11 +171,11 @@ def render_block(
         Volume of shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey. Only the first 3 of more
         channels are shown.
     size : int
-        Pixels of the longer side, 16 to 4096.
+        Longer side of the image in pixels, 16 to 4096. Default: 512.
     azimuth : float
         Rotation of the view to the right in degrees. If 0, only the front is visible.
     elevation : float
-        Rotation of the view upwards in degrees, -90 to 90.
+        Rotation of the view upwards in degrees, -90 to 90. Default: 30.
     interpolation : {"linear", "cubic", "nearest"}
         Interpolation between voxels. "nearest" shows each voxel as a square.
 

@@ -60,7 +60,7 @@ def render_volume(
         Volume of shape (D, H, W) or (D, H, W, C). Only the first 3 of more channels are shown; a fourth one is
         transparency.
     size : int
-        Pixels of the longer side, 16 to 4096.
+        Longer side of the image in pixels, 16 to 4096.
     azimuth : float
         Rotation of the view to the right in degrees. If 0, only the front is visible.
     elevation : float

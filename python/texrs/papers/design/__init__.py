@@ -120,19 +120,19 @@ def design(
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
-        The example, of any real dtype, at least 16 pixels a side. Several exemplars of one dtype and number of
-        channels are mixed. A set of analysed elements, as for `splice`, contains its own elements.
+        Example image, of any real dtype, at least 16 pixels a side. Several exemplars are mixed if they have the same
+        dtype and number of channels. A set of analysed elements, as for `splice`, contains its own elements.
     size : int or (rows, columns), optional
-        Size of the result, in pixels, at least 16 a side. Default: twice the exemplar.
+        Size of the result, in pixels, at least 16 a side. Default: twice the size of the exemplar.
     seed : int
         Number that selects the texture, 0 to 2^64 - 1. The same exemplar, options, seed and version give the same
         bytes. Default: 0.
     wrap : bool or (rows, columns), optional
         Axes along which the result repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Share of each exemplar: n numbers, a map of exemplar numbers, or a map of n shares per pixel. Default: equal
-        shares. Borders follow outlines, at most one element away from their place in a map. The total shares are kept
-        within 3 %.
+        Share of each exemplar, as one number each, 0 or more. Python also accepts a map of exemplar numbers or a map
+        of shares per pixel. Borders follow outlines, at most one element away from their place in a map. The total
+        shares are kept within 3 %. Default: equal shares.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
         Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number, one for each
         of these exemplars, or maps. Whole elements are scattered over a texture of the first exemplar. Elements of the
@@ -145,18 +145,18 @@ def design(
         Options that control how elements are deformed. Default: the default options.
     motion : {"auto", "move", "keep"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
-        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and takes the
+        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and uses the
         better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses is
         laid course by course unless elements move. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
-        Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side. Default: a sixth of the
-        shorter side, 12 to 32.
+        Side of the patches that fill holes, in pixels, from 4 to the exemplar's shorter side. Default: 1/6 of the
+        shorter side, but 12 to 32.
     screening : float, optional
-        Weight that keeps the values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller weight
-        spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in the
-        same way, with ``across=False`` if there are several exemplars. Default: 0.15.
+        Weight of the original values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller
+        weight spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in
+        the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
     method : {None, "paper"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired, for comparison. The
         printed generator moves whole colour layers, once each or ``operations`` times. They are stitched at the plain
@@ -296,20 +296,20 @@ def design_variants(
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
-        The example, of any real dtype, at least 16 pixels a side. Several exemplars of one dtype and number of
-        channels are mixed. A set of analysed elements, as for `splice`, contains its own elements.
+        Example image, of any real dtype, at least 16 pixels a side. Several exemplars are mixed if they have the same
+        dtype and number of channels. A set of analysed elements, as for `splice`, contains its own elements.
     count : int
         Number of textures, 1 to 4096.
     size : int or (rows, columns), optional
-        Size of each texture, in pixels, at least 16 a side. Default: twice the exemplar.
+        Size of each texture, in pixels, at least 16 a side. Default: twice the size of the exemplar.
     seed : int
         Number that selects the textures, 0 to 2^64 - 1. Their seeds are ``seed``, ``seed + 1``, ... Default: 0.
     wrap : bool or (rows, columns), optional
         Axes along which each texture repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Share of each exemplar: n numbers, a map of exemplar numbers, or a map of n shares per pixel. Default: equal
-        shares. Borders follow outlines, at most one element away from their place in a map. The total shares are kept
-        within 3 %.
+        Share of each exemplar, as one number each, 0 or more. Python also accepts a map of exemplar numbers or a map
+        of shares per pixel. Borders follow outlines, at most one element away from their place in a map. The total
+        shares are kept within 3 %. Default: equal shares.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
         Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number, one for each
         of these exemplars, or maps. Whole elements are scattered over a texture of the first exemplar. Elements of the
@@ -322,18 +322,18 @@ def design_variants(
         Options that control how elements are deformed. Default: the default options.
     motion : {"auto", "move", "keep"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
-        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and takes the
+        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and uses the
         better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses is
         laid course by course unless elements move. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
-        Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side. Default: a sixth of the
-        shorter side, 12 to 32.
+        Side of the patches that fill holes, in pixels, from 4 to the exemplar's shorter side. Default: 1/6 of the
+        shorter side, but 12 to 32.
     screening : float, optional
-        Weight that keeps the values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller weight
-        spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in the
-        same way, with ``across=False`` if there are several exemplars. Default: 0.15.
+        Weight of the original values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller
+        weight spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in
+        the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
     method : {None, "paper"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired, for comparison. The
         printed generator moves whole colour layers, once each or ``operations`` times. They are stitched at the plain

@@ -89,13 +89,13 @@ def perspective(
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
-        Any real dtype and channels; each side at least 16.
+        Example image, of any real dtype and number of channels, at least 16 pixels a side.
     scale_map : (H, W) float array, Plane, "auto" or "front"
         Size of the exemplar's elements at each pixel, positive. Only ratios count (`texrs.scale_maps`). `texrs.Plane`
         or its words ``"plane:slant=50,tilt=90,fov=60"`` give the sizes on a plane. "auto": the sizes on the plane in
         the image (`texrs.planes.find`), or else measured sizes (`texrs.planes.measure_scale`). "front": one size.
     size : int or (int, int), optional
-        Size of the result in pixels. By default the size of the ``target``, else twice the exemplar's.
+        Size of the result in pixels. Default: the size of ``target``, or else twice the size of the exemplar.
     target : array or Plane, optional
         Requested size of elements at each pixel of the result, in the units of ``scale_map``. It is a scale map, or a
         surface that the texture is placed on. `texrs.Plane` or its words give another plane, with elements of size 1
@@ -108,23 +108,23 @@ def perspective(
         Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX).
     scale_kind : {"width", "area"}, optional
         Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
-        "area", square roots of areas. None: the quantity that fits the scale map best as a map of a plane. The target
-        has the same quantity.
+        "area", square roots of areas. The target has the same quantity. Default: the quantity that fits the scale map
+        best as a map of a plane.
     fov : float, optional
         Angle of view of the longer side of the exemplar in degrees, 1 to 170. Default: 60 (`texrs.planes.FOV`). It
         determines the foreshortening of a plane, in addition to a scale map. A ``target`` that is a surface, and
         ``direction``, need it. Ignored if ``scale_map`` is a plane, which has its own.
     direction : float, (rows, columns) array or Field, optional
-        Counter-clockwise rotation of the copied texture in degrees: one number, or one per pixel. An array of another
-        size is stretched. A `texrs.fields.Field` of two axes, or its words such as ``"circular"`` or
+        Counter-clockwise rotation of the copied texture in degrees: one number, or one per pixel. Maps of another size
+        are stretched. A `texrs.fields.Field` of two axes, or its words such as ``"circular"`` or
         ``"zigzag:period=64,angle=30"``, gives the rotation of the field. On a plane or another surface the texture
-        rotates on it.
+        rotates on it. Default: 0.
     scale_measurement : Measuring, optional
         Measurement of a ``scale_map`` "auto" in a mask of features (`texrs.scale_maps.Measuring`), instead of by a
         plane.
     method : {None, "paper"}
-        Algorithm. "paper": the literal one, for comparison. It averages windows and is slow. It does not wrap, and
-        takes up to four channels.
+        Algorithm to use. "paper" is the algorithm as printed, for comparison. It averages windows and is slow. It does
+        not wrap, and takes up to four channels. Default: the algorithm with departures from the paper.
     scale_weight : float
         Weight of the requested scale compared with similarity to the exemplar, 0 to 16. Copies are chosen by this
         weight only. Elements on a plane have their size in any case, but another sharpness. If 0, scales are ignored.
@@ -137,9 +137,9 @@ def perspective(
     wrap : bool or (rows, columns), optional
         Axes along which the result is periodic. Default: none. The target must also be periodic.
     seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     interpolation : {"nearest", "linear", "cubic"}
-        Interpolation between the exemplar's samples, where it is resized.
+        Interpolation between the exemplar's samples where it is resized. Default: "cubic".
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
         the work. True shows a bar.

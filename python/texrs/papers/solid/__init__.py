@@ -102,43 +102,44 @@ def solid(
     Parameters
     ----------
     exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
-        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` with ``axes=3`` states whether its
-        values are labels and along which axes it is periodic. Otherwise this is measured.
+        Example volume, of any real dtype and number of channels, at least 16 voxels a side. A `texrs.Exemplar` with
+        ``axes=3`` states whether its values are labels and along which axes it is periodic, which are otherwise
+        measured.
     size : int or (planes, rows, columns)
         Size of the result in voxels. One number is a cube.
     field : Field, str, array_like or path_like, optional
-        Frame field that rotates and scales the texture at each voxel (`texrs.fields`). It is a field or its words.
-        Directions (P, R, C, 3) or frames (P, R, C, 3, 3) over the output may be an array or a file. None leaves the
-        texture as it is.
+        Field that rotates and scales the texture at each voxel (`texrs.fields`). Python accepts a field or its words.
+        Python also accepts directions (P, R, C, 3) or frames (P, R, C, 3, 3) over the output, as an array or a file.
+        None leaves the texture as it is.
     seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     wrap : bool or (planes, rows, columns), optional
         Axes along which the result is periodic. Default: none.
     quality : {"preserve", "fast", "optimise"}
         Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
-        elements.
+        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
+        without elements. Default: "preserve".
     bend_patches : bool, optional
         If True, patches bend with the field, as courses and nets need. If False, they are rotated and scaled as a
-        whole, as separate elements need. By default chosen by whether the exemplar has separate elements.
+        whole, as separate elements need. Default: False if the exemplar has separate elements.
     method : {None, "paper", "paper-compensated"}
-        Algorithm. "paper": the literal one, for comparison. "paper-compensated": the same with the windows of Lefebvre
-        and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and look up
-        the nearest sample by default.
+        Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
+        Lefebvre and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and
+        look up the nearest sample by default. Default: the algorithm with departures from the paper.
     constraints : Constraints, optional
         Given voxels, by their values or by their source coordinates (`texrs.Constraints`).
     guide : Guide, optional
         A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
         (`texrs.Guide`).
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Interpolation between the exemplar's samples in the final look-up. None is "cubic". Labels always use the
-        nearest sample.
+        Interpolation between the exemplar's samples in the final look-up. Labels always use the nearest sample.
+        Default: "cubic".
     spacing : (plane, row, column) float, optional
         Voxel size along each axis of the exemplar and of the result, in any unit. The field rotates and scales the
         texture in space, not in voxels, and its places and lengths are in this unit. Default: the spacing that the
         exemplar's file states, else 1.
     memory_limit : int, optional
-        Maximum bytes of the work. By default the limits in force (`texrs.limits`).
+        Maximum memory of the work in bytes. Default: the limits in force (`texrs.limits`).
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
         the work. True shows a bar.
@@ -248,44 +249,44 @@ def synthesize(
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
-        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` states whether its values are labels and
-        along which axes it is periodic. Otherwise this is measured.
+        Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
+        whether its values are labels and along which axes it is periodic, which are otherwise measured.
     size : int or (int, int)
         Size of the result in pixels. One number is a square.
     field : Field, str, array_like or path_like, optional
-        Frame field that rotates and scales the texture at each pixel (`texrs.fields`). It is a field or its words.
-        Directions (R, C, 2) or frames (R, C, 2, 2) over the output may be an array or a file. None leaves the texture
-        as it is.
+        Field that rotates and scales the texture at each pixel (`texrs.fields`). Python accepts a field or its words.
+        Python also accepts directions (R, C, 2) or frames (R, C, 2, 2) over the output, as an array or a file. None
+        leaves the texture as it is.
     seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     wrap : bool or (rows, columns), optional
         Axes along which the result is periodic. Default: none.
     quality : {"preserve", "fast", "optimise"}
         Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
-        elements.
+        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
+        without elements. Default: "preserve".
     bend_patches : bool, optional
         If True, patches bend with the field, as courses and nets need. If False, they are rotated and scaled as a
-        whole, as separate elements need. By default chosen by whether the exemplar has separate elements.
+        whole, as separate elements need. Default: False if the exemplar has separate elements.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
-        Method of stitching. "large": patches a quarter larger than the default, which tear fewer elements and copy
-        more in one piece. "unmasked": seams may cross elements. "auto": each method is tried twice at the exemplar's
-        size and evaluated (`texrs.metrics`). A clearly better one replaces the default. The report key "candidates"
-        contains the figures of each.
+        Method of stitching. "large": patches a quarter larger than the default, which tear fewer elements but copy
+        larger parts. "unmasked": seams may cross elements. "unmasked-large": both. "auto": each method is tried twice
+        at the exemplar's size and evaluated (`texrs.metrics`). A clearly better one replaces the default. The report
+        key "candidates" contains the figures of each. Default: "default".
     method : {None, "paper", "paper-compensated"}
-        Algorithm. "paper": the literal one, for comparison. "paper-compensated": the same with the windows of Lefebvre
-        and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and look up
-        the nearest sample by default.
+        Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
+        Lefebvre and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and
+        look up the nearest sample by default. Default: the algorithm with departures from the paper.
     constraints : Constraints, optional
         Given pixels, by their values or by their source coordinates (`texrs.Constraints`).
     guide : Guide, optional
         A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
         (`texrs.Guide`).
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Interpolation between the exemplar's samples in the final look-up. None is "cubic". Labels always use the
-        nearest sample.
+        Interpolation between the exemplar's samples in the final look-up. Labels always use the nearest sample.
+        Default: "cubic".
     memory_limit : int, optional
-        Maximum bytes of the work. By default the limits in force (`texrs.limits`).
+        Maximum memory of the work in bytes. Default: the limits in force (`texrs.limits`).
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
         the work. True shows a bar.
@@ -308,8 +309,7 @@ def synthesize(
 
     See Also
     --------
-    solid : The same in three dimensions.
-    texrs.PlaneTexture : Any window of an unbounded picture.
+    solid : The same in three dimensions. texrs.PlaneTexture : Any window of an unbounded image.
 
     References
     ----------

@@ -31,8 +31,8 @@ class PlaneTexture(Texture):
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar or Material
-        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` states whether its values are labels and
-        along which axes it is periodic. Otherwise this is measured.
+        Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
+        whether its values are labels and along which axes it is periodic, which are otherwise measured.
     field : Field, str, array_like or path_like, optional
         Frame field with two axes: rotation and scale of the texture at each point of the world (`texrs.fields`). A
         centre or length that is not given takes the default of the unbounded field. None leaves the texture as it is.
@@ -40,8 +40,8 @@ class PlaneTexture(Texture):
         Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     quality : {"preserve", "fast", "optimise"}
         Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
-        elements. The three give different textures.
+        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
+        without elements. The three give different textures. Default: "preserve".
     interpolation : {"nearest", "linear", "cubic"}, optional
         Interpolation between the exemplar's samples. None is "cubic", or "nearest" for an exemplar of few colours, so
         that no colours are added. Labels always use the nearest sample.
@@ -51,7 +51,7 @@ class PlaneTexture(Texture):
     cache_bytes : int
         Memory for finished parts in bytes, 0 or more. Neighbours of computed parts are then cheap.
     memory_limit : int, optional
-        Maximum bytes of one window. By default the limits in force (`texrs.limits`).
+        Maximum memory of one window in bytes. Default: the limits in force (`texrs.limits`).
 
     Raises
     ------
@@ -83,8 +83,9 @@ class SolidTexture(Texture):
     Parameters
     ----------
     exemplar : (D, H, W) or (D, H, W, C) array, Exemplar or Material
-        Any real dtype and channels; each side at least 16. A `texrs.Exemplar` with ``axes=3`` states whether its
-        values are labels and along which axes it is periodic. Otherwise this is measured.
+        Example volume, of any real dtype and number of channels, at least 16 voxels a side. A `texrs.Exemplar` with
+        ``axes=3`` states whether its values are labels and along which axes it is periodic, which are otherwise
+        measured.
     field : Field, str, array_like or path_like, optional
         Frame field with three axes: rotation and scale of the texture at each point of the world (`texrs.fields`). A
         centre or length that is not given takes the default of the unbounded field. None leaves the texture as it is.
@@ -92,10 +93,10 @@ class SolidTexture(Texture):
         Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
     quality : {"preserve", "fast", "optimise"}
         Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many places for each patch. "fast" corrects blocks point by point, for textures without
-        elements. The three give different textures.
+        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
+        without elements. The three give different textures. Default: "preserve".
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Interpolation between the exemplar's samples. None is "cubic". Labels always use the nearest sample.
+        Interpolation between the exemplar's samples. Labels always use the nearest sample. Default: "cubic".
     spacing : (plane, row, column) float, optional
         Voxel size along each axis, in any unit. The field rotates in space, where voxels need not be cubes. Its places
         and lengths are in the same unit. Windows and points stay in voxels. Default: the spacing that
@@ -103,7 +104,7 @@ class SolidTexture(Texture):
     cache_bytes : int
         Memory for finished parts in bytes, 0 or more. Neighbours of computed parts are then cheap.
     memory_limit : int, optional
-        Maximum bytes of one window. By default the limits in force (`texrs.limits`).
+        Maximum memory of one window in bytes. Default: the limits in force (`texrs.limits`).
 
     Raises
     ------

@@ -146,45 +146,45 @@ def splice(
     Parameters
     ----------
     elements : ElementAnalysis, or (H, W) or (H, W, C) array
-        The texture whose elements are used. An image is analysed by `texrs.elements.analyse`.
+        Texture whose elements are used. An image is first analysed by `texrs.elements.analyse`.
     layout : ElementAnalysis, or array
-        The texture whose layout the elements take, or a drawn layout (`texrs.layouts`).
+        Texture whose layout the elements take, or a drawn layout (`texrs.layouts`).
     size : int or (rows, columns), optional
         Size of the result, in pixels. Default: the size of ``elements``.
     seed : int
-        Number that selects the pixels that fill holes, and the noise of the refinement. Default: 0.
+        Seed of the patches that fill holes, and of the noise of the refinement, 0 to 2^64 - 1. Default: 0.
     method : {None, "paper", "preview"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
-        triangles between the moved elements; elements are not kept rigid and holes are not filled. Default: the
-        algorithm with departures from the paper.
+        triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
+        with departures from the paper.
     strength : float
-        Share of the way that elements move from their own layout, 0, to the other layout, 1. Separate elements at the
-        texture's own size give the texture itself with 0. Default: 1.
+        Distance that elements move, as a share from 0 (their own layout) to 1 (the other layout). Separate elements at
+        the texture's own size give the texture itself with 0. Default: 1.
     layout_scale : float, optional
-        Scale of the layout, 0.01 to 100. With 1 a pixel of the layout is a pixel of the result, and the centres of
-        both coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense are
-        pushed apart. By default the layout is scaled to the spacing or the size of the elements of ``elements``.
+        Scale of the layout, 0.01 to 100. If it is 1, a pixel of the layout is a pixel of the result, and the centres
+        of both coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense are
+        pushed apart. Default: the scale that fits the spacing or the size of the elements of ``elements``.
     align : bool, optional
-        If True, the layout is turned so that lines of its points agree with those of ``elements``. Cells and nets
-        ignore this. By default True without ``layout_scale``.
+        If True, the layout is rotated so that lines of its points agree with those of ``elements``. Cells and nets
+        ignore this. Default: True without ``layout_scale``.
     snap_rows : bool
-        If True, targets near one row are moved to one row. Use it for walls that are bent, whose long joints then stay
+        If True, targets near one row are moved to this row. Use it for curved walls, whose long joints then become
         straight. Default: False.
     use_cells : bool, optional
-        If True, a connected texture is composed of its cells; if False, its figure is bent. By default True if cells
-        are found.
+        If True, a connected texture is composed of its cells. If False, its figure is bent. Default: True if cells are
+        found.
     use_nets : bool, optional
         If True, a connected texture is composed of its knots and the lines between them, also if it has cells. If
-        False, its figure is bent. By default True without cells, if ``use_cells`` is not given and a reliable layout
-        has six knots or more.
+        False, its figure is bent. Default: True without cells, if ``use_cells`` is not given and a reliable layout has
+        six knots or more.
     allow_rotation : bool, optional
-        If True, cells may be turned. By default True, unless light or letters show which side of ``elements`` is up.
+        If True, cells may be rotated. Default: True, unless light or letters show which side of ``elements`` is up.
     refine : bool
-        If True, pixels that are not rigid are refined, or stretched pixels of cells. Nets, and backgrounds between
-        separate elements, do not need it. Default: True.
+        If True, pixels of elements that are not rigid, or stretched pixels of cells, are refined. Nets, and
+        backgrounds between separate elements, do not need it. Default: True.
     screening : float, optional
-        Weight that keeps the values when colours are corrected where elements and background meet, 0 to 1e6, see
-        `texrs.blend`. It applies to separate elements on their background; other results are not corrected. If one
+        Weight of the original values when colours are corrected where elements and background meet, 0 to 1e6, see
+        `texrs.blend`. It applies to separate elements on their background. Other results are not corrected. If one
         side of the texture is lit, so is the result, and elements do not keep the light of their old places. None or
         0: colours are not corrected, and the image is the texture at the coordinates of the source map. Default: 0.01.
     progress : callable or True, optional
@@ -372,12 +372,12 @@ def self_splice(
     Parameters
     ----------
     elements : ElementAnalysis, or (H, W) or (H, W, C) array
-        The texture. An image is analysed by `texrs.elements.analyse`.
+        Texture to edit. An image is first analysed by `texrs.elements.analyse`.
     edit : str, mapping, or sequence of mappings, optional
-        Steps of the edit in order: scale, shift, rows, randomise, regularise, move, remove or points. They are plain
-        JSON types. ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` scales the layout, not the elements. ``{"op":
-        "shift", "by": [4, 0]}`` moves all elements. ``{"op": "rows", "by": 6}`` moves every other row to the right,
-        and the rows between to the left. ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` adds Gaussian
+        Steps of the edit in order: scale, shift, rows, randomise, regularise, move, remove or points. Python accepts
+        plain JSON types. ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` scales the layout, not the elements.
+        ``{"op": "shift", "by": [4, 0]}`` moves all elements. ``{"op": "rows", "by": 6}`` moves every other row to the
+        right, and the rows between to the left. ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` adds Gaussian
         displacements. Their amount is in spacings, and the least distance is a share of the usual least distance.
         ``{"op": "regularise", "amount": 1}`` moves elements to the best lattice. ``{"op": "move", "element": 3, "by":
         [0, 8]}`` moves one element; ``"to"`` gives its new place instead. ``{"op": "remove", "element": 3}`` removes
@@ -389,18 +389,18 @@ def self_splice(
         elements as the report's "elements" lists them, with their places before the steps. Default: the size of
         ``elements``.
     seed : int
-        Number that selects random steps, elements that enter over a border, pixels that fill holes, and the noise of
-        the refinement. Default: 0.
+        Seed of random steps, of elements that enter over a border, of patches that fill holes, and of the noise of the
+        refinement. Default: 0.
     method : {None, "paper", "preview"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
-        triangles between the moved elements; elements are not kept rigid and holes are not filled. Default: the
-        algorithm with departures from the paper.
+        triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
+        with departures from the paper.
     refine : bool
-        If True, deformed pixels are refined: those of connected figures, and of separate elements that show too little
-        of their background. Default: True.
+        If True, deformed pixels are refined: pixels of connected figures, and of separate elements that show too
+        little of their background. Default: True.
     screening : float, optional
-        Weight that keeps the values when changed colours are corrected where elements and background meet, 0 to 1e6,
-        as in `splice`. It applies to separate elements on their background; other results keep their values. None or
+        Weight of the original values when changed colours are corrected where elements and background meet, 0 to 1e6,
+        as in `splice`. It applies to separate elements on their background. Other results keep their values. None or
         0: colours are not corrected. Default: 0.01.
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
