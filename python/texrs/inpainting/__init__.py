@@ -70,16 +70,17 @@ def inpaint(
     Parameters
     ----------
     image : (H, W[, C]) or (D, H, W[, C]) array, or Exemplar
-        The picture or the volume, any real dtype, at least 4 pixels or 16 voxels a side. Values in the hole are ignored and
-        may be NaN. A volume takes ``patch_size``, ``boundary_width``, ``screening`` and ``seed``; the other options
-        are for pictures.
+        An image or a volume of any real dtype, at least 4 pixels or 16 voxels a side. Values in the hole are ignored
+        and may be NaN. For a volume, only ``patch_size``, ``boundary_width``, ``screening`` and ``seed`` are allowed;
+        the other options are for images.
     mask : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
-        Mask of the pixels to fill, white where it marks. "alpha": all pixels that are not fully opaque. "nan": all pixels
-        that are NaN or infinite. "nodata": the value that the file of the image states for pixels without data. A number:
-        all pixels of this value. Default: all pixels that are masked, NaN or infinite. See `texrs.Mask` for how a mask is
-        read, inverted, grown and feathered. A mask of three axes means a volume.
+        Mask of the pixels to fill, white where pixels are marked. "alpha": all pixels that are not fully opaque.
+        "nan": all pixels that are NaN or infinite. "nodata": the value that the file of the image states for pixels
+        without data. A number: all pixels of this value. Default: all pixels that are masked, NaN or infinite.
+        `texrs.Mask` describes how a mask is read, inverted, grown and feathered. A mask with three axes means a
+        volume.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
-        Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
+        Another image to copy from, of the same dtype and channels. Default: the known pixels of ``image``.
     allowed : (H, W) array, path or Mask, optional
         Mask of the pixels that patches may be copied from, such as the floor without the sky above it. Default: all known
         pixels. It cannot be combined with ``exemplar`` or with "optimise".
@@ -91,8 +92,8 @@ def inpaint(
         Size of the elements in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in an image taken from
         the front. Measured maps have a geometric mean of 1.
     scale_kind : {"width", "area"}, optional
-        What the maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope;
-        "area", square roots of areas. None: what each fits best, as a map of a plane.
+        Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
+        "area", square roots of areas. None: the quantity that fits each map best, as a map of a plane.
     method : {"patch", "optimise"}
         "patch": patches that match the surroundings, joined along cuts [1]_. If the scale map is that of a plane, patches
         of the plane are projected into the hole, except with an ``exemplar``. "optimise": windows are corrected until each
@@ -118,12 +119,12 @@ def inpaint(
         None is 0.1, and 0 for labels (integers with at most 16 values), which are never mixed. The correction of a volume is
         not in its source map: other volumes that are rendered through the map have no correction.
     wrap : bool or (rows, columns), optional
-        Axes along which the picture is cyclic, so that a hole at its border is also filled from across; None: neither.
+        Axes along which the image is periodic, so that a hole at its border is also filled from the opposite side.
+        None: neither axis.
     seed : int
-        Chooses patches where nothing is known around.
+        Seed of the random choices of patches that have no known pixels around them. Default: 0.
     progress : callable or True, optional
-        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
-        True shows a bar.
+        Function that is called as ``progress(stage, share)``. If it raises, the work stops. True shows a bar.
 
     Returns
     -------
@@ -144,7 +145,7 @@ def inpaint(
         - ``seed``: The seed.
         - ``filled``: Share of the image that was filled, 0 to 1.
         - ``scaled``: Whether scale maps were used.
-        - ``measured``: What a ``scale_map`` "auto" found, as `texrs.planes.ScaleEstimate`; else None.
+        - ``measured``: The result of a ``scale_map`` "auto", as `texrs.planes.ScaleEstimate`; else None.
         - ``exemplar_measured``: The same for the exemplar.
         - ``replaced_outside``: Number of known pixels that changed.
         - ``patch_size``: Side of the patches, in pixels.
@@ -163,8 +164,9 @@ def inpaint(
     Raises
     ------
     InvalidInput
-        A hole or ``allowed`` of another shape. A hole that marks nothing. An exemplar of another dtype or other channels.
-        Nothing to copy from. A patch that is larger than the images or the space outside the hole, or given to "optimise".
+        If the hole or ``allowed`` has another shape, the hole marks nothing, the exemplar has another dtype or other
+        channels, no pixels can be copied, a patch is larger than the images or the space outside the hole, or a patch
+        size is given for "optimise".
 
     Notes
     -----
@@ -272,7 +274,7 @@ def inpaint(
         )
     places, count = made.source, made.count
     new = _find_places(places.label)
-    # What is kept maps to itself; of patches every coordinate is whole, but where they are seen in depth.
+    # Kept pixels map to themselves. Coordinates of patches are integers, except on oblique planes.
     result = pictures[0].copy()
     if not made.whole:
         result[new] = places.render(pictures, interpolation="cubic")[new]
@@ -331,7 +333,7 @@ def _check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
 def _recover_scales(
     pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object, scale_kind: Kind | None
 ) -> tuple[list[Floats] | None, list[ScaleEstimate | None]]:
-    """Return the scale maps of the picture and of the one to copy from, if scales count, and how each was measured."""
+    """Return the scale maps of the image and of the image to copy from, if they are used, and how each was measured."""
     scale, measured = recover_scale(pictures[0], open_, own, scale_kind=scale_kind)
     if scale is None or len(pictures) == 1:
         return None if scale is None else [scale], [measured, None]
@@ -341,8 +343,8 @@ def _recover_scales(
 
 
 def _check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | None) -> list[Array]:
-    """Return the picture with its marked pixels painted over, and the one to copy from if there is one."""
-    # Values in the hole must not matter, not even for the range of the values.
+    """Return the image with its marked pixels painted over, and the image to copy from if there is one."""
+    # Values in the hole must not have an effect, not even on the range of the values.
     array = array.copy()
     first = np.unravel_index(mask.argmin(), mask.shape)
     array[mask] = array[first] if not mask[first] else 0
@@ -364,5 +366,5 @@ def _check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | 
 
 
 def _find_places(marked: Array) -> tuple[NDArray[np.intp], ...]:
-    """Return the places of what is not zero, as `np.nonzero`, which looks at each axis apart, in a tenth of its time."""
+    """Return the indices of the values that are not zero, as `np.nonzero`, in 10 % of its time."""
     return np.unravel_index(np.flatnonzero(marked), marked.shape)

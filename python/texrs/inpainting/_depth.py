@@ -1,4 +1,4 @@
-"""Holes filled in depth: with patches of the plane that a picture shows, each seen as it is seen in the hole.
+"""Fill holes on oblique planes: patches of the plane are projected into the hole.
 
 W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008. The scale is recovered from
 the known pixels and continued into the hole. The hole is then synthesised with the known pixels as the exemplar.
@@ -23,15 +23,15 @@ from texrs.source_map import SourceMap
 __all__ = ["fill_in_depth", "see_plane"]
 
 SIDE = 0.6
-"""Side of the patches, as a share of what a whole picture is grown of: holes are small."""
+"""Side of the patches relative to the side for a whole image, because holes are small."""
 TAPS = 5
-"""Samples that one between them is interpolated from, and one more: all must be known."""
+"""Number of samples that an interpolated sample uses, and one more. All of them must be known."""
 AROUND = 2.0
-"""Known pixels around a hole that patches are to fit, in sides of the largest."""
+"""Width of the known band around a hole that patches must fit, in sides of the largest patch."""
 
 
 def see_plane(picture: Array, open_: Bools, scale: Floats) -> Slope | None:
-    """Return the plane whose scale map that of a picture with holes is, if it is one's."""
+    """Return the plane whose scale map equals that of an image with holes, if such a plane exists."""
     return find_plane(guidance(as_image(paint_over(picture, open_))), np.ascontiguousarray(scale), find_kind(scale))
 
 
@@ -48,37 +48,37 @@ def fill_in_depth(
     seed: int,
     progress: Progress | None,
 ) -> tuple[SourceMap, float, int] | None:
-    """Return the source map of a picture whose hole is filled, the side of the patches, and how many there are.
+    """Fill a hole in depth. Return the source map, the side of the patches and their number.
 
     Parameters
     ----------
     picture : (H, W) or (H, W, C) array
-        What it holds in the hole does not matter.
+        Image. Its values in the hole have no effect.
     open_, wide : (H, W) bool
-        The hole, and what may be replaced.
+        Mask of the hole, and mask of the pixels that may be replaced.
     far : (H, W) bool, optional
         Pixels that may be replaced if elements are separate.
     plane : texrs.scale_maps._slope.Slope
-        The plane that it shows.
+        Plane that the image shows.
     usable : (H, W) bool
-        What may be copied.
+        Mask of the pixels that may be copied.
     side : int, optional
         Side of the patches in pixels.
     wrap : (bool, bool)
-        Axes along which the picture is cyclic.
+        Axes along which the image is periodic.
     seed : int
-        Chooses patches where nothing is known around.
+        Seed of the random choices of patches that have no known pixels around them.
     progress : callable, optional
-        Called with the stage and the share of it that is done.
+        Function that is called with the stage and its finished share.
 
     Returns
     -------
     tuple or None
-        None where too little of the plane is known.
+        None if too little of the plane is known.
     """
     from scipy import ndimage
 
-    # Values that are interpolated from pixels of the hole are not known.
+    # Values that are interpolated from pixels of the hole are unknown.
     whole: Bools = ndimage.minimum_filter(usable, TAPS, mode="nearest")
     if not whole.any():
         return None

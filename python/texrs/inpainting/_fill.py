@@ -1,4 +1,4 @@
-"""One hole filled: in depth where a plane is seen, else with patches as they lie."""
+"""Fill one hole: in depth if a plane is visible, else with patches of the image as it is."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from texrs.source_map import SourceMap
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filling:
-    """A picture whose hole is filled, and by what."""
+    """An image whose hole is filled, and facts about the filling."""
 
     source: SourceMap
     side: float
@@ -23,9 +23,9 @@ class Filling:
     count: int
     """Number of patches."""
     tried: list[tuple[int, float]]
-    """Sides that were tried, and the visibility of the seams of each."""
+    """Sides that were tried, each with the visibility of the seams."""
     whole: bool
-    """Whether every coordinate is that of a pixel."""
+    """If True, all coordinates are integers."""
 
 
 def fill(
@@ -48,27 +48,27 @@ def fill(
     Parameters
     ----------
     pictures : sequence of array
-        The picture, and another one to copy from if there is one.
+        Image, and another image to copy from if there is one.
     open_, wide : (H, W) bool
-        The hole, and what may be replaced.
+        Mask of the hole, and mask of the pixels that may be replaced.
     far : (H, W) bool, optional
         Pixels that may be replaced on a plane with separate elements. Elements that the hole cuts are not copied.
     usable : (H, W) bool
-        What may be copied.
+        Mask of the pixels that may be copied.
     plane : Plane, optional
-        The plane that is copied from, and filled in.
+        Plane that patches are copied from and pasted into.
     scales : sequence of (H, W) float32, optional
-        Size of the elements, if no plane is known, or too little of it.
+        Size of the elements, if no plane is known or too little of it is visible.
     patch : int, optional
         Side of the patches, in pixels.
     mirrors : sequence of Flip
-        Mirror images that patches are copied from; not of a plane.
+        Mirror images that patches are copied from. Planes are not mirrored.
     wrap : (bool, bool)
-        Axes along which the picture is cyclic.
+        Axes along which the image is periodic.
     seed : int
-        Chooses patches where nothing is known around.
+        Seed of the random choices of patches that have no known pixels around them.
     progress : callable, optional
-        Called with the stage and the share of it that is done.
+        Function that is called with the stage and its finished share.
 
     """
     if plane is not None:

@@ -1,4 +1,4 @@
-"""Holes: which pixels are to be filled, and what is around them."""
+"""Find the pixels to fill, and their surroundings."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from texrs.io import _origins, read_metadata
 
 
 def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) -> tuple[Array, Bools]:
-    """Return an image and which of its pixels are to be filled.
+    """Return an image and the mask of its pixels to fill.
 
     Parameters
     ----------
     image : array_like, path_like or numpy.ma.MaskedArray
-        Masked values are a hole too.
+        Image. Its masked values are also a hole.
     mask : Mask
-        Its marks are a mask, "alpha", "nan", "nodata", a number, or None: all pixels without a value.
+        Mask, whose marks are an array, "alpha", "nan", "nodata", a number, or None for all pixels without a value.
     wrap : sequence of bool
-        Axes along which the image is cyclic.
+        Axes along which the image is periodic.
     axes : int
         Number of axes of the image without channels.
 
@@ -54,7 +54,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
 
 
 def check_material(given: dict[str, Any]) -> None:
-    """Refuse a hole that is found in the values of one image, where there are several maps."""
+    """Refuse a hole that is defined by the values of one image if there are several maps."""
     marks = as_marks(given.get("mask")).marks
     if _is_alpha(marks) or _is_value(marks):
         raise InvalidInput("mask: must be a mask, because the image is a material, whose maps have it in common")
@@ -65,14 +65,14 @@ def _is_alpha(marks: object) -> bool:
 
 
 def _is_value(marks: object) -> bool:
-    """Return whether marks are values of the image: "nan", "nodata", a number, or None for pixels without a value."""
+    """Return whether marks refer to values of the image: "nan", "nodata", a number, or None for pixels without a value."""
     if isinstance(marks, str):
         return marks in ("nan", "nodata")
     return marks is None or (isinstance(marks, numbers.Real) and not isinstance(marks, bool))
 
 
 def take_masked(image: object, axes: int = 2) -> tuple[Array, Bools | None]:
-    """Return an image, and where any of its channels is masked; None if nothing is."""
+    """Return an image, and the mask of the pixels with a masked channel; None if nothing is masked."""
     if not isinstance(image, np.ma.MaskedArray) or not np.ma.is_masked(image):
         return as_ndarray(image, "image", axes=axes, used=False), None
     masked = np.ma.getmaskarray(image)
@@ -80,7 +80,7 @@ def take_masked(image: object, axes: int = 2) -> tuple[Array, Bools | None]:
 
 
 def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bools:
-    """Return which pixels are not fully opaque, or are as transparent as a threshold says."""
+    """Return the mask of the pixels that are not fully opaque, or whose alpha is below a threshold."""
     if pixels.ndim != axes + 1 or pixels.shape[-1] not in (2, 4):
         raise InvalidInput(
             f"mask: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
@@ -100,7 +100,7 @@ def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bool
 
 
 def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | None, axes: int) -> Bools:
-    """Return which pixels have no value: those that are NaN or infinite in any channel, or nodata in all channels."""
+    """Return the mask of pixels without a value: NaN or infinite in any channel, or nodata in all channels."""
     bad = ~np.isfinite(pixels) if pixels.dtype.kind == "f" else np.zeros(pixels.shape, np.bool_)
     missing = np.asarray(bad.any(axis=-1) if pixels.ndim > axes else bad, np.bool_)
     path, stated = _find_nodata(image) if marks in (None, "nodata") else ("", None)
@@ -144,7 +144,7 @@ def _find_nodata(image: object) -> tuple[str, float | None]:
 
 
 def look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> Region:
-    """Return the part of a picture that a filling looks at: all of an axis that wraps."""
+    """Return the part of an image that a filling needs. It includes the whole length of periodic axes."""
     origin, shape, whole = [], [], []
     for axis, closed in enumerate(wrap):
         n = open_.shape[axis]
@@ -160,7 +160,7 @@ def look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -
 
 
 def paint_over(picture: Array, open_: Bools) -> Array:
-    """Paint over holes with the nearest known colours, which is what windows at their boundary see."""
+    """Paint over holes with the nearest known colours, which the windows at their boundary then contain."""
     from scipy.ndimage import distance_transform_edt
 
     if not open_.any():

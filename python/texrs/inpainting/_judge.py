@@ -11,34 +11,34 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats
 
 STRONG = 1.4
-"""Power of a difference: a few large ones show more than many small ones of the same sum."""
+"""Power of a difference. A few large differences are more visible than many small ones with the same sum."""
 
 Places = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filled:
-    """A picture that was filled, and where its pixels come from."""
+    """A filled image, and the source of its pixels."""
 
     colours: Floats
-    """(H, W, C)"""
+    """Colours, (H, W, C)."""
     label: NDArray[np.integer[Any]]
-    """(H, W): the patch of each pixel, 0 where the picture was kept."""
+    """Patch of each pixel, (H, W); 0 for kept pixels."""
     coordinates: Floats
-    """(H, W, 2): place in what is copied from, of pixels of patches."""
+    """Source coordinates of the pixels of patches, (H, W, 2)."""
     frames: Floats
-    """(patches + 1, 2, 2): Jacobian of each patch."""
+    """Jacobian of each patch, (patches + 1, 2, 2)."""
 
 
 def judge_seams(filled: Filled, source: Floats, free: Bools, wrap: tuple[bool, bool]) -> float:
-    """Return how far what patches would show beyond their seams is from what is shown there, over all seams.
+    """Return the total visibility of all seams.
 
     Parameters
     ----------
     filled : Filled
-        The picture.
+        Filled image.
     source : (h, w, C) float32
-        What was copied from.
+        Image that the patches were copied from.
     free : (h, w) bool
         What is known of it.
     wrap : (bool, bool)
@@ -70,7 +70,7 @@ def _look_beyond(
 ) -> tuple[Floats, Bools]:
     """Return what the patch of each place shows a step on, and whether that is known."""
     label = filled.label[place]
-    # By a sum of two products, which is the same on all processors.
+    # Use a sum of two products, which gives the same result on all processors.
     down, right = np.moveaxis(filled.frames[label] * way.astype(np.float32), -1, 0)
     at = filled.coordinates[place] + (down + right)
     row, column = np.rint(at).astype(np.intp).T

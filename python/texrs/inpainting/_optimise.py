@@ -1,4 +1,4 @@
-"""Holes filled by optimisation: windows that fit what is around them, with elements of the size that belongs there.
+"""Fill holes by optimisation: windows that fit the surroundings, with elements of the right size.
 
 W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008. The scale is recovered from
 the known pixels and continued into the hole. The hole is then synthesised with the known pixels as the exemplar.
@@ -29,19 +29,19 @@ SETTINGS = replace(
 )
 """Features that continue across a hole are more important than rare ones, and copies of the surroundings are allowed."""
 LEAST = 16
-"""Least side of a picture."""
+"""Smallest side of an image."""
 AROUND = 12
-"""Points of the coarsest level around a hole that are looked at with it."""
+"""Width of the band around a hole that is processed with it, in points of the coarsest level."""
 SIZES = (1.0, 0.8, 1.25)
-"""Sizes of the copies that are copied from where scales count; more where what is wanted lies beyond them."""
+"""Sizes of the copies of the image if there is a scale map. More copies are added if other sizes are requested."""
 NOWHERE = 1e6
-"""Scale of what is not to be copied: none that is ever wanted."""
+"""Scale of pixels that must not be copied, which is never requested."""
 
 
 def recover_scale(
     picture: Array, open_: Bools, given: object, name: str = "scale_map", scale_kind: Kind | None = None
 ) -> tuple[Floats | None, ScaleEstimate | None]:
-    """Return the scale map of a picture with holes: given, and continued into them, or measured, and how that was."""
+    """Return the scale map of an image with holes, given or measured and continued into them, and how it was measured."""
     if given is None:
         return None, None
     known = ~open_
@@ -54,7 +54,7 @@ def recover_scale(
         return found.scale, found
     scale, holds = try_array(given), find_kind(given) or scale_kind
     if scale.shape == open_.shape and scale.dtype.kind == "f":
-        # Where there is a hole, a map may have one too.
+        # A map may also have a hole where the image has one.
         with np.errstate(invalid="ignore"):
             bad = open_ & ~(np.isfinite(scale) & (scale > 0))
         if bad.any() and not bad.all():
@@ -72,16 +72,16 @@ def optimise(
     seed: int,
     progress: Progress | None,
 ) -> tuple[SourceMap, list[dict[str, object]]]:
-    """Return the source map of a picture whose holes are filled, from itself or from a second one, and what each level did.
+    """Fill holes from the image or from another one. Return the source map and a report of each level.
 
-    ``wide`` is what may be replaced: the holes and a boundary around them.
+    The mask ``wide`` marks the pixels that may be replaced: the holes and a boundary around them.
     """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     for name, shape in zip(("image", "exemplar"), shapes, strict=False):
         if min(shape) < LEAST:
             raise InvalidInput(f"{name}: must have at least {LEAST} pixels a side for method 'optimise', got {shape}")
     levels = min(count_levels(shape, SETTINGS.coarsest) for shape in shapes)
-    # Windows may not leave a copy, but those of known pixels at the border do.
+    # Windows must not extend beyond a copy, except those of known pixels at the border.
     margin = RADIUS << (levels - 1)
     atlas = _make_atlas(pictures, open_, scales, wide, levels, margin)
     region = look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
@@ -112,7 +112,7 @@ def optimise(
 def _make_atlas(
     pictures: list[Array], open_: Bools, scales: list[Floats] | None, wide: Bools, levels: int, margin: int
 ) -> Atlas:
-    """Return what is copied from: what is known of the picture, or the exemplar, in the sizes that are of use."""
+    """Return the atlas that is copied from: the known pixels or the exemplar, in the useful sizes."""
     ground, free, scale = _lay_out(pictures, open_, scales, margin)
     sizes: tuple[float, ...] = (1.0,)
     wanted: tuple[float, float] | None = None
@@ -134,9 +134,9 @@ def _make_atlas(
 def _lay_out(
     pictures: list[Array], open_: Bools, scales: list[Floats] | None, margin: int
 ) -> tuple[Array, Bools, Floats | None]:
-    """Return the picture, with an exemplar below it, what of them may be copied, and their scales.
+    """Return the image with an exemplar below it, the mask of the pixels that may be copied, and their scales.
 
-    Beside an exemplar the picture is there for what is around the hole to look like, and nothing is copied from it.
+    If there is an exemplar, the image is only used to match the surroundings of the hole, and is not copied.
     """
     wide = ((margin, margin), (margin, margin))
     image = np.pad(paint_over(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")

@@ -21,20 +21,20 @@ from texrs.inpainting._scene import Scene
 from texrs.source_map import SourceMap
 
 SCALED = np.float32(2.0)
-"""Weight of scales as colours that patches are compared by: elements larger by a half are as far off as black from white."""
+"""Weight of scales in the comparison of patches. Elements that are 50 % larger differ as much as black and white."""
 LEAST = 4
-"""Side of the smallest patch that still says anything of a texture."""
+"""Smallest side of a patch that still shows a part of a texture, in pixels."""
 PLACES = 64
-"""Places to copy from that a patch should have; where it has fewer, smaller patches are taken."""
+"""Minimum number of places that a patch can be copied from. With fewer places, smaller patches are used."""
 SIZES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 3.0, 4.0)
-"""Sides of patches that are tried, in usual ones."""
+"""Sides of patches that are tried, relative to the usual side."""
 FINE = (0.75, 1.0, 1.5)
-"""The same in usual ones of the full size, where a copy is filled."""
+"""The same, relative to the usual side at full size, if a reduced copy is filled."""
 STARTS = (1, 5)
 """Indices of the sides that are tried first, from the largest. The neighbours of the best side follow, until none is better.
 This takes half the time of all sides. Seams are 1 % more visible, measured in 75 holes of 22 images."""
 WIDEST = 0.3
-"""The largest of them is at most this share of the shorter side."""
+"""Maximum side, as a share of the shorter side of the image."""
 CLEARLY = 0.97
 """Smaller patches are used if the visibility of their seams is below this share of that of larger patches."""
 WITHIN = 1.3
@@ -42,15 +42,18 @@ WITHIN = 1.3
 MANY = 256
 """Maximum number of patches that fill the holes. Smaller patches are not tried."""
 COVERS = 0.4
-"""Share of a patch that fills a hole."""
+"""Share of the area of a patch that fills the hole, on average."""
 MARGIN = 256
-"""Pixels around the holes that patches are copied from."""
+"""Width of the band around the holes that patches are copied from, in pixels."""
 PLENTY = 2
-"""Known pixels there, in pixels of the holes; where they are fewer, all of the picture is copied from."""
+"""Minimum number of known pixels in this band, relative to the pixels of the holes.
+
+With fewer pixels, the whole image is used.
+"""
 LARGE = 160**2
-"""For holes of more pixels, sizes are tried in a copy of half the size, or less."""
+"""Area in pixels above which sizes are tried in a copy of half the size or less."""
 SMALLEST = 64
-"""A side of the smallest picture that is halved."""
+"""Smallest side of an image that is halved, in pixels."""
 
 
 def fill_with_patches(
@@ -76,7 +79,7 @@ def fill_with_patches(
     int
         The side of the patches.
     list of (int, float)
-        The sides that were tried, and what the seams of each show.
+        The sides that were tried, each with the visibility of its seams.
 
     """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
@@ -94,7 +97,7 @@ def fill_with_patches(
         check_places(free, chosen)
         side = chosen
     elif scales is not None:
-        # Where scales differ, those within a large patch do too.
+        # If scales differ across the image, they also differ within a large patch, so smaller patches are used.
         side = list_sides(scene, choose_usual_side(min(free.shape)), (1.0,))[0]
     else:
         side, tried, made = try_sides(scene, mirrors, seed, lambda share: watch("inpaint", 0.5 * share))
@@ -118,7 +121,7 @@ def choose_mirrors(pictures: Sequence[Array], open_: Bools, mirror: bool | None)
     rows, columns = (np.flatnonzero(open_.any(axis=1 - axis)) for axis in range(2))
     whole = pictures[0]
     beside = [whole[: rows[0]], whole[rows[-1] + 1 :], whole[:, : columns[0]], whole[:, columns[-1] + 1 :]]
-    # Use the largest strip next to the holes: a hole's outline would look like directional light.
+    # Use the largest strip next to the holes, because the outline of a hole would look like directional light.
     known = max(beside, key=lambda part: part.shape[0] * part.shape[1])
     return find_mirrors(guidance(as_image(known)), SUSPECT) if known.size else ALL
 
@@ -126,7 +129,7 @@ def choose_mirrors(pictures: Sequence[Array], open_: Bools, mirror: bool | None)
 def try_sides(
     scene: Scene, mirrors: Sequence[Flip], seed: int, watch: Callable[[float], object]
 ) -> tuple[int, list[tuple[int, float]], Filled | None]:
-    """Return the best side, all that were tried with what their seams show, and the filling if it was made at full size."""
+    """Return the best side, all tried sides with the visibility of their seams, and a full-size filling, if any."""
     small, times = scene, 1
     # Try sides in a reduced image if the holes are large, as long as it has enough places for patches.
     while small.holes > LARGE and min(*small.known.shape, *small.free.shape) >= SMALLEST:
@@ -168,7 +171,7 @@ def try_sides(
 
 
 def is_better(number: int, best: int, shown: Mapping[int, float]) -> bool:
-    """Return whether patches of a size are better than the best before, by what their seams show; the largest are first."""
+    """Return whether the seams of a size are less visible than those of the best larger one."""
     if number > best:
         return shown[number] < CLEARLY * shown[best]
     return CLEARLY * shown[number] <= min(shown.values())
@@ -177,7 +180,7 @@ def is_better(number: int, best: int, shown: Mapping[int, float]) -> bool:
 def choose_part(
     open_: Bools, keep: Bools, wrap: tuple[bool, bool], usable: Bools
 ) -> tuple[tuple[slice, slice], tuple[bool, bool]]:
-    """Return the part of a picture that is looked at, and which of its axes are cyclic: what is around its holes."""
+    """Return the part of an image around its holes, and its periodic axes."""
     parts, cyclic = [], []
     for axis, closed in enumerate(wrap):
         side = open_.shape[axis]
@@ -202,7 +205,7 @@ def map_untouched(shapes: tuple[tuple[int, ...], ...]) -> SourceMap:
 
 
 def guide_together(pictures: Sequence[Array]) -> list[Floats]:
-    """Return the colours that patches are compared by, brought to [0, 1] together."""
+    """Return the colours of both images that patches are compared by, scaled together to [0, 1]."""
     pixels = [as_image(p) for p in pictures]
     if len(pixels) == 1:
         return [guidance(pixels[0])]
@@ -216,7 +219,7 @@ def guide_together(pictures: Sequence[Array]) -> list[Floats]:
 
 
 def check_places(free: Bools, side: int) -> None:
-    """Refuse patches of a size that has no place."""
+    """Refuse a patch size without any place to copy from."""
     if not mark_corners(free, side).any():
         fits = next((s for s in range(side - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
         hint = f"the largest that does is {fits}" if fits else "no other size does; give an exemplar"
@@ -224,7 +227,7 @@ def check_places(free: Bools, side: int) -> None:
 
 
 def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:
-    """Return the sides of patches about the usual one that have places enough, the largest first."""
+    """Return the sides around the usual one that have enough places, the largest first."""
     free = scene.free
     largest = min(*scene.known.shape, *free.shape)
     most = min(largest, max(round(usual), round(min(WIDEST * min(free.shape), WITHIN * scene.holes**0.5))))

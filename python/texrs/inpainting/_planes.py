@@ -1,4 +1,4 @@
-"""Holes in pictures of several planes: each is filled in by itself, from what is seen of it, and as it is seen.
+"""Fill holes in images of several planes. Each plane is filled from its own visible pixels, in its own perspective.
 
 Parts outside the planes, such as the sky above a floor, continue behind the planes. Two planes that meet in a hole are both
 filled a little beyond their visible part, and cut at the line where they meet (`texrs.inpainting._sides`).
@@ -28,7 +28,10 @@ from texrs.scale_maps._slope import LEVEL, Slope
 from texrs.source_map import SourceMap
 
 LEAST = 0.05
-"""Nearer to the horizon than this share of the middle's scale nothing is seen of a plane."""
+"""Minimum scale of a visible point of a plane, relative to the scale in the middle.
+
+Smaller scales are near the horizon.
+"""
 FEWEST = 0.02
 """Least share of the image outside the planes. A smaller part does not continue behind them."""
 BESIDE = 0.5
@@ -38,25 +41,31 @@ MOSTLY = 0.8
 ALIKE = 0.15
 """Largest difference of the mean colours, 0 to 1, of regions of one part, such as the sky on both sides of a tower."""
 BAND, NARROWEST, WIDEST = 0.4, 16, 64
-"""By how much more of a plane is filled in than is shown, where it meets another: in roots of its area, and in pixels."""
+"""Width of the band by which a plane is filled beyond its visible part, where it meets another.
+
+In square roots of its area, with the minimum and the maximum in pixels.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """Something that a picture with holes shows, and that goes on in them."""
+    """A part of an image with holes that continues in them."""
 
     shown: Bools
-    """(H, W): where it is seen."""
+    """Mask of the visible pixels, (H, W)."""
     slope: Slope | None = None
-    """How it lies; None of what is seen from the front."""
+    """Orientation of the part. None: seen from the front."""
     reach: Bools | None = None
-    """(H, W): where it can be seen at all; None for everywhere."""
+    """Mask of the pixels that the part can reach, (H, W). None: all pixels."""
     large: Bools | None = None
     """(H, W): where enough of it is visible to continue behind other parts; None: everywhere that it is visible."""
 
     @classmethod
     def of(cls, shown: Bools, plane: Plane | None, origin: Sequence[int] = (0, 0)) -> Part:
-        """Return what a picture shows of a plane; it begins at a point (row, column) of the plane's own picture."""
+        """Return the part of an image that shows a plane.
+
+        The image begins at a point (row, column) of the plane's own image.
+        """
         if plane is None:
             return cls(shown)
         places = np.moveaxis(np.indices(shown.shape), 0, -1) + np.asarray(origin)
@@ -125,23 +134,23 @@ def add_rest(parts: Sequence[Part], hole: Bools, pixels: Array) -> list[Part]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mended:
-    """A picture whose holes are filled, each part by itself."""
+    """An image whose holes are filled, each part separately."""
 
     source: SourceMap
     owner: NDArray[np.uint16]
-    """(H, W): the part that each pixel shows."""
+    """Part that each pixel shows, (H, W)."""
     replaced: Bools
-    """(H, W): pixels that are copied from other places."""
+    """Mask of the pixels that are copied from other places, (H, W)."""
     counts: tuple[int, ...]
-    """Patches of each part."""
+    """Number of patches of each part."""
     shades: NDArray[np.uint8]
     """(H, W) grey levels: where each part was visible, lighter for earlier parts; 0 in the holes and outside all parts."""
 
     def finish(self, screening: float, first: tuple[int, int] | None) -> dict[str, Any]:
-        """Return the options of a `RenderOptions`.
+        """Return the arguments of `RenderOptions`.
 
-        Seams are corrected, except where two parts meet: the colours of one would stain the other. Light is followed if the
-        place of the first pixel in the known image is given.
+        Seams are corrected, except where two parts meet, because the colours of one part would bleed into the other.
+        If the position of the first pixel in the known image is given, patches are adapted to the light.
         """
         if not screening and first is None:
             return {}
@@ -149,7 +158,7 @@ class Mended:
         return {"screening": screening or None, "within": self.replaced, "parts": apart, "light": first}
 
     def show(self, pixels: Array, hole: Bools) -> dict[str, Array]:
-        """Return the stages: what is known, what each part shows, and the patches, each in a shade of its own."""
+        """Return the stages: the known pixels, the part of each pixel, and the patches, each in its own shade."""
         known = pixels.copy()
         known[hole] = pixels[~hole].min()
         shades = np.zeros(hole.shape, np.uint8)
@@ -169,18 +178,18 @@ def fill_parts(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Mended:
-    """Fill the holes of a picture.
+    """Fill the holes of an image.
 
     Parameters
     ----------
     pixels : (H, W, C) array
-        What it holds in the holes does not matter.
+        Image. Its values in the holes have no effect.
     hole : (H, W) bool
-        What is to be filled.
+        Mask of the pixels to fill.
     parts : sequence of Part
-        What goes on there.
+        Parts that continue in the holes.
     boundary : int
-        Pixels around the holes that may change too.
+        Width of the band around the holes that may also change, in pixels.
     element_width : int
         The same for planes with separate elements.
     light : bool
@@ -188,9 +197,9 @@ def fill_parts(
     patch : int, optional
         Side of the patches in pixels.
     seed : int
-        Chooses patches where nothing is known around.
+        Seed of the random choices of patches that have no known pixels around them.
     progress : callable, optional
-        Called with the stage and the share of it that is done.
+        Function that is called with the stage and its finished share.
 
     """
     everywhere = np.ones_like(hole)
@@ -252,7 +261,7 @@ def fill_parts(
 
 
 def even_light(pixels: Array, hole: Bools, parts: Sequence[Bools]) -> Array:
-    """Return a picture with its holes painted over, and the light of its parts divided out where it is uneven."""
+    """Return an image with its holes painted over, and with the light of each part divided out if it is uneven."""
     lights = measure_lights(pixels, parts)
     if all(light is None for light in lights):
         return paint_over(pixels, hole)

@@ -1,4 +1,4 @@
-"""An image with holes, and the pixels that they may be filled from; the same at half the size."""
+"""An image with holes, and the pixels that they may be filled from; also at half the size."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ class Scene:
     """An image with holes, and the image that they are filled from."""
 
     colours: Floats
-    """(H, W, C)"""
+    """Colours, (H, W, C)."""
     known: Bools
-    """(H, W): False in the holes."""
+    """Mask of the known pixels, (H, W): False in the holes."""
     keep: Bools
-    """(H, W): pixels that no patch may replace."""
+    """Mask of the pixels that no patch may replace, (H, W)."""
     source: Floats
-    """(h, w, C): the image that patches are copied from: the same colours, or those of another image."""
+    """Image that patches are copied from, (h, w, C): the same colours, or those of another image."""
     free: Bools
-    """(h, w): pixels of it that may be copied."""
+    """Mask of its pixels that may be copied, (h, w)."""
     wrap: tuple[bool, bool]
-    """Axes along which the picture is cyclic."""
+    """Axes along which the image is periodic."""
     _made: dict[tuple[Flip, ...], PatchIndex] = field(default_factory=dict, repr=False)
-    """An index of each set of mirror images, whatever the size of the patches."""
+    """Index of each set of mirror images, for all sizes of patches."""
 
     @property
     def itself(self) -> bool:
-        """Whether holes are filled from what is around them."""
+        """Return whether holes are filled from their own image."""
         return self.source is self.colours
 
     @property

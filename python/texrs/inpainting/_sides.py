@@ -13,13 +13,13 @@ from texrs._masks import widen
 from texrs._typing import Bools
 
 REACH = 0.5
-"""Distance of the known pixels around a hole that show where parts meet, in square roots of the area of the hole."""
+"""Width of the known band around a hole that shows where parts meet, in square roots of the area of the hole."""
 NEAREST = 16
-"""Least distance in pixels."""
+"""Minimum width of this band, in pixels."""
 POINTS = 1500
-"""Number of pixels of each part that are compared, about."""
+"""Approximate number of pixels of each part that are compared."""
 FEWEST = 12
-"""Least number of pixels of a part. With fewer pixels, a line is not reliable."""
+"""Minimum number of pixels of a part. With fewer pixels, a line is not reliable."""
 ANGLES = 180
 """Number of directions of a line that are tried."""
 FINER = 10
@@ -29,16 +29,16 @@ WRONG = 0.04
 
 
 def share_out(hole: Bools, parts: Sequence[Bools], reach: Sequence[Bools]) -> NDArray[np.intp]:
-    """Return the part that goes on at each pixel of a hole, -1 elsewhere.
+    """Return the part that continues at each pixel of a hole, and -1 elsewhere.
 
     Two parts that meet in a line next to the hole meet in that line inside it. Otherwise the nearer part continues.
 
     Parameters
     ----------
     hole : (H, W) bool
-        What is not known.
+        Mask of the hole.
     parts : sequence of (H, W) bool
-        Where each part is seen.
+        Mask of the visible pixels of each part.
     reach : sequence of (H, W) bool
         Pixels that each part can reach: for a floor, those below its horizon. The nearest part continues at other pixels.
 
@@ -67,7 +67,7 @@ def share_out(hole: Bools, parts: Sequence[Bools], reach: Sequence[Bools]) -> ND
 def _follow_lines(
     piece: Bools, parts: Sequence[Bools], places: NDArray[np.intp], away: NDArray[np.float64], margin: int
 ) -> NDArray[np.intp]:
-    """Return the part of each place: the one that is before all others, by lines between two of them or as the nearer."""
+    """Return the part of each place: the part on the right side of all its lines, or else the nearer part."""
     ring = widen(piece, margin) & ~piece
     near = [np.argwhere(ring & p) for p in parts]
     near = [p[:: max(1, len(p) // POINTS)] for p in near]
@@ -108,11 +108,11 @@ def find_line(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[float, fl
 
 
 def _cut(one: NDArray[np.intp], other: NDArray[np.intp], angle: float) -> tuple[float, float, float, float]:
-    """Return the best line across a direction: what is on its wrong side, minus its room, the direction, and how far it is."""
+    """Return the best line across a direction: its wrong pixels minus its free room, the direction, and the distance."""
     values = np.concatenate([_measure(points, angle) for points in (one, other)])
     order = np.argsort(values, kind="stable")
     sign = np.concatenate([np.full(len(one), 1 / len(one)), np.full(len(other), -1 / len(other))])[order]
-    # Shares of both that lie on the wrong side of a line after each point.
+    # Shares of both parts on the wrong side of a line after each point.
     wrong = np.round(1 - np.cumsum(sign), 9)
     at = int(wrong[:-1].argmin())
     low, high = (float(values[order[k]]) for k in (at, at + 1))
@@ -120,5 +120,5 @@ def _cut(one: NDArray[np.intp], other: NDArray[np.intp], angle: float) -> tuple[
 
 
 def _measure(points: NDArray[np.intp], angle: float) -> NDArray[np.float64]:
-    """Return how far points reach in a direction, to digits that no processor doubts."""
+    """Return the distance of points in a direction, rounded to digits that are equal on all processors."""
     return np.asarray(np.round(points[:, 0] * sin(angle) + points[:, 1] * cos(angle), 6), np.float64)

@@ -1,7 +1,8 @@
-"""Holes in volumes: patches of the known voxels, cut into the hole along minimum cuts, and seams made to disappear.
+"""Fill holes in volumes: patches of the known voxels, cut along minimum cuts, and a correction of the seams.
 
-The stitcher of `texrs._engine.stitcher` fills the hole: known voxels are held, and samples in the hole cost so much that no
-patch shows them. Then the differences that the patches have inside are kept, and the values move to where those fit together.
+The stitcher of `texrs._engine.stitcher` fills the hole. Known voxels are held, and samples in the hole cost so much
+that no patch shows them. The correction then keeps the differences inside each patch, and moves its values so that the
+patches fit together.
 """
 
 from __future__ import annotations
@@ -32,35 +33,35 @@ __all__ = ["inpaint_volume", "is_volume"]
 LEAST = 16
 """Least side of a volume, in voxels."""
 MOST_CHANNELS = 4
-"""A third axis of a hole that is not longer is that of the channels of a picture."""
+"""Maximum length of a third axis that contains channels of an image."""
 SIDES = (12, 32)
 """Smallest and largest side of the patches, in voxels. Smaller patches lose features. Larger patches do not fit all around."""
 SHARES = {False: (1.0, 2 / 3, 1 / 2), True: (1.0, 2 / 3, 1 / 2, 0.4)}
 """Sides that are tried, as shares of the usual side, without and with labels. Smaller patches fit better around the hole:
 steps at its border decrease from 2.0 to 1.2 for labels, which cannot be corrected. They lose larger features."""
 SMALLEST = 6
-"""Least side of a patch."""
+"""Smallest side of a patch, in voxels."""
 SEEN = 1.2
-"""Largest step at the border of a hole that is not visible: no smaller patches are tried then."""
+"""Largest step at the border of a hole that is not visible. Smaller patches are only tried above it."""
 MARGIN = 48
 """Voxels around the hole that patches are copied from. The search of one patch takes as long as there are voxels."""
 PLENTY = 8
-"""Voxels that patches are copied from, in voxels of the hole, at least if the volume has them."""
+"""Minimum number of voxels that patches are copied from, relative to the voxels of the hole, if the volume allows it."""
 CANDIDATES, RECOVER = {False: 16, True: 48}, 2.0
 """Places that are tried for a patch: more for labels, because their seams cannot be corrected. Patches that cover the worst
 seams again, as a share of all."""
 FORBIDDEN = 5.0
-"""Cost of a sample in the hole, in that of a point that does not follow a guide."""
+"""Cost of a sample in the hole, relative to a point that does not follow a guide."""
 BLEND = 0.1
-"""Usual weight of the values, if seams are corrected: the correction is lost within about three voxels."""
+"""Default weight of the values in the correction, which then fades within about three voxels."""
 SWEEPS, RELAXED = (40, 400), 1.6
-"""Sweeps of the correction, and how far each overshoots."""
+"""Number of sweeps of the correction without and with labels, and the overrelaxation factor."""
 CODE = 2047
-"""Largest value of a demand."""
+"""Largest value of a guide."""
 
 
 def is_volume(image: object, hole: object) -> bool:
-    """Return whether an image is a volume: an exemplar of three axes, or one whose hole has three, not channels."""
+    """Return whether an image is a volume: an exemplar with three axes, or an image whose hole has three axes."""
     if isinstance(image, Exemplar):
         return image.axes == 3
     marks = as_marks(hole).marks
@@ -68,7 +69,7 @@ def is_volume(image: object, hole: object) -> bool:
         return os.path.exists(marks) and holds_volume(marks)
     shape = () if marks is None else try_array(marks).shape
     sides: tuple[int, ...] = getattr(image, "shape", ())
-    # A picture of few channels stays a picture, whatever its hole.
+    # An image with few channels stays an image, whatever its hole.
     flat = len(sides) == 3 and sides[2] <= MOST_CHANNELS
     return len(shape) == 3 and shape[2] > MOST_CHANNELS and not flat
 
@@ -163,7 +164,7 @@ def check_volume(image: object, hole: object) -> tuple[Array, Bools]:
 
 
 def paint_over(volume: Array, hole: Bools) -> Array:
-    """Return a volume whose hole has the nearest known values, which patches at its border are compared with."""
+    """Return a volume whose hole has the nearest known values. Patches at its border are compared with these."""
     from scipy.ndimage import distance_transform_edt
 
     part = find_box(hole, 1)
@@ -191,7 +192,7 @@ def find_box(mask: Bools, margin: int) -> tuple[slice, ...]:
 
 
 def choose_part(hole: Bools) -> tuple[slice, slice, slice]:
-    """Return the part of a volume that is looked at: the hole, and enough known voxels around it."""
+    """Return the part of a volume to work on: the hole, and enough known voxels around it."""
     margin = MARGIN
     while True:
         part = find_box(hole, margin)
@@ -202,7 +203,7 @@ def choose_part(hole: Bools) -> tuple[slice, slice, slice]:
 
 
 def choose_side(hole: Bools, shape: tuple[int, ...]) -> int:
-    """Return the side of the patches, by how far the hole extends."""
+    """Return the side of the patches for the extent of a hole."""
     box = find_box(hole, 0)
     across: int = min(s.stop - s.start for s in box)
     return min(*shape, max(SIDES[0], min(SIDES[1], round(10 + across / 4))))
@@ -263,7 +264,7 @@ def fill_part(
 def measure_step(volume: Array, new: Bools, *, labels: bool) -> float:
     """Return the mean difference across the border of replaced voxels, as a multiple of the mean difference elsewhere.
 
-    Labels differ or are equal: the distance of two labels has no meaning.
+    Labels are equal or different, because the distance of two labels has no meaning.
     """
     values = volume.reshape(*new.shape, -1)
     sums, counts = np.zeros(2), np.zeros(2)
@@ -284,7 +285,7 @@ def stitch(
     exemplar: Exemplar, hole: Bools, wide: Bools, side: int, seed: int, progress: Progress | None
 ) -> tuple[NDArray[np.intp], NDArray[np.uint32], NDArray[np.int16], float]:
     """Return the voxel that each voxel is copied from (D, H, W, 3), its patch (0: itself), the frames, and the seam cost."""
-    # Patches that are laid reach beyond the hole by their side.
+    # Patches extend beyond the hole by up to their side.
     part = find_box(wide, side)
     here = hole[part]
     region = Region.whole(here.shape, (False,) * 3)
@@ -347,7 +348,7 @@ def correct_seams(
         low, high = (tuple(s if a == axis else slice(None) for a in range(3)) for s in (slice(-1), slice(1, None)))
         slopes = np.zeros((*at[low].shape[:3], colours.shape[-1]))
         seen = np.zeros((*at[low].shape[:3], 1))
-        # The pair as it is where the one voxel comes from, and as it is where the other one does.
+        # Average the difference at the source of one voxel and at the source of the other one.
         for start, step in ((at[low], 1), (at[high], -1)):
             beside = start.copy()
             beside[..., axis] = np.clip(beside[..., axis] + step, 0, ends[axis] - 1)
@@ -363,7 +364,7 @@ def correct_seams(
         wanted[high] += slopes
         pairs.append((low, high, counts))
     x = colours[box].copy()
-    # Voxels of one colour of a chess board have no neighbour of the same colour.
+    # Voxels of one colour of a chessboard have no neighbour of the same colour.
     odd = np.indices(shape).sum(axis=0) % 2 == 1
     sweeps = round(min(SWEEPS[1], max(SWEEPS[0], 12 / sqrt(weight))))
     for sweep in range(sweeps):
