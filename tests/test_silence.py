@@ -15,7 +15,7 @@ import pytest
 import typer
 
 from test_cli_messages import CALLS, refuse_work
-from texrs import cli, io, samples
+from texrs import SourceMap, cli, io, samples
 from texrs.cli import COMMANDS, Group, app, main
 
 Capture = pytest.CaptureFixture[str]
@@ -130,6 +130,7 @@ def test_assumptions_are_shown(here: Path, capsys: Capture, command: str, name: 
 @pytest.mark.parametrize(("command", "name"), MASKS)
 def test_masks_that_mark_nothing_are_refused(here: Path, capsys: Capture, command: str, name: str) -> None:
     io.write("empty.png", np.zeros((64, 96), np.uint8))
+    SourceMap.identity((64, 96)).save("map.npz")
     place = next(p for p in GROUP.get_command(None, command).params if p.name == name)
     io.write_volume("empty.tif", np.zeros((32, 36, 40), np.uint8))
     io.write_volume("volume.tif", samples.stripes((32, 36, 40)).image)

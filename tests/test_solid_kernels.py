@@ -160,7 +160,7 @@ def test_wrong_arrays_get_a_sentence():
         (lambda: appearance.correct(good, region_of(3), frames), "region: must have the 2 axes"),
         (lambda: appearance.blocks(region, frames, cell=1), "cell: must be an integer between 2"),
         (lambda: appearance.blocks(region, frames, contrast=2), "contrast: must be a number between 0 and 1"),
-        (lambda: Appearance(np.zeros((4, 4)), axes=2), "too small"),
+        (lambda: Appearance(np.zeros((4, 4)), axes=2), "must have sides of at least 6"),
     ):
         with pytest.raises(InvalidInput) as caught:
             call()
