@@ -29,12 +29,18 @@ VOLUMES = "a TIFF of several slices, .npy, .npz, .vti, NRRD, NIfTI or Zarr"
 """File formats of volumes, as errors list them."""
 
 
+MOST_CHANNELS = 4
+"""Maximum length of a third axis that is read as channels without a notice."""
+
+
 def read_picture(text: str, *, finite: bool = True) -> Array:
     """Read an image file, or make the built-in exemplar of ``sample:NAME``."""
     image: Array = samples.load(text.removeprefix(SAMPLE)).image if text.startswith(SAMPLE) else io.read(text)
     if finite:
         as_image(image, text)
         report_nodata(text, image)
+    if image.ndim == 3 and image.shape[2] > MOST_CHANNELS:
+        assume(f"{text}: {' x '.join(map(str, image.shape))} is read as an image with {image.shape[2]} channels")
     return image
 
 
@@ -172,10 +178,16 @@ def name_file(path: str) -> str:
 
 def read_hole(text: str, about: About) -> Any:
     """Return a number, or the name of a file."""
-    with suppress(ValueError):
-        if not os.path.exists(text):
-            return float(text)
-    return name_file(text)
+    return float(text) if is_number(text) else name_file(text)
+
+
+def is_number(text: str) -> bool:
+    """Return whether a text is a number and not the name of a file."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return not os.path.exists(text)
 
 
 def read_scale_map(path: str, encoding: str = "log2") -> Floats:

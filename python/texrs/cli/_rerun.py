@@ -28,6 +28,7 @@ from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
 from texrs.io._formats import detect_kind
+from texrs.io._grids import holds_volume
 from texrs.io._pillow import count_frames
 from texrs.io._raw import strip_raw
 from texrs.io._temporary import name_prefix
@@ -291,7 +292,8 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
                 continue
     if is_stack(file):
         return describe_material(file, "layer")
-    volume = recipe is not None and recipe.verb == "solid" and recipe.output == "--out"
+    made_by_solid = recipe is not None and recipe.verb == "solid" and recipe.output == "--out"
+    volume = made_by_solid or (Path(file).suffix.lower() == ".npy" and holds_volume(file))
     try:
         image, axes = (io.read_volume(file), 3) if volume else (io.read(file), 2)
     except FileError as error:

@@ -36,7 +36,7 @@ from texrs.cli._kinds import (
 )
 from texrs.cli._options import Options
 from texrs.cli._places import check_corners
-from texrs.cli._readers import read_stated_spacing
+from texrs.cli._readers import is_number, read_stated_spacing
 from texrs.cli._texts import PLANE
 from texrs.cli._verb import Verb
 from texrs.errors import FileError, InvalidInput
@@ -146,9 +146,9 @@ class Filling(Verb):
     deep: Verb | None = None
 
     def run(self, **given: Any) -> None:
-        """Fill a volume if the mask is one, else an image."""
-        texts = [given["mask_marks"], given["image"]]
-        named = next(text for text in texts if text is not None and text not in FILLED.words)
+        """Fill a volume if the mask is one, or if the values of a volume define the hole. Else fill an image."""
+        mask = given["mask_marks"]
+        named = given["image"] if mask is None or mask in FILLED.words or is_number(mask) else mask
         deep = None
         # The reader refuses an unreadable file later.
         with suppress(FileError):

@@ -18,6 +18,7 @@ from texrs._arrays import as_float, as_image, as_int, as_seed, check_memory, try
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
 from texrs._masks import as_marks, widen
+from texrs._notices import assume
 from texrs._progress import answering, stage
 from texrs._typing import Array, Bools, Progress
 from texrs.errors import InvalidInput
@@ -61,17 +62,30 @@ CODE = 2047
 
 
 def is_volume(image: object, hole: object) -> bool:
-    """Return whether an image is a volume: an exemplar with three axes, or an image whose hole has three axes."""
+    """Return whether an image is a volume.
+
+    It is one if it is an exemplar with three axes or if its hole has three axes. If the values of the image define the
+    hole, a file that holds a volume is one, and so is an array of four axes, or of three axes whose last is too long
+    for channels.
+    """
     if isinstance(image, Exemplar):
         return image.axes == 3
     marks = as_marks(hole).marks
-    if isinstance(marks, str | os.PathLike):
-        return os.path.exists(marks) and holds_volume(marks)
-    shape = () if marks is None else try_array(marks).shape
     sides: tuple[int, ...] = getattr(image, "shape", ())
     # An image with few channels stays an image, whatever its hole.
-    flat = len(sides) == 3 and sides[2] <= MOST_CHANNELS
-    return len(shape) == 3 and shape[2] > MOST_CHANNELS and not flat
+    deep = len(sides) == 4 or (len(sides) == 3 and sides[2] > MOST_CHANNELS)
+    if marks is None or marks in ("nan", "nodata") or isinstance(marks, int | float):
+        if isinstance(image, str | os.PathLike):
+            return os.path.exists(image) and holds_volume(image)
+        if deep:
+            assume(
+                f"image: {' x '.join(map(str, sides))} is read as a volume; a mask of two axes would make it an image"
+            )
+        return deep
+    if isinstance(marks, str | os.PathLike):
+        return os.path.exists(marks) and holds_volume(marks)
+    shape = try_array(marks).shape
+    return len(shape) == 3 and shape[2] > MOST_CHANNELS and (deep or len(sides) != 3)
 
 
 def inpaint_volume(
