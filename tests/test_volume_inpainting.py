@@ -178,3 +178,23 @@ def test_the_command_fills_volumes(tmp_path: Path, capsys: pytest.CaptureFixture
     assert io.read_spacing(names[2]) == (3, 1, 0.5)
     assert main(["inpaint", names[0], names[1], "-o", names[2], "--wrap", "x", "-q"]) == 2
     assert "--wrap: only available for images; omit it for a volume" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".nrrd", ".tif"])
+def test_values_of_a_volume_define_its_hole(suffix: str, tmp_path: Path) -> None:
+    """A volume without a mask was filled as an image of many channels, and known voxels changed."""
+    volume = make_noise(1).astype(np.float32)
+    hole = make_ball(volume.shape, 6)
+    for value, words in ((np.nan, []), (np.nan, ["nan"]), (-7.0, ["--", "-7"])):
+        given = np.where(hole, np.float32(value), volume)
+        io.write_volume(tmp_path / f"in{suffix}", given)
+        out = tmp_path / f"out{suffix}"
+        assert main(["inpaint", "-o", str(out), "--force", "-q", str(tmp_path / f"in{suffix}"), *words]) == 0
+        filled = io.read_volume(out)
+        np.testing.assert_array_equal(filled[~hole], volume[~hole])
+        assert np.isfinite(filled).all()
+        assert filled.min() >= volume.min() - 20
+    for mask in (None, "nan"):
+        made = texrs.inpaint(np.where(hole, np.nan, volume), mask)
+        np.testing.assert_array_equal(made.image[~hole], volume[~hole])
+        assert any("is read as a volume" in text for text in made.report["assumed"])

@@ -211,13 +211,17 @@ def read_voxels(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
 
 def say_planes(result: Synthesis) -> str:
     """Return the planes that were followed."""
+    from texrs.planes._sizes import SURE
+
     said = []
     for each in result.report.get("planes", [result.report]):
         plane = each["plane"]
         if plane is None:
             said.append(", no plane followed")
             continue
-        found = f", found with confidence {plane['confidence']:.2f}" if each["found"] else ""
+        sure = plane["confidence"] or 0.0
+        found = f", found with confidence {sure:.2f}" if each["found"] else ""
+        found += " (unsure: give --corners or --slant)" if each["found"] and sure < SURE else ""
         said.append(f", slant {plane['slant']:.1f} and tilt {plane['tilt']:.1f}{found}")
     return "".join(said)
 

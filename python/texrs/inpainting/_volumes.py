@@ -64,9 +64,8 @@ CODE = 2047
 def is_volume(image: object, hole: object) -> bool:
     """Return whether an image is a volume.
 
-    It is one if it is an exemplar with three axes or if its hole has three axes. If the values of the image define the
-    hole, a file that holds a volume is one, and so is an array of four axes, or of three axes whose last is too long
-    for channels.
+    An exemplar with three axes is a volume, and so is an image whose hole has three axes. If the values of the image
+    define the hole, its file or its number of axes decides.
     """
     if isinstance(image, Exemplar):
         return image.axes == 3

@@ -4,7 +4,7 @@
 Role                   Words at the end of a name
 ====================== =======================================================================================
 ``colour``             albedo, alb, basecolor, base_color, base_colour, basemap, color, colour, col, diffuse, diff, bc,
-                       albedo_transparency, albedo_opacity
+                       albedo_transparency, albedo_opacity, image, photo
 ``normal``             normal, normals, nor, nrm, norm, normal_gl, nor_gl, nrm_gl, normal_opengl (y up)
 ``normal-dx``          normal_dx, nor_dx, nrm_dx, normal_directx (y down)
 ``normal-xy``          normal_xy, normal_rg (y up; z is not stored)
@@ -145,7 +145,8 @@ LAYOUTS: dict[Role, tuple[str, ...]] = {
 CODED = ("reflectance", "porosity", "emissiveness")
 """Quantities of labPBR whose values are codes above a certain number, which must not be mixed."""
 WORDS: dict[Role, str] = {
-    Role.COLOUR: "albedo alb basecolor basecolour basemap color colour col diffuse diff bc albedotransparency albedoopacity",
+    Role.COLOUR: "albedo alb basecolor basecolour basemap color colour col diffuse diff bc image photo "
+    "albedotransparency albedoopacity",
     Role.NORMAL: "normal normals nor nrm norm normalgl norgl nrmgl normalopengl",
     Role.NORMAL_DX: "normaldx nordx nrmdx normaldirectx",
     Role.NORMAL_XY: "normalxy normalrg",

@@ -34,8 +34,8 @@ class Comparison:
     ----------
     shares : (2, K) float64
         Share of each class, from dark to light (or by label).
-    particles : tuple of Particles
-        Connected pieces of the chosen material.
+    particles : tuple of ComponentStatistics
+        Connected pieces of the chosen classes or labels: their number in 100 000 voxels, and their sizes.
     frequency : tuple of float
         Mean spectral frequency of the slices.
     two_point : (2, A, 13) float64
@@ -99,20 +99,27 @@ class Comparison:
 
     @property
     def text(self) -> str:
-        """Return the report as a table."""
+        """Table of the report. A ratio near 1 and a distance near 0 mean that output and exemplar are similar.
+
+        The distances of two-point correlations, lineal paths and autocorrelations are mean absolute differences over
+        all axes and steps. "distance of values" is `values`, and "isolated voxels" is `isolated`. "change from plane
+        to plane / median" is `seams`. A large maximum means a visible seam.
+        """
         rows = [("", "exemplar", "output", "output/exemplar")]
 
         def row(name: str, pair: tuple[float, float], form: str) -> None:
             rows.append((name, format(pair[0], form), format(pair[1], form), f"{_divide(pair):.2f}"))
 
         for k, (before, after) in enumerate(self.shares.T.tolist()):
-            row(f"share of class {k}", (before, after), ".3f")
+            # Labels need not be consecutive: those that do not occur have no row.
+            if before or after:
+                row(f"share of class {k}", (before, after), ".3f")
         first, second = self.particles
         row("particles in 100 000", (first.density, second.density), ".1f")
         row("mean size", (first.mean, second.mean), ".0f")
         row("median size", (first.median, second.median), ".0f")
         for d in (1, 9):
-            row(f"{d}0 % are not above", (first.deciles[d - 1], second.deciles[d - 1]), ".0f")
+            row(f"{d}0th percentile of sizes", (first.deciles[d - 1], second.deciles[d - 1]), ".0f")
         row("mean frequency", self.frequency, ".4f")
         row("isolated voxels", self.isolated, ".4f")
         rows.append(("distance of two-point correlations", "", f"{_measure_distance(self.two_point):.3f}", ""))
@@ -122,7 +129,7 @@ class Comparison:
         rows.append(("change from plane to plane / median", "", f"{self.seams[0]:.2f} to {self.seams[1]:.2f}", ""))
         if self.orientation is not None:
             rows.append(("the field turns the normal by", "", f"{self.turned:.1f}", ""))
-            for i, name in enumerate(("median error of the normal", "nine tenths are within")):
+            for i, name in enumerate(("median error of the normal", "90th percentile of the error")):
                 row(name, (float(self.orientation[0, i]), float(self.orientation[1, i])), ".1f")
         if self.reuse is not None:
             rows.append(("coherent neighbours", "", f"{self.reuse.coherent:.3f}", ""))
