@@ -95,12 +95,12 @@ KINDS = (
         "Check it. If it marks pixels in black, invert it (`--invert`).",
     ),
     kind(
-        r"cannot (?:hold|contain|be kept|keep)|is (?:not )?written|are (?:not )?written|format",
+        r"cannot (?:hold|store|contain|be kept|keep)|is (?:not )?written|are (?:not )?written|format",
         "The format cannot contain these data.",
         "Use a format from the message, or convert the data.",
     ),
     kind(
-        r"is no |holds? no|not (?:an?|the) |cut off|not all of|not packed|not JSON",
+        r"is no |holds? no|not (?:an?|the) |cut off|are missing|not packed|not JSON",
         "The file or the value is of the wrong kind.",
         "Give one of the kind in the message.",
     ),

@@ -127,7 +127,7 @@ def test_same_bytes_for_any_number_of_threads(lines, count):
         ({"direction": np.full((4, 4), np.inf)}, "direction: must be finite degrees"),
         ({"direction": np.zeros((4, 4, 2))}, "direction: must be degrees"),
         ({"direction": "up"}, "field"),
-        ({"direction": fields.circular()}, "direction: must be a field of 2 axes"),
+        ({"direction": fields.circular()}, "direction: must be a field with 2 axes"),
         ({"direction": 9.0, "method": "paper"}, "method: cannot be combined with surfaces or directions"),
         (
             {"direction": np.array([[0.0, 90.0]]), "wrap": (False, True)},

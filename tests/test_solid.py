@@ -429,9 +429,9 @@ def held(mask, **what):
         (STRIPES, {"size": (20, 20)}, "size: must be (planes, rows, columns)"),
         (STRIPES, {"size": 20.5}, "size: must be (planes, rows, columns)"),
         (STRIPES, {"size": None}, "size: must be (planes, rows, columns)"),
-        (STRIPES, {"field": fields.zigzag(axes=2)}, "field: must be a field of 3 axes, got <2-D field"),
+        (STRIPES, {"field": fields.zigzag(axes=2)}, "field: must be a field with 3 axes, got <2-D field"),
         (STRIPES, {"field": "no-such-field"}, "field: "),
-        (STRIPES, {"field": np.eye(3)}, "field: must be a field of 3 axes, got ndarray"),
+        (STRIPES, {"field": np.eye(3)}, "field: must be a field with 3 axes, got ndarray"),
         (STRIPES, {"field": fields.constant(np.eye(3) * 0.12)}, "field: must not shrink elements"),
         (
             STRIPES,
@@ -476,7 +476,7 @@ def test_bad_input_of_pictures():
         (WEAVE[:10], 20, {}, "exemplar: each side must be at least 16"),
         (STRIPES, 20, {}, "a volume is not an image"),
         (WEAVE, (20, 20, 20), {}, "size: must be (rows, columns)"),
-        (WEAVE, 20, {"field": fields.rotation_3d()}, "field: must be a field of 2 axes, got <3-D field"),
+        (WEAVE, 20, {"field": fields.rotation_3d()}, "field: must be a field with 2 axes, got <3-D field"),
     ):
         with pytest.raises(InvalidInput) as caught:
             texrs.synthesize(exemplar, size, **options)

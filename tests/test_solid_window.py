@@ -162,7 +162,7 @@ def test_a_single_index_selects_a_plane() -> None:
         ((slice(0, 4, 2), slice(0, 4), slice(0, 4)), "without a step, got 0:4:2"),
         ((slice(4, 4), slice(0, 4), slice(0, 4)), "empty range, got 4:4"),
         ((slice(0, 4.5), slice(0, 4), slice(0, 4)), "integers"),
-        ((slice(0, 4), slice(0, 4), 10**10), "within 1000000000"),
+        ((slice(0, 4), slice(0, 4), 10**10), "to 1000000000"),
         ((slice(0, 4), slice(0, 4), "x"), "integers and ranges"),
         ((slice(0, 4), slice(0, 4), ...), "integers and ranges"),
         ((slice(0, 4), slice(0, 4), True), "integers and ranges"),
@@ -175,7 +175,7 @@ def test_bad_indices(index: tuple[object, ...], says: str) -> None:
 
 def test_bad_options() -> None:
     for options, says in (
-        ({"field": fields.circular(axes=2)}, "field: must be a field of 3 axes"),
+        ({"field": fields.circular(axes=2)}, "field: must be a field with 3 axes"),
         ({"cache_bytes": -1}, "cache_bytes"),
         ({"interpolation": "best"}, "interpolation"),
         ({"seed": -1}, "seed"),

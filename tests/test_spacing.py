@@ -134,9 +134,9 @@ def test_the_middle_and_the_length_are_those_of_the_output_in_space() -> None:
     # An omitted length is a number of the smallest voxel sides.
     assert "period 22.4 along x" in str(fields.as_field("zigzag", 3, (11, 21, 31), spacing=SPACING))
     assert "period 0.02" in str(fields.as_field("zigzag:period=0.02", 3, spacing=(0.005, 0.005, 0.005)))
-    with pytest.raises(InvalidInput, match="period: must be at least 2 voxels, 1.4, got 1"):
+    with pytest.raises(InvalidInput, match=r"period: must be at least 1.4 \(2 voxels\), got 1"):
         fields.as_field("zigzag:period=1", 3, spacing=SPACING)
-    with pytest.raises(InvalidInput, match="period: must be at least 2 voxels, 2, got 1"):
+    with pytest.raises(InvalidInput, match=r"period: must be at least 2 \(2 voxels\), got 1"):
         fields.as_field("zigzag:period=1", 3)
 
 

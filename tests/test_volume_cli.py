@@ -132,7 +132,7 @@ def test_fields_in_words_and_in_files(here):
         ("rotation_3d", size[:2], "--field: rotation_3d is only available for volumes"),
         ("two.npz", size, "two.npz: must contain a single array, or one with the key"),
         ("flat.npz", size, "flat.npz: the frame at"),
-        ("frames.npz", size[:2], "frames.npz: must have 2 axes, got shape (2, 2, 2, 3, 3), a field of 3 axes"),
+        ("frames.npz", size[:2], "frames.npz: must have 2 axes, got shape (2, 2, 2, 3, 3), a field with 3 axes"),
         ("none.npz", size, "none.npz: does not exist"),
     ):
         with pytest.raises(TexrsError) as caught:

@@ -303,7 +303,7 @@ CUBE = np.zeros((16, 16, 16), np.uint8)
         (lambda: volume.compare(np.full((16,) * 3, np.nan), CUBE), "exemplar: .* NaN"),
         (lambda: volume.compare(np.array([None] * 8).reshape(2, 2, 2), CUBE), "exemplar"),
         (lambda: volume.compare(CUBE, CUBE, SourceMap.identity((4, 4, 4))), "source: "),
-        (lambda: volume.compare(CUBE, CUBE, field=fields.identity(2)), "field: must be a field of 3 axes"),
+        (lambda: volume.compare(CUBE, CUBE, field=fields.identity(2)), "field: must be a field with 3 axes"),
         (lambda: volume.compare(CUBE, CUBE, classes=1), "count: must be an integer between 2"),
         (lambda: volume.compare(CUBE, CUBE, classes=None, chosen=4), "chosen"),
         (lambda: volume.compare(CUBE, CUBE, classes=None, chosen=()), "chosen"),

@@ -290,7 +290,7 @@ def as_rgb(unit: Floats) -> Floats:
 
 
 def to_lab(unit: Floats) -> Floats:
-    """Return CIE Lab / 100 of colours.
+    """Return the CIE Lab values of colours, divided by 100.
 
     A just visible difference is about 0.02. The bits are the same on any processor.
     """
@@ -314,8 +314,8 @@ def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     return np.array(as_array(given, name, np.bool_, shape))
 
 
-# NumPy computes functions of single precision in different ways on different processors, with other last bits. Values
-# computed in double precision and rounded are the same.
+# NumPy computes functions of single precision in different ways on different processors, so that the last bits differ. Values
+# computed in double precision and then rounded are the same everywhere.
 
 
 def log_single(values: Array) -> Floats:

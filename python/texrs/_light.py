@@ -27,7 +27,7 @@ BETTER = 0.75
 ROUNDS, FAR = 6, 4.0
 """Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
 DIGITS = 8
-"""Digits of the polynomial after the point. The last bits of a fit depend on the processor."""
+"""Decimal places of the coefficients of the polynomial. The last bits of a fit depend on the processor."""
 MOST = 1.1
 """Maximum natural logarithm of the light that is followed."""
 TERMS = (1, 3, 6)

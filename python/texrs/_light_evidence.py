@@ -27,7 +27,7 @@ CHANCE = 2.0
 ROUNDS, FAR = 6, 4.0
 """Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
 DIGITS = 8
-"""Digits of the fit after the point. Its last bits depend on the processor."""
+"""Decimal places of the fit. Its last bits depend on the processor."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

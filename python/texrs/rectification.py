@@ -37,9 +37,9 @@ SMALLEST = 32
 LEAST = 0.05
 """Minimum scale that is used, as a share of the scale in the middle. Smaller scales are near the horizon."""
 LARGER = 8
-"""Maximum pixels of the flattened plane, as a multiple of the photograph's."""
+"""Maximum number of pixels of the flattened plane, as a multiple of the photograph's."""
 SHOWN = 640
-"""Maximum pixels a side of the first flattening."""
+"""Maximum side of the first flattened image, in pixels."""
 CELLS = 160
 """Cells a side of the lattice that is searched for the largest rectangle."""
 COURSES = 0.35

@@ -81,7 +81,7 @@ class Appearance:
         Colours for the comparison of windows, up to four channels of any scale. Shape (rows, columns[, C]) or (planes,
         rows, columns[, C]).
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
     wrap : bool or one per axis
         Axes along which the exemplar repeats.
     radius : int
@@ -305,7 +305,7 @@ class Appearance:
         reach : int
             Distance of the neighbours whose matches are tried, 1 or 2 points.
         acceptance : float
-            Required improvement of a drawn match over the present one, in units of `spacing`, 0 to 100. Good matches
+            Minimum improvement of a random match over the present one, in units of `spacing`, 0 to 100. Good matches
             are kept.
         coherence : float
             Cost of each neighbour that shows another piece of the exemplar, in units of `spacing`, 0 to 100. It keeps

@@ -19,7 +19,7 @@ from texrs.errors import InvalidInput
 __all__ = ["FREE", "Pasting", "Samples", "Shown", "Stitched", "Stitcher", "Weights"]
 
 FREE = 2**32 - 1
-"""Value of a pixel that shows nothing yet."""
+"""Value of a pixel that is not copied from any place yet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

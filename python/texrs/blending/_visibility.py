@@ -16,7 +16,7 @@ from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
 LOOK = 2**22
-"""Maximum pixels of an image whose seams are measured. Exemplars are sampled at a quarter of this number."""
+"""Maximum number of pixels of an image whose seams are measured. Exemplars are sampled at a quarter of this number."""
 
 
 @dataclass(frozen=True, slots=True)

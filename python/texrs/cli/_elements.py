@@ -140,7 +140,7 @@ def database_command(
                 say(f"{record.name}\t{record.layout}\t{record.elements} elements\tbox {box}\t{record.image}")
         case "remove":
             if not names:
-                raise InvalidInput("NAME: must be given for remove")
+                raise InvalidInput("NAME: must be the name of a texture to remove")
             for name in names:
                 textures.remove(name)
                 note(f"removed {name}", quiet=quiet)
@@ -217,7 +217,7 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
     images = [i for i in items if not re.fullmatch(PLACE, i)]
     values = ANALYSED.read(given)
     if not images:
-        raise InvalidInput("IMAGE: must be given for add")
+        raise InvalidInput("IMAGE: must be an image to add")
     if len(images) > 1 and (given["name"] or {("box",), ("background",), ("mask",), ("points",)} & values.keys()):
         raise InvalidInput(
             "IMAGE: must be one image with --name, --box, --background, --mask or --points; add images one by one"

@@ -87,7 +87,7 @@ class Options:
     Parameters
     ----------
     function : callable
-        Function with types and a numpydoc docstring. A parameter that is a dataclass gives an option for each field.
+        Function with type annotations and a numpydoc docstring. A parameter that is a dataclass gives an option for each field.
     arguments : mapping
         Positional parameters, and their kinds.
     kinds : mapping
@@ -184,7 +184,7 @@ class Options:
             if each.kind is each.VAR_KEYWORD or name == "self" or name in self.leave or (only and name not in only):
                 continue
             group: Any = next((t for t in _split_union(each.annotation) if is_dataclass(t)), self.groups.get(name))
-            # A mask by itself is an ordinary option. If it marks the hole, its reading options are added.
+            # A mask that is not a hole is an ordinary option. A hole also gets the options of `Mask`.
             if group is None or name in self._kinds or (group is Mask and f"{name}.marks" not in self._arguments):
                 yield (name,), each, texts.get(name, "")
                 continue

@@ -354,7 +354,7 @@ def describe_scene(file: str) -> str:
         pictures = ", ".join(image["name"] for image in scene["images"])
         return f"scene: glTF {scene['asset']['version']}, {shapes}, textures {pictures}"
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise FileError(f"{file}: not a binary glTF file, or damaged") from None
+        raise FileError(f"{file}: is damaged or not a binary glTF file") from None
 
 
 def describe_document(file: str) -> str:
@@ -362,7 +362,7 @@ def describe_document(file: str) -> str:
     try:
         root = ElementTree.fromstring(Path(file).read_bytes())
     except ElementTree.ParseError:
-        raise FileError(f"{file}: not a MaterialX document, or damaged") from None
+        raise FileError(f"{file}: is damaged or not a MaterialX document") from None
     names = [each.get("value", "") for each in root.iter("input") if each.get("type") == "filename"]
     return f"material: MaterialX {root.get('version', '')}, of {', '.join(dict.fromkeys(names))}"
 

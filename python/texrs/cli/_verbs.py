@@ -233,7 +233,7 @@ def make_views(
     fov: list[float | None] | float | None = None,
     ground: list[Array | None] | None = None,
 ) -> Any:
-    """Return the description of each plane: one for each ground, or the only one."""
+    """Return the known facts about the planes: a list for several masks of the ground, else a single `PlaneView`."""
     from texrs.planes import PlaneView
 
     given = {"corners": corners, "slant": slant, "tilt": tilt, "fov": fov, "ground": ground}

@@ -242,7 +242,7 @@ class CornerTiles(InParts):
         Parameters
         ----------
         origin : int or (int, int)
-            First pixel of the window, any integers within 10^15.
+            First pixel of the window: integers from -10^15 to 10^15.
         size : int or (rows, columns)
             Size of the window in pixels.
         progress : callable or True, optional
@@ -367,7 +367,7 @@ class CornerTiles(InParts):
 
     def _as_origin(self, origin: int | Sequence[int]) -> tuple[int, int]:
         values = (origin, origin) if isinstance(origin, int | np.integer) else origin
-        pair = as_tuple(values, "origin", 2, f"2 integers within {MAX_COORDINATE}")
+        pair = as_tuple(values, "origin", 2, f"2 integers from -{MAX_COORDINATE} to {MAX_COORDINATE}")
         row, column = (as_int(v, "origin", -MAX_COORDINATE, MAX_COORDINATE) for v in pair)
         return row, column
 

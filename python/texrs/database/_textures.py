@@ -223,8 +223,7 @@ class TextureDatabase:
             name = FilePath(file).stem
             if not NAME.fullmatch(name):
                 raise InvalidInput(
-                    f"image: {name!r} cannot be the name of a texture, only letters, digits, '.', '_' and '-' can; "
-                    "give a name"
+                    f"image: its file name must consist of letters, digits, '.', '_' and '-', got {name!r}; pass a name"
                 )
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise InvalidInput(f"name: must be up to 100 letters, digits, '.', '_' and '-', got {name!r}")

@@ -452,7 +452,7 @@ def load(path: Path) -> ElementAnalysis:
 
     def choose(headers: Mapping[str, Header]) -> list[str]:
         if MARK not in headers:
-            raise FileError(f"{path}: not an analysis of a texture's elements")
+            raise FileError(f"{path}: is not an analysis of a texture's elements")
         return choose_parts(headers, path)
 
     # Check the headers first, so that a file of another kind is not read.

@@ -463,7 +463,7 @@ class Exemplar:
             # Check the size before reading: an analysis takes tens of bytes per sample over all levels.
             size = sum(header.size for name, header in headers.items() if "/" in name)
             if any(name not in headers for name in ("format", "image", "said")):
-                raise FileError(f"{path}: not a saved exemplar")
+                raise FileError(f"{path}: is not a saved exemplar")
             samples, few = prod(headers["image"].shape), max(headers[name].size for name in ("format", "said"))
             if samples > 4 * MAX_PIXELS or size > _ANALYSED * samples + _SAID or few > _SMALL:
                 raise FileError(f"{path}: the file is damaged ({samples} samples, {size} bytes of analysis)")
@@ -472,7 +472,7 @@ class Exemplar:
         arrays = read_arrays(path, choose=choose)
         try:
             if int(arrays.get("format", np.array(-1)).reshape(())) != FORMAT:
-                raise FileError(f"{path}: not an exemplar of this version of texrs")
+                raise FileError(f"{path}: is not an exemplar of this version of texrs")
             axes, labels, *repeat = (int(s) for s in arrays["said"])
             made = cls(
                 arrays["image"],

@@ -48,7 +48,7 @@ class Field(ABC):
     Attributes
     ----------
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Examples
     --------
@@ -221,7 +221,7 @@ class Field(ABC):
                 f"origin: must be an integer, or {self.axes} of them; got {first.dtype} of {first.shape}"
             )
         if max(map(abs, first.tolist())) > FAR:
-            raise InvalidInput(f"origin: must be integers within {FAR} of 0, got {first.tolist()}")
+            raise InvalidInput(f"origin: must be integers from -{FAR} to {FAR}, got {first.tolist()}")
         spread, given = as_float(step, "step", 2.0**-20, 2.0**20), as_bool(jacobians, "jacobians")
         out = np.empty((prod(sides), self.axes, self.axes), np.float32)
         for start in range(0, len(out), _BLOCK):

@@ -105,7 +105,7 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
             f"got {given.dtype} of {given.shape}"
         )
     if axes is not None and field.axes != as_axes(axes):
-        raise InvalidInput(f"must have {axes} axes, got shape {given.shape}, a field of {field.axes} axes")
+        raise InvalidInput(f"must have {axes} axes, got shape {given.shape}, a field with {field.axes} axes")
     return field
 
 
@@ -121,7 +121,7 @@ def as_field(
         file contains such an array (`read`). Options of `from_directions` may follow its name, as in
         ``flow.npy:along=z,order=xyz`` (also ``up=1x0x0`` and ``signed=no``).
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
     extent : sequence of int, optional
         Voxels that arrays cover, and the size for words. By default one for each vector.
     spacing : sequence of float, optional
@@ -169,14 +169,14 @@ def _make_field(value: object, axes: int, extent: Sequence[int] | None) -> Field
     """Return a value as a field in units of voxels."""
     if isinstance(value, Field):
         if value.axes != axes:
-            raise InvalidInput(f"field: must be a field of {axes} axes, got {value}")
+            raise InvalidInput(f"field: must be a field with {axes} axes, got {value}")
         return value
     if isinstance(value, str | os.PathLike):
         name, words = _split(value) if isinstance(value, str) else (os.fspath(value), "")
         return read(FilePath(name), extent, axes=axes, **_parse_options(words))
     given = try_array(value)
     if given.dtype.kind not in "buif" or given.ndim < 3:
-        raise InvalidInput(f"field: must be a field of {axes} axes, got {type(value).__name__}")
+        raise InvalidInput(f"field: must be a field with {axes} axes, got {type(value).__name__}")
     try:
         return make(given, extent, axes=axes)
     except InvalidInput as error:

@@ -91,7 +91,7 @@ class Zigzag(Field):
     def _check_steps(self, steps: Sequence[float]) -> None:
         least = 2 * steps[self.across]
         if self.period < least:
-            raise InvalidInput(f"period: must be at least 2 voxels, {least:g}, got {self.period:g}")
+            raise InvalidInput(f"period: must be at least {least:g} (2 voxels), got {self.period:g}")
 
     def describe(self) -> str:
         letters = LETTERS[self.axes - 2]

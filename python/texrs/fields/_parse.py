@@ -60,7 +60,7 @@ def parse(
     text : str
         ``name`` or ``name:key=value,key=value``. A centre is written ``16x24.5x0``. `names` lists the fields.
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
     size : sequence of int, optional
         Size of the output. It sets parameters that are not given, as in `Field.over`.
     spacing : sequence of float, optional

@@ -154,7 +154,7 @@ def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: in
         this point, not on other points or earlier calls. A field can be pickled if its function can. Such a field has
         no `Field.key`.
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------

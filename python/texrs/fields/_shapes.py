@@ -22,7 +22,7 @@ def identity(axes: int = 3) -> Field:
     Parameters
     ----------
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def rotation(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
         Two of "x" (columns), "y" (rows) and "z" (planes). A positive angle in "xy" is clockwise on the screen, where
         rows grow downwards.
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
     plane : str
         Two of "x", "y" and "z".
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------
@@ -201,7 +201,7 @@ def circular(
         Point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
         `Field.over`), or the origin of an unbounded one.
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------
@@ -247,7 +247,7 @@ def spiral(
         Point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
         `Field.over`), or the origin of an unbounded one.
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------
@@ -288,7 +288,7 @@ def zigzag(
     plane : str
         Plane of rotation: two of "x", "y" and "z", as in `rotation`.
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------
@@ -331,7 +331,7 @@ def scale_ramp(
         Length of the growth in voxels, or in the unit of the spacing if one is given; more than 0. By default up to
         the last voxel of a bounded output (see `Field.over`), or 128 for an unbounded one.
     axes : int
-        2 or 3.
+        Number of axes, 2 or 3.
 
     Returns
     -------

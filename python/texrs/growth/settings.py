@@ -32,7 +32,7 @@ class Settings:
         ``continuation``: cost of continuing exactly where a neighbour ends. ``repetition``: cost of showing the same
         samples as a neighbour.
     acceptance : float
-        Acceptance threshold: the required improvement of a drawn match over the present one.
+        Acceptance threshold: the minimum improvement of a random match over the present one.
     coherence : float
         Coherence penalty: cost of each neighbour that does not continue the same piece of the exemplar.
     settled : float

@@ -68,7 +68,7 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
         file = _open(path)
         # The package leaves out parts that are damaged.
         if len(file.parts) != len(heads):
-            raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
+            raise FileError(f"{path}: is cut off or corrupt; some of its pixels are missing")
         for number, head in enumerate(heads):
             channels = file.channels(number)
             if any((each.xSampling, each.ySampling) != (1, 1) for each in channels.values()):

@@ -367,7 +367,7 @@ def _check_whole(path: Path, kind: str, image: Any, file: bytes) -> None:
             and image.tile[0][0] == "dds_rgb"
             and len(file) - 128 < image.width * image.height * (image.tile[0][3][0] // 8)
         ):
-            raise FileError(f"{path}: is cut off; not all of its pixels are there")
+            raise FileError(f"{path}: is cut off; some of its pixels are missing")
         if getattr(image, "pixel_format", "").startswith("BC6H"):
             assume(f"{path}: {image.pixel_format} holds floats; read as 8 bits, values above 1 as 1")
     if kind == "psd" and any(number == 1057 and data[4:5] == b"\0" for number, _, data in image.resources):

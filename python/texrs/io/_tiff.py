@@ -91,7 +91,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
                 raise
             return _read_otherwise(path, series, sides, channels, limit), orientation
         if array.shape != series.shape:
-            raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
+            raise FileError(f"{path}: is cut off or corrupt; some of its pixels are missing")
         order = [a for a in series.axes if a not in "YXSC"] + [a for a in "YXCS" if a in series.axes]
         array = array.transpose([series.axes.index(a) for a in order]).reshape(*sides, channels)
         return _part_alpha(path, _apply_colours(path, np.ascontiguousarray(array), first), first), orientation
@@ -346,12 +346,12 @@ def _check_tags(path: Path, tif: Any, page: Any) -> None:
     for _ in range(count):
         code = int.from_bytes(file.read(layout.tagsize)[:2], order)
         if code == 0 or (code in _SHAPING and code not in page.tags):
-            raise FileError(f"{path}: is cut off or corrupt; not all of its tags are there")
+            raise FileError(f"{path}: is cut off or corrupt; some of its tags are missing")
 
 
 def _check_segments(path: Path, series: Any, length: int) -> None:
     """Check that all strips and tiles are in the file, because missing ones would be read as zeros."""
-    cut = FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
+    cut = FileError(f"{path}: is cut off or corrupt; some of its pixels are missing")
     if series.dataoffset is not None and series.dataoffset + series.nbytes > length:
         raise cut
     for page in series.pages:

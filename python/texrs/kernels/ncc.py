@@ -68,7 +68,7 @@ class Correlation:
         -------
         (H - h + 1, W - w + 1, C) float32
             Correlation coefficient of each window and channel, -1 to 1, stored at the first pixel of the window. It is 0
-            if the window or the template is constant. Values are rounded to 20 bits after the point.
+            if the window or the template is constant. Values are rounded to 20 fractional bits.
 
         Raises
         ------

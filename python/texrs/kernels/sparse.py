@@ -109,12 +109,12 @@ class Cholesky:
         return 8 * self._inner.entries
 
     def solve(self, sides: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Return the solutions for one or several right sides.
+        """Return the solutions for one or several right-hand sides.
 
         Parameters
         ----------
         sides : (n,) or (n, k) array_like
-            Right sides, one in each column; any real dtype.
+            Right-hand sides, one in each column, of any real dtype.
 
         Returns
         -------

@@ -49,7 +49,7 @@ class Exports(Mapping[str, Map]):
             Direction of the light in degrees: counter-clockwise from the right, so 135 is the upper left; and
             elevation above the surface, 1 to 90.
         side : int
-            Maximum pixels of the longer side of the image. Larger materials are averaged.
+            Maximum length of the longer side of the image in pixels. Larger materials are averaged.
 
         Returns
         -------

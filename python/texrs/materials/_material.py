@@ -42,7 +42,7 @@ CHANNELS: dict[Role, tuple[int, ...]] = {
 AT_ONCE = 2
 """Number of maps that are made in parallel. Each takes up to 0.4 GB in addition to its result."""
 SHOWN = 512
-"""Maximum pixels of the longer side in a notebook."""
+"""Maximum length of the longer side in a notebook, in pixels."""
 
 
 class Material(Exports):

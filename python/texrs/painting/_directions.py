@@ -261,7 +261,7 @@ def _read_axis(text: str, whole: str) -> Floats64:
         axis = np.zeros(0)
     if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
         raise InvalidInput(
-            "directions: must be x, y, z, or three numbers such as 1,0,1 (also after around:); or curvature, curvature:least, "
+            "directions: must be an axis (x, y, z, or numbers such as 1,0,1), around: and an axis, curvature, curvature:least, "
             f"or strokes in .json; got {whole!r}"
         )
     return np.asarray(axis / np.sqrt((axis**2).sum()))

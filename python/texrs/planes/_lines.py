@@ -287,7 +287,7 @@ class _Mixture:
         return np.asarray(np.arctan2(ways[:, 1], ways[:, 0]))
 
     def step(self) -> tuple[Reals, Reals]:
-        """Assign lines to directions; return the normal matrix and right side for the change of rise and angles."""
+        """Assign lines to directions; return the normal matrix and right-hand side for the change of rise and angles."""
         # Density in the image, at the direction of each line, of random directions on the plane.
         flat = self._flatten(self.ways)
         aside = self._flatten(np.stack([-self.ways[:, 1], self.ways[:, 0]], axis=-1))

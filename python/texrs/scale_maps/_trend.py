@@ -25,7 +25,7 @@ _POINTS = 2**14
 _FEWEST = 256
 _ROUNDS = 30
 _DIGITS = 10
-"""Digits after the point of fitted coefficients, whose terms are about 1."""
+"""Decimal places of fitted coefficients, whose terms are about 1."""
 _TUNING = 1.345
 """Threshold of Huber's weights, in standard deviations: 95 % as efficient as least squares on data without outliers."""
 

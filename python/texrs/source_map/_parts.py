@@ -76,7 +76,7 @@ class Parted(ABC):
                     f"jacobian: must be a NumPy array, a field or None, got {type(self.jacobian).__name__}"
                 )
             if self.jacobian.axes != axes:
-                raise InvalidInput(f"jacobian: must be a field of {axes} axes as the map, got {self.jacobian.axes}")
+                raise InvalidInput(f"jacobian: must be a field with {axes} axes like the map, got {self.jacobian.axes}")
         if not isinstance(self.shapes, Sequence) or not all(_is_shape(s, axes) for s in self.shapes):
             raise InvalidInput(f"shapes: each must have {axes} sides, integers of at least 1, got {self.shapes}")
         if self.exemplar.size and int(np.asarray(self.exemplar).max()) >= len(self.shapes):

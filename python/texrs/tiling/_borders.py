@@ -33,7 +33,7 @@ STRICT, OUT_OF_STEP = 0.5, 1.5
 """Least correlation of a lattice that must continue across a border, and largest ratio of the differences to the image
 a period away. The factor is relative to the largest difference elsewhere."""
 DIGITS = 4
-"""Digits of a figure after the point: the last bits of a mean depend on the processor."""
+"""Decimal places of a figure. The last bits of a mean depend on the processor."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ TINY = 0.002
 LEAST = 0.05
 """Least figure of a level. Without it, a level without a step would decide the mean of all levels."""
 DIGITS = 4
-"""Digits of a figure after the point: the last bits of a mean depend on the processor."""
+"""Decimal places of a figure. The last bits of a mean depend on the processor."""
 
 
 def measure_steps(guide: Floats, source: SourceMap, wrap: Sequence[bool]) -> tuple[float | None, float | None]:

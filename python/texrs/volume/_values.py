@@ -56,7 +56,7 @@ def check_field(field: object, axes: int) -> Field | None:
     """Check that a field, if given, has a number of axes, and return it."""
     if field is not None and (not isinstance(field, Field) or field.axes != axes):
         got = field if isinstance(field, Field) else type(field).__name__
-        raise InvalidInput(f"field: must be a field of {axes} axes, got {got}")
+        raise InvalidInput(f"field: must be a field with {axes} axes, got {got}")
     return field
 
 

@@ -22,7 +22,7 @@ from texrs.volume._values import as_direction
 __all__ = ["oblique_slice", "render_block", "slices", "turntable"]
 
 _LARGEST = 4096
-"""Maximum pixels a side of images of blocks."""
+"""Maximum side of images of blocks, in pixels."""
 _MOST = 2**26
 """Maximum total pixels of a turntable."""
 _MARGIN = 1.04

@@ -153,7 +153,7 @@ def _as_stops(transfer: Sequence[Stop]) -> NDArray[np.float64]:
     rows = []
     for stop in transfer:
         if not isinstance(stop, Sequence) or len(stop) != 3:
-            raise InvalidInput(f"transfer: must be (value, colour, alpha), got {str(stop)[:60]}")
+            raise InvalidInput(f"transfer: each stop must be (value, colour, alpha), got {str(stop)[:60]}")
         value, colour, alpha = stop
         given = colour is not None
         rgb = _as_colour(colour) if given else (0.0, 0.0, 0.0)

@@ -7,7 +7,7 @@
 
 use crate::{Error, Result};
 
-/// Number of binary digits after the point.
+/// Number of fractional bits.
 pub const BITS: u32 = 12;
 /// The fixed-point value of one sample.
 pub const ONE: i32 = 1 << BITS;

@@ -55,7 +55,7 @@ def iterate(start: float, growth_rate: float = 2.0, count: int = 64, *, burn_in:
 
 
 def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Iterator[float]:
-    """Return the values of `iterate` one by one, without an end. A bad start is refused at once.
+    """Return the values of `iterate` one by one, without an end. An invalid start raises an error at once.
 
     Examples
     --------

@@ -61,7 +61,7 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
 def follow_field(field: Field, size: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return cosines and sines of the rotations nearest to the frames of a field."""
     if field.axes != 2:
-        raise InvalidInput(f"direction: must be a field of 2 axes, got one of {field.axes}")
+        raise InvalidInput(f"direction: must be a field with 2 axes, got {field.axes}")
     j = field.over(size).lattice(size).astype(np.float64)
     return normalise(j[..., 0, 0] + j[..., 1, 1], j[..., 0, 1] - j[..., 1, 0])
 

@@ -36,7 +36,7 @@ Departures of the corrections:
   From jitter, sparse particles never form, whatever the correction does.
 - The cost of a block is divided by its own contrast. With squared differences alone blocks of low contrast win, and
   rare elements become rarer.
-- The correction changes a point for a drawn match only if the gain is more than twice the exemplar's own spacing.
+- The correction changes a point to a random match only if the gain is more than twice the exemplar's own spacing.
   Otherwise repeated corrections remove rare elements.
 - A pass corrects every other point, as on a chess board, and only where pieces of the exemplar meet. If all points
   change at once, neighbours on both sides of a seam swap and nothing is gained. Votes, which solved this, cost a third

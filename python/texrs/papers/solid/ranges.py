@@ -26,7 +26,7 @@ def as_origin(origin: object, axes: int) -> tuple[int, ...]:
         ends = [_as_end(v) for v in values]
         if None not in ends:
             return tuple(int(v) for v in values)
-    raise InvalidInput(f"origin: must be {axes} integers within {MAX_COORDINATE}, got {origin!r}")
+    raise InvalidInput(f"origin: must be {axes} integers from -{MAX_COORDINATE} to {MAX_COORDINATE}, got {origin!r}")
 
 
 def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
@@ -51,7 +51,9 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
         else:
             raise InvalidInput(f"texture: must be indexed by integers and ranges, {_ORDER[axes]}; got {part!r}")
         if start is None or stop is None:
-            raise InvalidInput(f"texture: must have a range of integers within {MAX_COORDINATE}, got {_spell(part)}")
+            raise InvalidInput(
+                f"texture: must have a range of integers from -{MAX_COORDINATE} to {MAX_COORDINATE}, got {_spell(part)}"
+            )
         if stop <= start:
             raise InvalidInput(f"texture: must not have an empty range, got {_spell(part)}")
         origin.append(start)

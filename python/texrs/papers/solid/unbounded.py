@@ -165,7 +165,7 @@ class Texture(Endless):
         Parameters
         ----------
         origin : int, or one per axis
-            First voxel in the world, any integers within 10^9.
+            First voxel in the world: integers from -10^9 to 10^9.
         size : int, or one per axis
             Number of voxels along each axis.
         progress : callable or True, optional
@@ -242,7 +242,7 @@ class Texture(Endless):
         Parameters
         ----------
         points : (..., 2) or (..., 3) array_like
-            (row, column) or (plane, row, column), in voxels of the world with centres at the integers, within 10^9.
+            (row, column) or (plane, row, column), in voxels of the world with centres at the integers, from -10^9 to 10^9.
         interpolation : {"nearest", "linear", "cubic"}, optional
             Interpolation between the exemplar's samples. None is the texture's own. Labels always use the nearest
             sample.

@@ -101,7 +101,7 @@ def compose_edit(a: ElementAnalysis, laid: Rearrangement, *, seed: int, screenin
 
 
 def say_finish(source: SourceMap, screening: float, within: Bools | None = None) -> SourceMap:
-    """Set how the seams of an image are hidden."""
+    """Return a source map with the options that hide the seams of a splice."""
     if not screening:
         return source.with_finish((False, False), interpolation="nearest")
     # Coordinates are whole pixels, where "linear" equals "nearest". Only "linear" permits a correction.

@@ -3,7 +3,7 @@
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
-/// Maximum number of samples along an axis: places have 12 of 32 bits after the point, and steps must fit too.
+/// Maximum number of samples along an axis: places have 12 fractional bits of 32, and steps must fit too.
 const SIDE: usize = 1 << 18;
 
 /// Samples whose windows are inside an exemplar.

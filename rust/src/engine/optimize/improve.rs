@@ -15,7 +15,7 @@ const DRAWS: usize = 6;
 struct Search {
     noise: Noise,
     number: u32,
-    /// The minimum improvement of a drawn match.
+    /// The minimum improvement of a random match.
     limit: i64,
     /// The cost of each neighbour that shows another patch of the exemplar.
     coherence: i64,
@@ -128,7 +128,7 @@ impl<const D: usize> Level<'_, D> {
                 }
             }
         }
-        // Stop here if no drawn match can be better by the limit: windows of the exemplar are hardly ever nearer than
+        // Stop here if no random match can be better by the limit: windows of the exemplar are hardly ever nearer than
         // their spacing.
         if least <= search.limit + search.limit / 2 {
             return best;

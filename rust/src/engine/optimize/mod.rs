@@ -10,7 +10,7 @@
 //!    drawn around the best.
 //! 3. It votes: it takes one of the coordinates that the windows around the point propose.
 //!
-//! There are three departures from the papers. A drawn match must be better by a multiple of the exemplar's own
+//! There are three departures from the papers. A random match must be better by a multiple of the exemplar's own
 //! spacing (an acceptance threshold). So good matches stay, and sparse features are not washed out. A point is skipped
 //! if all its neighbours show the same patch of the exemplar, because only borders of patches need corrections. It is
 //! also skipped if nothing around it has changed since its last correction. The frame's Jacobian displaces a window or
@@ -54,7 +54,7 @@ pub struct Options {
     pub exhaustive: bool,
     /// Distance of the neighbours whose matches are tried, 1 or 2 points.
     pub reach: i32,
-    /// Acceptance threshold: the minimum improvement of a drawn match, in units of the exemplar's spacing.
+    /// Acceptance threshold: the minimum improvement of a random match, in units of the exemplar's spacing.
     pub acceptance: f64,
     /// Coherence penalty: the cost of each neighbour that shows another patch of the exemplar, in units of the
     /// exemplar's spacing.

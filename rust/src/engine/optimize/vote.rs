@@ -5,7 +5,7 @@ use crate::engine::appearance::{CHANNELS, Colour, UNIT};
 use crate::foundation::fixed::{Place, add, apply, nearest};
 use crate::foundation::libm::exp;
 
-/// Standard deviation of the weights of proposals over the distance of their windows, in points.
+/// Standard deviation of the Gaussian that weights a proposal by the distance of its window, in points.
 const SIGMA: f64 = 2.0;
 /// Handicap of a proposal from a distant window, in units of the variance of colours.
 const DISTANCE: f64 = 0.03;

@@ -27,7 +27,7 @@ use pool::halve;
 use window::Around;
 pub use window::{Span, Window};
 
-/// The place of a pixel that shows nothing yet.
+/// Marks a pixel that is not copied from any place yet.
 const FREE: u32 = u32::MAX;
 /// Number of matches of the pool that are cut in.
 const CANDIDATES: usize = 3;

@@ -126,7 +126,7 @@ def take_points(
     # Points on one line have no cells between them.
     area = float(np.median(counts[counts > 0])) * step**2 if counts.any() else layout.scale**2
     factor = unit / float(np.sqrt(area)) if scale is None else scale
-    # Cells extend as far as they are wide.
+    # Assume that no cell extends further from its point than the width of a typical cell.
     wide = max(unit, factor * float(np.sqrt(area)))
     margin = int(np.ceil(MARGIN * wide))
     middle, origin = (np.array(size) - 1) / 2, (low + high) / 2 if centre is None else centre

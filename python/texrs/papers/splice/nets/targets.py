@@ -38,7 +38,7 @@ class Targets:
     scale : float
         Scale factor of the layout.
     continued : str
-        How the layout continues beyond its image: "lattice", "wrap", "quilted", "reflected", or "".
+        How the layout continues beyond its image: "lattice", "wrap", "quilted", "reflected", or "" if it need not.
     start : (n, 2) float64, optional
         Origin of each knot among A's own, if it moves only a share of its way.
 
