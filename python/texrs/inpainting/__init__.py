@@ -82,42 +82,43 @@ def inpaint(
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another image to copy from, of the same dtype and channels. Default: the known pixels of ``image``.
     allowed : (H, W) array, path or Mask, optional
-        Mask of the pixels that patches may be copied from, such as the floor without the sky above it. Default: all known
-        pixels. It cannot be combined with ``exemplar`` or with "optimise".
+        Mask of the pixels that patches may be copied from, such as the floor without the sky above it. It cannot be
+        combined with ``exemplar`` or with "optimise". Default: all known pixels.
     scale_map : {None, "auto"} or (H, W) float array, optional
         Size of the elements at each pixel (`texrs.scale_maps`), for images taken at an angle. The hole is then filled with
         elements of the right size [2]_. "auto": the map of the plane that is found (`texrs.planes.find`), or a measured map
         (`texrs.planes.measure_scale`). Values in the hole may be NaN, because the map is continued there.
     exemplar_scale_map : {None, "auto"} or (h, w) float array, optional
-        Size of the elements in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in an image taken from
-        the front. Measured maps have a geometric mean of 1.
+        Size of the elements in ``exemplar``, in the units of ``scale_map``. Measured maps have a geometric mean of 1.
+        Default: 1 everywhere, as in an image taken from the front.
     scale_kind : {"width", "area"}, optional
         Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
         "area", square roots of areas. None: the quantity that fits each map best, as a map of a plane.
     method : {"patch", "optimise"}
-        "patch": patches that match the surroundings, joined along cuts [1]_. If the scale map is that of a plane, patches
-        of the plane are projected into the hole, except with an ``exemplar``. "optimise": windows are corrected until each
-        is similar to a window of the image or of ``exemplar``, resized by the scale map [2]_. It is for large holes, where
-        patches would repeat the surroundings.
+        Method of filling. "patch": patches that match the surroundings are joined along cuts [1]_. If the scale map is
+        that of a plane, patches of the plane are projected into the hole, except with an ``exemplar``. "optimise":
+        windows are corrected until each is similar to a window of the image or of ``exemplar``, resized by the scale
+        map [2]_. It is for large holes, where patches would repeat the surroundings. Default: "patch".
     patch_size : int, optional
-        Side of a patch in pixels, at least 4: about the size of the elements. By default several sides are tried: 0.75 to 4
-        times 1/6 of the shorter side (12 to 32). Large holes are tried in a small copy. The side with the least visible
-        seams is kept. With a scale map, the side is 1/6, and up to 1/4 for a plane. "optimise" has no patches, and refuses a
-        side. Volumes: at least 6. By default 12 to 32, depending on the hole. Smaller sides are tried if the border of the
-        hole is visible.
+        Side of a patch in pixels, at least 4. It should be about the size of the elements. Large holes are tried in a
+        small copy. With a scale map, the side is 1/6 of the shorter side, and up to 1/4 for a plane. "optimise" has no
+        patches, and does not accept a side. Volumes: at least 6, and 12 to 32 by default, depending on the hole.
+        Smaller sides are tried if the border of the hole is visible. Default: the side with the least visible seams
+        among 0.75 to 4 times 1/6 of the shorter side (12 to 32).
     boundary_width : int
-        Width in pixels of a band around the hole that may be replaced too, 0 to 1024. The seam can then follow the least
-        visible path. 0: known pixels do not change.
+        Width in pixels of a band around the hole that may also be replaced, 0 to 1024. The seam can then follow the
+        least visible path. If 0, known pixels do not change. Default: 0.
     allow_mirror : bool, optional
-        If True, patches may be mirrored; use False for textures with letters. By default patches are mirrored along axes
-        where the surroundings are symmetric: light from one side is not. With a scale map patches are not mirrored, because
-        an oblique view is not symmetric.
+        If True, patches may be mirrored. Use False for textures with letters. With a scale map patches are not
+        mirrored, because an oblique view is not symmetric. Default: True along axes where the surroundings are
+        symmetric, which excludes light from one side.
     screening : float, optional
-        Weight of the values in the correction of colours at seams, 0 to 1e6. A smaller weight gives a wider correction.
-        0.003 is good for patches of the image, and a smaller weight for an ``exemplar`` in other light.
-        None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the hole. Volumes:
-        None is 0.1, and 0 for labels (integers with at most 16 values), which are never mixed. The correction of a volume is
-        not in its source map: other volumes that are rendered through the map have no correction.
+        Weight of the original values when colours are corrected to hide seams, 0 to 1e6. A smaller weight spreads the
+        correction wider. 0.003 is good for patches of the image, and a smaller weight for an ``exemplar`` in other
+        light. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the
+        hole. Volumes: None is 0.1, and 0 for labels (integers with at most 16 values), which are never mixed. The
+        correction of a volume is not in its source map, so other volumes that are rendered through the map have no
+        correction.
     wrap : bool or (rows, columns), optional
         Axes along which the image is periodic, so that a hole at its border is also filled from the opposite side.
         None: neither axis.
@@ -130,12 +131,12 @@ def inpaint(
     -------
     Synthesis
         The filled image, in the dtype and with the channels of the input. Its source map points into the image, or
-        into ``[image, exemplar]``. Pixels that are kept map to themselves, and no pixel maps into the hole. Replace NaN in
-        the hole by any number before you render an image through the map.
+        into ``[image, exemplar]``. Pixels that are kept map to themselves, and no pixel maps into the hole. Replace
+        NaN in the hole by any number before you render an image through the map.
 
         Stages:
 
-        - ``known``: The image with its hole in one colour.
+        - ``known``: The image, with its hole in one colour.
         - ``patches``: Each patch in a shade of its own.
         - ``before_blending``: The result before colours are corrected.
 
@@ -193,7 +194,7 @@ def inpaint(
     """
     progress = listen(progress)
     as_method(method, "patch", "optimise")
-    # Options without a meaning in volumes are errors, not ignored.
+    # Options that are not available for volumes are errors, not ignored.
     if is_volume(image, mask):
         flat = {
             "exemplar": exemplar is not None,
@@ -293,7 +294,7 @@ def inpaint(
         result = apply(places, pictures, progress=progress)
     watch("done", 1.0)
     bare = pictures[0].copy()
-    # The hole is painted over with a known pixel, which does not change the least value.
+    # Fill the hole with the smallest known value for the stage, so that its range does not change.
     bare[open_] = 0 if open_.all() else bare.min()
     shades = np.zeros(open_.shape, np.uint8)
     shades[new] = 55 + places.label[new] * 67 % 200
@@ -319,7 +320,7 @@ def inpaint(
 
 
 def _check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
-    """Return the pixels that patches may be copied from: known pixels, and only allowed ones if there is a mask of them."""
+    """Return the known pixels that patches may be copied from, limited by the mask ``allowed`` if it is given."""
     if allowed is None:
         return ~open_
     if not fits:

@@ -31,7 +31,7 @@ AROUND = 2.0
 
 
 def see_plane(picture: Array, open_: Bools, scale: Floats) -> Slope | None:
-    """Return the plane whose scale map equals that of an image with holes, if such a plane exists."""
+    """Return the plane of the scale map of an image with holes, or None if it is not the map of a plane."""
     return find_plane(guidance(as_image(paint_over(picture, open_))), np.ascontiguousarray(scale), find_kind(scale))
 
 

@@ -160,7 +160,7 @@ def look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -
 
 
 def paint_over(picture: Array, open_: Bools) -> Array:
-    """Paint over holes with the nearest known colours, which the windows at their boundary then contain."""
+    """Fill holes with the nearest known colours, which windows at their boundary are compared with."""
     from scipy.ndimage import distance_transform_edt
 
     if not open_.any():
@@ -168,7 +168,7 @@ def paint_over(picture: Array, open_: Bools) -> Array:
     box = []
     for axis in range(2):
         marked = np.flatnonzero(open_.any(axis=1 - axis))
-        # The known pixels next to the holes are nearer than all others.
+        # The nearest known pixels are next to the holes, so search only there.
         box.append(slice(max(0, int(marked[0]) - 1), int(marked[-1]) + 2))
     part = tuple(box)
     nearest = distance_transform_edt(open_[part], return_distances=False, return_indices=True)

@@ -1,4 +1,4 @@
-"""Visibility of the seams of a filled hole: how badly patches continue into their neighbours."""
+"""Visibility of the seams of a filled hole: a measure of how badly patches continue into their neighbours."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def judge_seams(filled: Filled, source: Floats, free: Bools, wrap: tuple[bool, b
     source : (h, w, C) float32
         Image that the patches were copied from.
     free : (h, w) bool
-        What is known of it.
+        Its known pixels.
     wrap : (bool, bool)
-        Axes along which the picture is cyclic.
+        Axes along which the image is periodic.
 
     """
     cost = 0.0
@@ -68,7 +68,7 @@ def judge_seams(filled: Filled, source: Floats, free: Bools, wrap: tuple[bool, b
 def _look_beyond(
     filled: Filled, source: Floats, free: Bools, place: Places, way: NDArray[np.intp]
 ) -> tuple[Floats, Bools]:
-    """Return what the patch of each place shows a step on, and whether that is known."""
+    """Return the source colours one step beyond each place, and whether they are known."""
     label = filled.label[place]
     # Use a sum of two products, which gives the same result on all processors.
     down, right = np.moveaxis(filled.frames[label] * way.astype(np.float32), -1, 0)

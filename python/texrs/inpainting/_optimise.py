@@ -87,7 +87,7 @@ def optimise(
     region = look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
     row, column = np.mgrid[part]
-    # The picture is the first copy of the atlas.
+    # The image is the first copy in the atlas.
     shown = np.stack([row, column], axis=-1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
     grown = grow_from_atlas(
         atlas,

@@ -1,4 +1,4 @@
-"""An image with holes, and the pixels that they may be filled from; also at half the size."""
+"""An image with holes, the pixels that fill them, and both at half the size."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Scene:
 
     @property
     def holes(self) -> int:
-        """Pixels to be filled."""
+        """Number of pixels to fill."""
         return int(np.count_nonzero(~self.known))
 
     def halve(self) -> Scene:
