@@ -434,7 +434,7 @@ def test_the_surface_shows_whether_y_is_up(down: bool, height: bool, bare: bool,
         io.write(tmp_path / "rock_height.png", 255 - draw_channel("height"))
     material = Material.read(tmp_path)
     assert material["normal"].role.down is down
-    side, shown = ("down" if down else "up"), "the heights" if height else "the slopes"
+    side, shown = ("down" if down else "up"), "the heights, in which white is deep," if height else "the slopes"
     assert f"rock_normal: read as normals with y {side}, as {shown} show" in material.notices.assumed
 
 

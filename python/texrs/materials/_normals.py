@@ -102,7 +102,9 @@ def measure_y(each: Map, maps: Mapping[str, Map]) -> tuple[bool, float, str]:
         down, across = (np.asarray(g) for g in np.gradient(heights[rows, columns].astype(np.float64)))
         found = _correlate(right, across), _correlate(along, down)
         if min(abs(found[0]), abs(found[1])) >= ENOUGH:
-            return found[0] * found[1] < 0, min(abs(found[0]), abs(found[1])), "the heights"
+            # Both correlations are negative if the heights are depths, which are dark where the surface is high.
+            by = "the heights" if found[0] > 0 else "the heights, in which white is deep,"
+            return found[0] * found[1] < 0, min(abs(found[0]), abs(found[1])), by
     curl = _correlate(np.gradient(right)[0], np.gradient(along)[1])
     return curl < 0, abs(curl), "the slopes"
 
