@@ -104,7 +104,7 @@ def extend(
         - ``replaced_outside``: Number of known pixels that changed.
         - ``boundary_width``: Width of the band that could change, in pixels.
         - ``screening``: Weight of the values in the colour correction.
-        - ``match_lighting``: Whether slow changes of light were followed.
+        - ``match_lighting``: Whether added pixels follow gradual changes of light.
         - ``seed``: The seed.
         - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in the
           image.
@@ -119,7 +119,7 @@ def extend(
     Warns
     -----
     UserWarning
-        If a plane is found with a confidence below 0.4. It is not followed: give corners or angles.
+        If a plane is found with a confidence below 0.4. It is not used; give corners or angles.
 
     Examples
     --------

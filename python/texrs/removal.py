@@ -107,7 +107,7 @@ def remove(
         - ``replaced_outside``: Number of known pixels that changed.
         - ``boundary_width``: Width of the band that could change, in pixels.
         - ``screening``: Weight of the values in the colour correction.
-        - ``match_lighting``: Whether slow changes of light were followed.
+        - ``match_lighting``: Whether filled pixels follow gradual changes of light.
         - ``seed``: The seed.
         - ``margin``: Pixels that were added around the mask.
         - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in

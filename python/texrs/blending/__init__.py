@@ -103,8 +103,8 @@ def blend(
     known : (h, w) bool or integers, or a sequence of one per exemplar, optional
         Masks of the exemplar pixels that may be used beyond a seam. Default: all.
     across : bool
-        If True, also correct seams between two exemplars. `texrs.design` uses False: flowers end at the edge of moss,
-        and the two would stain each other. Default: True.
+        If True, also correct seams between two exemplars. `texrs.design` uses False, because the colours of flowers
+        and moss would bleed into each other. Default: True.
     parts : (H, W) integers, optional
         Part of each pixel, such as floor or wall. Nothing is corrected where two parts meet. Default: one part.
     outlines : bool
@@ -118,8 +118,8 @@ def blend(
         Type of the map and direction of y, as in `SourceMap.render`. For normals, the slopes are corrected, then
         normals get unit length again. Only the channels that store normals are corrected.
     progress : callable or True, optional
-        Function called as ``progress("blend", share)`` with the completed share; raising stops the work. True shows a
-        bar.
+        Function called as ``progress("blend", share)`` with the completed share. If it raises an exception, the work
+        stops. True shows a bar.
 
     Returns
     -------
@@ -234,8 +234,8 @@ def apply(
     finish : RenderOptions, optional
         Finish. Default: the finish of the source map.
     progress : callable or True, optional
-        Function called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a
-        bar.
+        Function called as ``progress("blend", share)`` while seams are corrected. If it raises an exception, the work
+        stops. True shows a bar.
 
     Returns
     -------

@@ -106,7 +106,7 @@ ENTRIES = replace(
     many=True,
 )
 WHITE = "White pixels are marked. In an image with transparency, opaque pixels are marked."
-WORDS = f"{WHITE} FILE:invert marks the other pixels. FILE:threshold=0.2,grow=4 sets options of texrs remove."
+WORDS = f"{WHITE} FILE:invert marks the other pixels. FILE:threshold=0.2,grow=4 sets --threshold and --grow of texrs remove."
 """Description of masks."""
 MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WORDS, file=True)
 GROUNDS = replace(
@@ -114,20 +114,20 @@ GROUNDS = replace(
     metavar=f"FILE|{FOUND}",
     words=(FOUND,),
     read=lambda texts, about: [None if text == FOUND else read_mask(text, about.axes) for text in texts],
-    note=f"{WORDS} Repeat the option for several planes, one of which may be {FOUND}.",
+    note=f"{WORDS} Repeat the option for several planes. The word {FOUND} lets texrs find the pixels of one.",
     many=True,
 )
 QUOTED = "Four points in quotes, such as '20,20 104,24 110,100 14,112'."
 CORNERS = Kind(
     "X,Y ...",
     lambda texts, about: [None if text == FOUND else parse_corners(text, about) for text in texts],
-    f"{QUOTED} For several planes, repeat the option in the order of --ground. One may be {FOUND}.",
+    f"{QUOTED} For several planes, repeat the option in the order of --ground. The word {FOUND} lets texrs find the plane.",
     many=True,
 )
 EACH = Kind(
     "NUMBER",
     parse_each,
-    f"For several planes, repeat the option in the order of --ground. One may be {FOUND}.",
+    f"For several planes, repeat the option in the order of --ground. The word {FOUND} lets texrs find the value.",
     many=True,
 )
 """One value for each plane of a photograph."""
@@ -136,7 +136,7 @@ OBJECT = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
 FILLED = Kind(
     "FILE|alpha|nan|nodata|VALUE",
     read_hole,
-    "nan: NaN or infinite pixels. nodata: pixels of the value that the file states. VALUE: pixels of this value.",
+    f"{WHITE} nan: NaN or infinite pixels. nodata: pixels of the value that the file states. VALUE: pixels of this value.",
     file=True,
     words=("alpha", "nan", "nodata"),
 )
@@ -144,7 +144,7 @@ MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs 
 SEEN = Kind(
     "FILE|auto",
     lambda text, about: text if text.startswith(PLANE) else read_scale_map(text),
-    "A file that texrs scale-map wrote, front (no perspective), or a plane such as plane:slant=50,tilt=90.",
+    "A file that texrs scale-map wrote, auto (measured), front (no perspective), or plane:slant=50,tilt=90.",
     file=True,
     words=("auto", "front"),
 )
@@ -160,7 +160,9 @@ DIRECTION = Kind(
     "A file of degrees (.npy, .tif), or a field: a name such as circular, or frames (.npz).",
     file=True,
 )
-MAP_OR_AUTO = replace(MAP, metavar="FILE|auto", words=("auto",))
+MAP_OR_AUTO = replace(
+    MAP, metavar="FILE|auto", note="A file that texrs scale-map wrote, or auto to measure the sizes.", words=("auto",)
+)
 NUMBERS = Kind("FILE", read_numbers, "The mean of several channels is used.", file=True)
 AXES = Kind(
     ("default|xy|x|y|none", "default|xyz|...|none"),

@@ -76,7 +76,7 @@ class CornerTiles(InParts):
     variants : int
         Number of tileable images that tiles are cut from, 1 to 64. Each is twice as large as a tile. Default: 4.
     progress : callable or True, optional
-        Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+        Function called as ``progress(stage, share)``. If it raises an exception, the work stops. True shows a bar.
     **options
         Options of `texrs.design_variants`, such as ``motion`` or ``deformation``.
 

@@ -173,7 +173,7 @@ class TextureDatabase:
         similarity : bool
             If True, also compute and store the similarity sets, which save time in later refinements. Default: False.
         progress : callable or True, optional
-            Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+            Function called as ``progress(stage, share)``. If it raises an exception, the work stops. True shows a bar.
         **options
             Options of `texrs.elements.analyse`. They are stored, so that an entry can be analysed again.
 
@@ -287,7 +287,7 @@ class TextureDatabase:
         name : str
             Name of the texture.
         progress : callable or True, optional
-            Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+            Function called as ``progress(stage, share)``. If it raises an exception, the work stops. True shows a bar.
 
         Returns
         -------
@@ -356,7 +356,7 @@ class TextureDatabase:
         size : (rows, columns), optional
             Size of the result in pixels. Default: the size of ``elements``.
         progress : callable or True, optional
-            Function called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+            Function called as ``progress(stage, share)``. If it raises an exception, the work stops. True shows a bar.
         **options
             Options of `texrs.splice`: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``, ``align``,
             ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.
@@ -412,7 +412,8 @@ class TextureDatabase:
             Function called as ``each(a, b, result)`` after each splice, for example to write it. Results are then not
             kept. Memory is limited to one result and about 256 MB of entries, for any number of splices.
         progress : callable or True, optional
-            Function called as ``progress("matrix", share)``; raising stops the work. True shows a bar.
+            Function called as ``progress("matrix", share)``. If it raises an exception, the work stops. True shows a
+            bar.
         **options
             Options of `texrs.splice`: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``, ``align``,
             ``snap_rows``, ``use_cells``, ``use_nets``, ``allow_rotation``, ``refine``, ``screening``.

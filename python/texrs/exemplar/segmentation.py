@@ -53,7 +53,7 @@ class ElementOptions:
         the grid if components are not convincing. Components are not convincing if they cover less than 5 % of the
         image, or one covers more than 25 %. The same holds if they are ragged or of very different sizes. They are
         also not convincing if their outlines have no more contrast than their inside or their surroundings.
-    labels : (H, W) array of int, or a list of one an exemplar, optional
+    labels : (H, W) array of int, or a list of one per exemplar, optional
         Elements marked by hand, where 0 is the background. Replaces the whole segmentation.
 
     Raises

@@ -74,16 +74,15 @@ def inpaint(
         and may be NaN. For a volume, only ``patch_size``, ``boundary_width``, ``screening`` and ``seed`` are allowed;
         the other options are for images.
     mask : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
-        Mask of the pixels to fill, white where pixels are marked. "alpha": all pixels that are not fully opaque.
-        "nan": all pixels that are NaN or infinite. "nodata": the value that the file of the image states for pixels
-        without data. A number: all pixels of this value. Default: all pixels that are masked, NaN or infinite.
-        `texrs.Mask` describes how a mask is read, inverted, grown and feathered. A mask with three axes means a
-        volume.
+        Mask of the pixels to fill. "alpha": all pixels that are not fully opaque. "nan": all pixels that are NaN or
+        infinite. "nodata": all pixels of the value that the file of the image states for missing data. A number: all
+        pixels of this value. See `texrs.Mask` for how a mask is read, inverted, grown and feathered. A mask of three
+        axes means a volume. Default: all pixels that are masked, NaN or infinite.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another image to copy from, of the same dtype and channels. Default: the known pixels of ``image``.
     allowed : (H, W) array, path or Mask, optional
         Mask of the pixels that patches may be copied from, such as the floor without the sky above it. It cannot be
-        combined with ``exemplar`` or with "optimise". Default: all known pixels.
+        combined with ``exemplar`` or ``method="optimise"``. Default: all known pixels.
     scale_map : {None, "auto"} or (H, W) float array, optional
         Size of the elements at each pixel (`texrs.scale_maps`), for images taken at an angle. The hole is then filled with
         elements of the right size [2]_. "auto": the map of the plane that is found (`texrs.planes.find`), or a measured map
@@ -93,7 +92,7 @@ def inpaint(
         Default: 1 everywhere, as in an image taken from the front.
     scale_kind : {"width", "area"}, optional
         Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
-        "area", square roots of areas. None: the quantity that fits each map best, as a map of a plane.
+        "area", square roots of areas. Default: the quantity that fits each map best as a map of a plane.
     method : {"patch", "optimise"}
         Method of filling. "patch": patches that match the surroundings are joined along cuts [1]_. If the scale map is
         that of a plane, patches of the plane are projected into the hole, except with an ``exemplar``. "optimise":
@@ -114,14 +113,14 @@ def inpaint(
         symmetric, which excludes light from one side.
     screening : float, optional
         Weight of the original values when colours are corrected to hide seams, 0 to 1e6. A smaller weight spreads the
-        correction wider. 0.003 is good for patches of the image, and a smaller weight for an ``exemplar`` in other
-        light. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the
-        hole. Volumes: None is 0.1, and 0 for labels (integers with at most 16 values), which are never mixed. The
-        correction of a volume is not in its source map, so other volumes that are rendered through the map have no
-        correction.
+        correction wider. A weight of 0.003 is good for patches of the image, and a smaller weight for an ``exemplar``
+        in other light. If 0, seams are not corrected. See `texrs.blend`, which corrects other maps in the same way,
+        ``within`` the hole. Labels in volumes (integers with at most 16 values) are never mixed. The correction of a
+        volume is not in its source map, so other volumes that are rendered through the map have no correction.
+        Default: no correction of images and labels, 0.1 for other volumes.
     wrap : bool or (rows, columns), optional
         Axes along which the image is periodic, so that a hole at its border is also filled from the opposite side.
-        None: neither axis.
+        Default: none.
     seed : int
         Seed of the random choices of patches that have no known pixels around them. Default: 0.
     progress : callable or True, optional

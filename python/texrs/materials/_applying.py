@@ -37,20 +37,20 @@ def apply(
     finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
-    """Apply a source map to a map of the exemplar, with the finish of the verb that made it.
+    """Apply a source map to a map of the exemplar, and correct it as the result was corrected.
 
-    ``apply(result.source_map, exemplar)`` is ``result.image``, bit for bit, unless elements are lit again
-    (`texrs.splice`). Seams are corrected, samples are interpolated, and known pixels are kept, in the same way. A map
-    without a finish is not corrected.
+    ``apply(result.source_map, exemplar)`` is ``result.image``, bit for bit, unless `texrs.splice` has changed the
+    light on elements. Seams are corrected, samples are interpolated, and known pixels are kept, in the same way. A
+    source map without a finish is not corrected.
 
     Parameters
     ----------
     source : SourceMap
         Source map of an image or a volume.
-    exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one an exemplar
-        Any map of the exemplar's height and width (and depth), any dtype and channels. The name of a file gives its
-        role, as in a folder of maps (`texrs.materials.guess_role`). Each channel of a packed map is looked up by
-        itself.
+    exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one per exemplar
+        Any map with the exemplar's height and width (and depth), of any real dtype and number of channels. The name of
+        a file gives its role, as in a folder of maps (`texrs.materials.guess_role`). Each channel of a packed map is
+        looked up separately.
     map_type : {"colour", "normal", "vector", "label"}, optional
         Type of the map. "colour": also heights and other values that may be mixed. If the finish removes uneven light,
         it does so here. "normal", "vector": normals in tangent space, or directions on the surface. They are rotated
@@ -80,8 +80,8 @@ def apply(
 
     See Also
     --------
-    texrs.SourceMap.render : The look-up alone.
-    texrs.blend : The correction alone, in any strength.
+    texrs.SourceMap.render : The look-up only.
+    texrs.blend : The correction only, in any strength.
 
     Examples
     --------

@@ -206,7 +206,7 @@ def design(
           of the example) and share of ``outliers``.
         - ``operations``: For each copy, the operations on each element. An entry names the ``element``, its ``operations``
           and its ``place``.
-        - ``tiling``: What `texrs.check_tiling` finds along each axis that wraps: ``tiles``, ``seam`` and ``place``.
+        - ``tiling``: Result of `texrs.check_tiling` along each axis that wraps: ``tiles``, ``seam`` and ``place``.
 
     Raises
     ------

@@ -105,7 +105,7 @@ def perspective(
         `texrs.Plane.jacobians`). A target of another size is stretched to the result, borders on borders
         (`texrs.scale_maps.resample`). None: ``scale_map``, stretched.
     target_green : {"up", "down"}
-        Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX).
+        Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX). Default: "up".
     scale_kind : {"width", "area"}, optional
         Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
         "area", square roots of areas. The target has the same quantity. Default: the quantity that fits the scale map
@@ -133,7 +133,7 @@ def perspective(
         Resizing of the exemplar. True: a plane is flattened and shown at any depth, and other exemplars are copied in
         other sizes. "auto": as True, but without copies if the exemplar has enough of every requested scale. False:
         requested scales that it lacks become the nearest existing ones, with a warning. Numbers of 1/8 to 4: copies in
-        these sizes, no plane.
+        these sizes, no plane. Default: "auto".
     wrap : bool or (rows, columns), optional
         Axes along which the result is periodic. Default: none. The target must also be periodic.
     seed : int
