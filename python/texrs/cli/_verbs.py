@@ -85,7 +85,7 @@ def make_verb(name: str) -> Verb:
                 flat,
                 says=lambda made: tell_filled(made) + tell_sizes(made),
                 fills=True,
-                deep=Verb(deep, says=tell_filled, fills=True),
+                deep=Verb(deep, says=tell_filled_volume, fills=True),
             )
         case "design":
             from texrs.cli._check import tell_tiling
@@ -164,6 +164,15 @@ def count_moved(result: Synthesis) -> str:
 def tell_filled(result: Synthesis) -> str:
     """Return the filled share of the image."""
     return f", {100 * result.report['filled']:.3g} % filled"
+
+
+def tell_filled_volume(result: Synthesis) -> str:
+    """Return the filled share of a volume, and the step at the border of the hole."""
+    from texrs.inpainting._volumes import SEEN
+
+    step = dict(result.report["candidates"])[result.report["patch_size"]]
+    visible = "" if step <= SEEN else " and visible: try --patch-size, --seed or --boundary-width"
+    return f"{tell_filled(result)}, step at its border {step:.2f} (1: as elsewhere){visible}"
 
 
 def tell_sizes(result: Synthesis) -> str:
