@@ -236,7 +236,9 @@ def list_rows(function: Callable[..., Any], options: dict[str, str]) -> Iterator
             continue
         sentences = SENTENCE.split(text)
         inside = USUAL.search(sentences[0])
-        usual = next((s for s in sentences[1:] if re.match(r"By default|None|The default", s)), inside and inside[1])
+        stated = [s for s in sentences[1:] if re.match(r"By default|None|The default", s)]
+        stated = [s[9:].rstrip(".") for s in sentences[1:] if s.startswith("Default: ")] or stated
+        usual = stated[0] if stated else inside and inside[1]
         unit = next(
             (u for u in UNITS if re.search(rf"(?:in|of|many|number of|{NUMBER}) {u}\b", sentences[0], re.I)), ""
         )

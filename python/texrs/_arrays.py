@@ -166,7 +166,7 @@ def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | s
     dtype : dtype
         Dtype of the result.
     shape : sequence of int or str, optional
-        Length of each axis. A word stands for any length of at least 1, and names the axis in messages. By default any
+        Length of each axis. A word stands for any length of at least 1, and names the axis in messages. Default: any
         shape.
 
     Returns

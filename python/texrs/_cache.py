@@ -22,7 +22,7 @@ class Cache(Generic[K, V]):
     limit : int
         Maximum total size of all values. A single value above it is not kept.
     size : callable, optional
-        Function that returns the size of a value, such as its bytes. By default each value counts 1.
+        Function that returns the size of a value, such as its bytes. Default: each value counts 1.
 
     """
 

@@ -61,7 +61,7 @@ def flatten_lighting(
         Size in pixels, at least 4, above which variation counts as light. Elements should be smaller. Default: a
         quarter of the shorter side.
     space : {"srgb", "linear"}, optional
-        Encoding of the values. By default integers are sRGB and floats are linear.
+        Encoding of the values. Default: integers are sRGB and floats are linear.
 
     Returns
     -------

@@ -70,7 +70,7 @@ def run(
         None is this process. An integer is a number of processes of this machine, which are started for this work. An
         address or a client is a cluster.
     threads_each : int, optional
-        Kernel threads of each worker. By default, processes share the cores, and a worker of a cluster uses its
+        Kernel threads of each worker. Default: processes share the cores, and a worker of a cluster uses its
         configured number of threads.
     spare : bool
         If True, a task that ends three workers does not stop the others. It yields a `WorkerLost` as its result.

@@ -180,7 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Arguments after ``texrs``. By default those from the shell.
+        Arguments after ``texrs``. Default: those from the shell.
 
     Examples
     --------

@@ -99,7 +99,7 @@ class Options:
     makers : mapping
         Functions that compute the values of parameters with several options, if the dataclass is not enough.
     only : collection of str
-        Parameters to include. By default all.
+        Parameters to include. Default: all.
     optional : mapping
         Parameters that default to a value of the command, and the text shown for it. The function does not get them if
         they are not given.

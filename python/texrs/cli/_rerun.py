@@ -152,9 +152,7 @@ class Recipe:
 def rerun_command(
     context: typer.Context,
     output: Annotated[str, make_argument("OUTPUT", "A file that texrs wrote, or a folder that one command wrote.")],
-    out: Annotated[
-        str | None, to_write("out", text="Path to write to. By default the result is only compared.")
-    ] = None,
+    out: Annotated[str | None, to_write("out", text="Path to write to. Default: the result is only compared.")] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:

@@ -65,9 +65,9 @@ def analyse(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array, or Material
-        Texture with sides of at least 16, of any dtype. The colours of a material are analysed first. If their result
-        is uncertain, all maps are analysed as well, and the more certain result is used. The result contains the
-        colours.
+        Texture, of any real dtype, at least 16 pixels a side. The colours of a material are analysed first. If their
+        result is uncertain, all maps are analysed as well, and the more certain result is used. The result contains
+        the colours.
     box : (row, column, height, width), optional
         Centre and size of the box around one element, in pixels. For a connected foreground, a box around one mesh or
         one knot.

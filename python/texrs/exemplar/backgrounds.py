@@ -56,7 +56,7 @@ def find_foreground(
     regions : Regions
         Regions of one colour in the image.
     layers : int, optional
-        Number of layers. By default chosen by the elements that they yield.
+        Number of layers. Default: chosen by the elements that they yield.
     watch : callable
         Function that is called during the work.
 

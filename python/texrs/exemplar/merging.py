@@ -59,7 +59,7 @@ def join_parts(parts: Labels, relief: Floats, usual: float | None = None, *, lea
     relief : (H, W) float32
         Strength of the joints, about 1 in joints.
     usual : float, optional
-        Expected area of a cell in pixels. By default the area is not used as evidence.
+        Expected area of a cell in pixels. Default: the area is not used as evidence.
     least : float
         Area in pixels below which a part always joins the neighbour with the weakest separation.
 

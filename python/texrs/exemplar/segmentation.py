@@ -44,7 +44,7 @@ class ElementOptions:
     Attributes
     ----------
     layers : int, optional
-        Number of colour layers, 1 to 16. Fewer are used if the image has fewer colours. By default two, or three or
+        Number of colour layers, 1 to 16. Fewer are used if the image has fewer colours. Default: two, or three or
         four if these find clearly more separate elements of the same size. If the background has fine grain, smooth
         areas belong to the layer above it.
     segmentation : {"auto", "components", "grid", "none"}

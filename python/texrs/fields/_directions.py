@@ -42,12 +42,12 @@ def from_directions(
     directions : (R, C, 2) or (P, R, C, 3) array_like
         Vectors in voxels of the output.
     extent : sequence of int, optional
-        Voxels that the array covers, as for `from_array`. By default one for each vector.
+        Voxels that the array covers, as for `from_array`. Default: one for each vector.
     along : {"x", "y", "z"}
         Axis of the exemplar that is turned into the directions: columns, rows or planes.
     up : (3,) or (P, R, C, 3) array_like, optional
-        Up direction in volumes, (plane, row, column), one for all or one per place, such as the normals of a surface. By
-        default the axis least parallel to the directions.
+        Up direction in volumes, (plane, row, column), one for all or one per place, such as the normals of a surface.
+        Default: the axis least parallel to the directions.
     order : {"zyx", "xyz", "yx", "xy"}, optional
         Order of the components. Default: the order of array axes, (plane, row, column).
     signed : bool

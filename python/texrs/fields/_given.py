@@ -44,7 +44,7 @@ def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = 
         Components are x, y, z in the formats of ParaView, Slicer and similar programs. Components in other formats are
         in the order of array axes, unless ``order`` is given.
     extent : sequence of int, optional
-        Voxels that the field covers, as for `from_array`. By default one for each vector.
+        Voxels that the field covers, as for `from_array`. Default: one for each vector.
     axes : int, optional
         Required number of axes, 2 or 3. For a single plane of vectors in space, 2 drops the component across it.
     **options
@@ -123,7 +123,7 @@ def as_field(
     axes : int
         Number of axes, 2 or 3.
     extent : sequence of int, optional
-        Voxels that arrays cover, and the size for words. By default one for each vector.
+        Voxels that arrays cover, and the size for words. Default: one for each vector.
     spacing : sequence of float, optional
         Distances between voxels along planes, rows and columns. The field rotates and scales in space, where voxels
         need not be cubes. Places and lengths of the field are in the unit of the spacing. Arrays cover voxels, and

@@ -47,7 +47,7 @@ def from_array(
     frames : array_like
         Shape (R, C, 2, 2) or (P, R, C, 3, 3), real numbers.
     extent : sequence of int, optional
-        Voxels that the array covers. By default one for each frame.
+        Voxels that the array covers. Default: one for each frame.
     origin : sequence of float, optional
         First voxel. Default: 0.
 

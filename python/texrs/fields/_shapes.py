@@ -195,10 +195,10 @@ def circular(
     axis : str
         Axis of the circles: "x", "y" or "z". An image is wound round "z", which it does not have.
     radial : str, optional
-        Axis r of the exemplar that points outwards; t is the remaining one. By default the one after ``axis`` in x, y,
+        Axis r of the exemplar that points outwards; t is the remaining one. Default: the one after ``axis`` in x, y,
         z, x: x is radial and y tangential round z.
     centre : sequence of float, optional
-        Point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
+        Point of the axis, (row, column) or (plane, row, column). Default: the middle of a bounded output (see
         `Field.over`), or the origin of an unbounded one.
     axes : int
         Number of axes, 2 or 3.
@@ -242,9 +242,9 @@ def spiral(
     axis : str
         Axis of the spirals: "x", "y" or "z". An image is wound round "z", which it does not have.
     radial : str, optional
-        Axis of the exemplar that points outwards at an angle of 0. By default the one after ``axis`` in x, y, z, x.
+        Axis of the exemplar that points outwards at an angle of 0. Default: the one after ``axis`` in x, y, z, x.
     centre : sequence of float, optional
-        Point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
+        Point of the axis, (row, column) or (plane, row, column). Default: the middle of a bounded output (see
         `Field.over`), or the origin of an unbounded one.
     axes : int
         Number of axes, 2 or 3.
@@ -284,7 +284,7 @@ def zigzag(
     angle : float
         Angle in degrees, as in `rotation`, -360 to 360.
     axis : str, optional
-        Axis across the bands: "x", "y" or "z". By default the first of ``plane``.
+        Axis across the bands: "x", "y" or "z". Default: the first of ``plane``.
     plane : str
         Plane of rotation: two of "x", "y" and "z", as in `rotation`.
     axes : int
@@ -328,7 +328,7 @@ def scale_ramp(
     axis : str
         Axis of growth: "x", "y" or "z".
     length : float, optional
-        Length of the growth in voxels, or in the unit of the spacing if one is given; more than 0. By default up to
+        Length of the growth in voxels, or in the unit of the spacing if one is given; more than 0. Default: up to
         the last voxel of a bounded output (see `Field.over`), or 128 for an unbounded one.
     axes : int
         Number of axes, 2 or 3.

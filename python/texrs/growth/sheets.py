@@ -91,7 +91,7 @@ def stitch_sheet(
     strength : float
         Weight of the scales. The usual weight is 1.
     side : float, optional
-        Side of a patch, in samples of the sheet. By default chosen from the available area.
+        Side of a patch, in samples of the sheet. Default: chosen from the available area.
     seed : int
         Seed of the random choices.
     held : (rows, columns) bool, optional
@@ -101,7 +101,7 @@ def stitch_sheet(
     loose : (rows, columns) bool, optional
         Fixed pixels that patches may still replace if this makes seams less visible.
     frames : (N, 2, 2) int16, optional
-        Jacobians of the sheet, one for all pixels or one per pixel, in fixed point. By default derived from the target.
+        Jacobians of the sheet, one for all pixels or one per pixel, in fixed point. Default: derived from the target.
     progress : callable, optional
         Called with the stage and its completed share.
 

@@ -64,7 +64,7 @@ def from_patches(
     candidates : int
         Number of positions tried for each patch. The best is used.
     bend : bool, optional
-        If True, patches bend with a field. By default they bend if the exemplar's edges have a direction and its
+        If True, patches bend with a field. Default: they bend if the exemplar's edges have a direction and its
         elements are not separate.
     larger : float
         Factor on the usual side of the patches.

@@ -89,7 +89,7 @@ def inpaint(
     patch_size : int or (rows, columns)
         Size of a patch in pixels, from 1 to the size of the image, of an exemplar and of ``index.max_patch``.
     keep : (H, W) array_like of bool, optional
-        Known pixels that no patch may replace. By default seams may run through all known pixels.
+        Known pixels that no patch may replace. Default: seams may run through all known pixels.
     count : int
         Number of matches to consider, 1 to 1000.
     separation : int

@@ -48,7 +48,7 @@ def mean_shift(
     max_iterations : int
         Maximum number of steps of a pixel, 0 to 2^31 - 1. Five, as in OpenCV, are enough for most pixels.
     tolerance : float, optional
-        Maximum colour change, 0 to 1e15, of a pixel that has arrived. Its rounded position must also stay. By default a
+        Maximum colour change, 0 to 1e15, of a pixel that has arrived. Its rounded position must also stay. Default: a
         constant position is enough, as in OpenCV. A twentieth of the range continues until the colour is at its mode
         too, at about twice the cost.
     wrap : bool or (bool, bool)

@@ -140,7 +140,7 @@ class PatchIndex:
         Parameters
         ----------
         allowed : (H, W) array_like of bool, or a list or tuple of them, optional
-            Mask of the positions that may be used. By default all positions.
+            Mask of the positions that may be used. Default: all positions.
         max_patch : int or (rows, columns), optional
             Size of the largest patch to search for, in pixels. Default: 64, or the largest that fits into the images.
 

@@ -55,7 +55,7 @@ def solve(
         The outermost pixels keep their values, the axis is periodic, or the ends are free. One value for both axes, or
         one for the rows' and one for the columns' axis.
     mask : (H, W) array_like of bool, optional
-        Pixels to solve. All others keep their values. By default all pixels.
+        Pixels to solve. All others keep their values. Default: all pixels.
     progress : callable, optional
         Called with the completed share, 0 to 1. An exception that it raises stops the work.
 
@@ -130,7 +130,7 @@ def spread(
         The outermost pixels are 0, the axis is periodic, or the ends are free. One value for both axes, or one for the
         rows' and one for the columns' axis.
     mask : (H, W) array_like of bool, optional
-        Pixels to solve. All others are 0. By default all pixels.
+        Pixels to solve. All others are 0. Default: all pixels.
     progress : callable, optional
         Called with the completed share, 0 to 1. An exception that it raises stops the work.
 

@@ -139,8 +139,8 @@ def cut(
     mask_a, mask_b : (H, W) or (D, H, W) array_like of bool
         Pixels that each image covers.
     core_a, core_b : array_like of bool, optional
-        Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must cover its core. By
-        default none.
+        Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must cover its core.
+        Default: none.
     penalty : float or array_like of float, optional
         Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean
         of its two penalties. This keeps seams out of elements that should stay whole.

@@ -70,9 +70,9 @@ def mesh(
     weight : (H, W) array_like of bool or int, optional
         Weight of each pixel, 0 to 254: larger weights are in front. Default: 0 everywhere.
     void : (H, W) array_like of bool, optional
-        Pixels whose triangles are not drawn. By default none.
+        Pixels whose triangles are not drawn. Default: none.
     size : int or (rows, columns), optional
-        Size of the output, up to 2^28 pixels. By default the size of the image.
+        Size of the output, up to 2^28 pixels. Default: the size of the image.
     progress : callable, optional
         Called with the completed share, 0 to 1. An exception that it raises stops the work.
 
@@ -161,7 +161,7 @@ def from_points(
     shape : int or (rows, columns)
         Size of the image, in pixels.
     size : int or (rows, columns), optional
-        Size of the output, up to 2^28 pixels. By default the size of the image.
+        Size of the output, up to 2^28 pixels. Default: the size of the image.
 
     Returns
     -------

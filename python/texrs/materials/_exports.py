@@ -94,16 +94,16 @@ class Exports(Mapping[str, Map]):
         folder : path_like
             Folder, created if needed. Files with these names are replaced.
         depth : {8, 16, 32}, optional
-            Bits of each sample: integers of 8 or 16, floats of 32. By default the bits of each map.
+            Bits of each sample: integers of 8 or 16, floats of 32. Default: the bits of each map.
         suffix : str, optional
-            Suffix of all files, such as ``".tif"``, which selects the format. By default PNG, or TIFF and EXR for maps
+            Suffix of all files, such as ``".tif"``, which selects the format. Default: PNG, or TIFF and EXR for maps
             that PNG cannot hold.
         pack : {"orm", "none"}, optional
             "orm" writes occlusion, roughness and metallic, if present, to one file ``orm`` as red, green and blue.
-            "none" writes each quantity of packed maps to its own file. By default maps are not repacked.
+            "none" writes each quantity of packed maps to its own file. Default: maps are not repacked.
         convention : str, optional
             Names, packings and direction of y: "ambientcg", "polyhaven", "gltf", "unreal", "unity", "urp", "hdrp",
-            "labpbr", "substance" or "substance-unreal". By default those of the maps that were read.
+            "labpbr", "substance" or "substance-unreal". Default: those of the maps that were read.
         mipmaps : bool
             If True, each map is also written at a half, a quarter, ... of its size, until each side is 1. The folder
             is ``mipmaps``: ``albedo.1.png``, ``albedo.2.png``, ... Colours are averaged as light, normals keep their
@@ -175,7 +175,7 @@ class Exports(Mapping[str, Map]):
         path : path_like
             File with the suffix .exr.
         depth : {16, 32}, optional
-            Bits of the floats that are written, which are then also read. By default enough for the values. Labels are
+            Bits of the floats that are written, which are then also read. Default: enough for the values. Labels are
             always whole numbers.
 
         Returns
@@ -275,7 +275,7 @@ class Exports(Mapping[str, Map]):
             File with the suffix .mtlx. Names of maps are its name and their own: ``stones.mtlx``,
             ``stones_albedo.png``.
         depth : {8, 16, 32}, optional
-            Bits of each sample of the maps: integers of 8 or 16, floats of 32. By default the bits of each map.
+            Bits of each sample of the maps: integers of 8 or 16, floats of 32. Default: the bits of each map.
 
         Returns
         -------

@@ -30,7 +30,7 @@ class Map:
     role : Role
         Role of the map.
     space : {"srgb", "linear"}
-        Encoding of light. By default integers of colours are sRGB, and everything else is linear.
+        Encoding of light. Default: integers of colours are sRGB, and everything else is linear.
     file : str
         Name of the file that the map was read from, without the suffix; empty for a map made from an array. The map is
         written to a file of this name again.

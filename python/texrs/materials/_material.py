@@ -60,7 +60,7 @@ class Material(Exports):
     roles : mapping of str to Role or str, optional
         Roles of maps whose name gives none, or a wrong one.
     spaces : mapping of str to {"srgb", "linear"}, optional
-        Encoding of light in maps. By default integers of colours and emission are sRGB, and everything else is linear.
+        Encoding of light in maps. Default: integers of colours and emission are sRGB, and everything else is linear.
     weights : mapping of str to float, optional
         Weights of maps for decisions, 0 to 100. Default: 1 for colours and normals, 0.75 for heights, 0.5 for
         roughness, metallic, occlusion, opacity, emission and masks, 0.25 for others and 0 for labels.

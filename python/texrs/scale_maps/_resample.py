@@ -35,7 +35,7 @@ def resample(
     size : (int, int) or int
         Size of the output in pixels (rows, columns), or one number for a square.
     mode : {"stretch", "extend", "user", "angles"}
-        Method. ``"stretch"``: stretch the map so that its borders stay at the borders, linearly in log S.
+        Method of resizing. ``"stretch"``: stretch the map so that its borders stay at the borders, linearly in log S.
         ``"extend"``: put the map in the middle and continue it by the plane that fits it (`extend`); for a smaller
         output, crop the middle. ``"user"``: stretch ``pattern``. ``"angles"``: the map of a plane with the given
         angles (`from_angles`). Default: "stretch".

@@ -178,9 +178,9 @@ def compare(
         Number of colour classes of the exemplar, 2 to 16. None: both arrays are labels, whole numbers from 0 to 255
         without channels.
     chosen : int or tuple of int, optional
-        Classes or labels whose pieces are counted. By default the lighter half of the classes, or all labels except 0.
+        Classes or labels whose pieces are counted. Default: the lighter half of the classes, or all labels except 0.
     axes : int, optional
-        Number of axes, 2 or 3. By default from the shape: up to 4 along the last of three axes are channels.
+        Number of axes, 2 or 3. Default: from the shape: up to 4 along the last of three axes are channels.
     spacing : sequence of float, optional
         Distances between samples along each axis, for both. Correlations, paths, sizes and orientations are then in
         space, and the field is in space. Frequencies stay in samples. Default: the spacing that the file of the

@@ -28,7 +28,7 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
     labels : array_like
         Bool or integers of at least 0, (H, W) or (D, H, W).
     colours : (K, 3) array_like, optional
-        Colours in uint8, in the order of the labels, which must then be below K. By default 0 is light, and the others
+        Colours in uint8, in the order of the labels, which must then be below K. Default: 0 is light, and the others
         have different colours. A label has the same colour in every volume.
 
     Returns

@@ -97,16 +97,16 @@ def oblique_slice(
     volume : array_like
         Volume of shape (D, H, W) or (D, H, W, C).
     point : sequence of 3 float, optional
-        (plane, row, column) of a point of the slice, in voxels. By default the middle of the volume.
+        (plane, row, column) of a point of the slice, in voxels. Default: the middle of the volume.
     normal : sequence of 3 float, optional
         Normal of the slice. The image's columns are as parallel to the volume's columns as possible, or to its rows if
         the normal is along the columns.
     axes : (2, 3) array_like, optional
         The steps of the image's rows and columns in voxels, instead of ``normal``.
     size : int or (rows, columns), optional
-        Size of the image in pixels, with the point in its middle. By default the whole slice.
+        Size of the image in pixels, with the point in its middle. Default: the whole slice.
     interpolation : {"linear", "cubic", "nearest"}
-        Interpolation. Use "nearest" for labels.
+        Interpolation between voxels. Use "nearest" for labels.
 
     Returns
     -------
@@ -236,7 +236,7 @@ def turntable(
     elevation : float
         Elevation of the view in degrees, -90 to 90.
     seconds : float
-        Duration of a turn, in seconds.
+        Duration of a turn, 0.1 to 600 seconds. Default: 4.
     background : sequence of 3 int
         Colour of the background, 0 to 255 each.
     interpolation : {"linear", "cubic", "nearest"}

@@ -65,7 +65,7 @@ class Classes:
         image : (H, W[, C]) or (D, H, W[, C]) array_like
             Image with the channels of the exemplar.
         axes : int, optional
-            2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
+            2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
 
         Returns
         -------
@@ -100,7 +100,7 @@ class Classes:
         image : (H, W[, C]) or (D, H, W[, C]) array_like
             Image with the channels of the exemplar.
         axes : int, optional
-            2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
+            2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
 
         Returns
         -------
@@ -178,7 +178,7 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
     image : (H, W[, C]) or (D, H, W[, C]) array_like
         Image or volume, with or without channels.
     axes : int, optional
-        2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
+        2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
 
     Returns
     -------
@@ -212,7 +212,7 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
     count : int
         Number of classes, 2 to 16. An exemplar of fewer colours has one class for each colour.
     axes : int, optional
-        2 for an image, 3 for a volume. By default from the shape: up to 4 along the last axis are channels.
+        2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
 
     Returns
     -------

@@ -299,7 +299,7 @@ def orientation_errors(
     field : Field, optional
         Field of the texture. Default: the identity.
     normal : array_like, optional
-        Normal n of the exemplar, (A,). By default `texture_normal` of the values themselves.
+        Normal n of the exemplar, (A,). Default: `texture_normal` of the values themselves.
     margin : int
         Pixels at the border that are left out, because the structure tensor lacks data there.
     step : int

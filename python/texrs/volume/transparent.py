@@ -66,11 +66,11 @@ def render_volume(
     elevation : float
         Rotation of the view upwards in degrees, -90 to 90.
     transfer : str or sequence of (value, colour, alpha), optional
-        Stops by rising value. Colour and alpha change linearly between them. The value is the lightness, from 0 to 1
-        (the full range of integers, or the own range of floats beyond that). The colour is "#rrggbb", three numbers
-        from 0 to 255, or None for the voxel's own. Alpha, from 0 to 1, is the opacity of one voxel. A text has the
-        form ``value:colour:alpha,...``, as in ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. By default all voxels that differ
-        from the most frequent colour are shown in their own colour.
+        Stops of the transfer function, by rising value. Colour and alpha change linearly between them. The value is
+        the lightness, from 0 to 1 (the full range of integers, or the own range of floats beyond that). The colour is
+        "#rrggbb", three numbers from 0 to 255, or None for the voxel's own. Alpha, from 0 to 1, is the opacity of one
+        voxel. A text has the form ``value:colour:alpha,...``, as in ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. Default:
+        all voxels that differ from the most frequent colour are shown in their own colour.
     shading : bool
         If True, surfaces are shaded.
 

@@ -63,7 +63,7 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
     axis : int
         Number of the axis, from 0.
     field : Field, optional
-        Field that J is taken from. By default the map's own frames.
+        Field that J is taken from. Default: the map's own frames.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
     source : SourceMap
         Source map of an image or a volume, from one exemplar or several.
     field : Field, optional
-        Field that J is taken from. By default the map's own frames.
+        Field that J is taken from. Default: the map's own frames.
     cell : int
         Side of the exemplar's cells, in voxels, at least 1. Cells that the border cuts count by their remaining size.
 

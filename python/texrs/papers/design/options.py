@@ -19,7 +19,7 @@ class DeformationOptions:
     Attributes
     ----------
     operations : int, optional
-        Number of deformations that are applied in sequence to each element, 0 to 8. By default 2, and 1 in heaps or in
+        Number of deformations that are applied in sequence to each element, 0 to 8. Default: 2, or 1 in heaps and in
         the printed algorithm. The first deformation in a heap puts the element into the place of another, turned and
         scaled to its shape. Further ones turn, mirror and scale the element as long as it fills that place. On a
         lattice, and without separate elements, the only deformation is a move from place to place, because others
@@ -34,8 +34,8 @@ class DeformationOptions:
         Least and largest scale factor, within 0.5 to 2. Default: 0.8 to 1.2.
     allow_mirror : bool, optional
         If True, elements, backgrounds and patches may be mirrored along both axes. If False, as for letters, they are
-        not mirrored. By default mirroring depends on the example: an axis is excluded if light or a slant shows its
-        direction. With ``rotate=0`` the default is False, because the example then has an upper side.
+        not mirrored. Default: True, except for axes whose direction light or a slant shows, and False with
+        ``rotate=0``, because the example then has an upper side.
     start : float, optional
         Start of the logistic map (Eq. 2), within (-1, 1). Default: drawn from the seed for each element.
     growth_rate : float

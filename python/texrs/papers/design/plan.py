@@ -64,7 +64,7 @@ def make_plan(
     options : DeformationOptions
         Options of the deformation.
     side : int, optional
-        Side of a patch, in pixels. By default a sixth of the exemplar's shorter side, 12 to 32.
+        Side of a patch, in pixels. Default: a sixth of the exemplar's shorter side, 12 to 32.
     literal : bool
         If True, the paper is followed as printed. Default: False.
 

@@ -150,7 +150,7 @@ def splice(
     layout : ElementAnalysis, or array
         Texture whose layout the elements take, or a drawn layout (`texrs.layouts`).
     size : int or (rows, columns), optional
-        Size of the result, in pixels. Default: the size of ``elements``.
+        Size of the result, in pixels. Default: the size of the image of ``elements``.
     seed : int
         Seed of the patches that fill holes, and of the noise of the refinement, 0 to 2^64 - 1. Default: 0.
     method : {None, "paper", "preview"}
@@ -163,9 +163,9 @@ def splice(
     layout_scale : float, optional
         Scale of the layout, 0.01 to 100. If it is 1, a pixel of the layout is a pixel of the result, and the centres
         of both coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense are
-        pushed apart. Default: the scale that fits the spacing or the size of the elements of ``elements``.
+        pushed apart. Default: the scale that fits the spacing or the size of the elements.
     align : bool, optional
-        If True, the layout is rotated so that lines of its points agree with those of ``elements``. Cells and nets
+        If True, the layout is rotated so that lines of its points agree with lines of the elements. Cells and nets
         ignore this. Default: True without ``layout_scale``.
     snap_rows : bool
         If True, targets near one row are moved to this row. Use it for curved walls, whose long joints then become
@@ -178,7 +178,7 @@ def splice(
         False, its figure is bent. Default: True without cells, if ``use_cells`` is not given and a reliable layout has
         six knots or more.
     allow_rotation : bool, optional
-        If True, cells may be rotated. Default: True, unless light or letters show which side of ``elements`` is up.
+        If True, cells may be rotated. Default: True, unless light or letters show which side of the texture is up.
     refine : bool
         If True, pixels of elements that are not rigid, or stretched pixels of cells, are refined. Nets, and
         backgrounds between separate elements, do not need it. Default: True.
@@ -386,8 +386,8 @@ def self_splice(
     size : int or (rows, columns), optional
         Size of the result, in pixels, at least 16 a side. The texture's own layout continues in a larger result before
         the steps, as in a splice with itself. A smaller result is the middle of the texture. Steps then number the
-        elements as the report's "elements" lists them, with their places before the steps. Default: the size of
-        ``elements``.
+        elements as the report's "elements" lists them, with their places before the steps. Default: the size of the
+        image of ``elements``.
     seed : int
         Seed of random steps, of elements that enter over a border, of patches that fill holes, and of the noise of the
         refinement. Default: 0.

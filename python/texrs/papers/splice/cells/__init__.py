@@ -90,7 +90,7 @@ def splice_cells(
     scale : float, optional
         Scale of B's layout. Default: the scale that gives it the size of A's cells.
     turns : bool, optional
-        If True, cells may be turned. By default True, unless the image shows which side of A is up.
+        If True, cells may be turned. Default: True, unless the image shows which side of A is up.
     refine : bool
         If True, stretched pixels are corrected.
     seed : int
