@@ -1,4 +1,4 @@
-"""Images and volumes in files: read with the dtype of the file, and written without loss.
+"""Read images and volumes with the dtype of the file, and write them without loss.
 
 ===================== =========================================== ========== ====================
 Suffix                dtypes                                      Channels   Loss
@@ -23,33 +23,35 @@ Suffix                dtypes                                      Channels   Los
 ``.zarr`` (e)         bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
 ===================== =========================================== ========== ====================
 
-(a) The three channels of a pixel have one exponent, and the largest of them has 8 bits.
+(a) The three channels of a pixel share one exponent, and the largest channel keeps 8 significant bits.
 
-(b) AVIF needs Pillow 11.3 or newer, JPEG XL a plugin: ``pip install pillow-jxl-plugin``.
+(b) AVIF needs Pillow 11.3 or newer. JPEG XL needs a plugin: ``pip install pillow-jxl-plugin``.
 
-(c) Only volumes; needs the extra: ``pip install texrs[vol]``.
+(c) Volumes only. These formats need the extra ``vol``: ``pip install texrs[vol]``.
 
-(d) Only volumes, for ParaView; read in every encoding that VTK writes.
+(d) Volumes only, for ParaView. Files are read in every encoding that VTK writes.
 
-(e) A folder: OME-Zarr of one level; needs the extra: ``pip install texrs[dask]``. Any arrays and OME-Zarr images are read;
-textures without borders write stores of any size (`texrs.SolidTexture.to_zarr`).
+(e) A folder, written as OME-Zarr of one level. It needs the extra ``dask``: ``pip install texrs[dask]``. Plain Zarr
+arrays and OME-Zarr images are read. Unbounded textures can be written to stores of any size
+(`texrs.SolidTexture.to_zarr`).
 
-PSD is also read: its flattened image, 8 bits a channel. The package OpenEXR reads and writes EXR, and tifffile TIFF. Pillow
-reads and writes WebP, JPEG, GIF, BMP, TGA, DDS, AVIF and JPEG XL, and reads PSD and layouts of DDS from BC1 to BC7. Some
-compressed TIFF files need the extra: ``pip install texrs[tiff]``. CMYK becomes sRGB by the profile of the file. Frames and
-pages that are not read are reported.
+PSD files are read only: their flattened image, with 8 bits per channel. The package OpenEXR reads and writes EXR, and
+tifffile reads and writes TIFF. Pillow reads and writes WebP, JPEG, GIF, BMP, TGA, DDS, AVIF and JPEG XL, and also
+reads PSD and compressed DDS (BC1 to BC7). Some compressed TIFF files need the extra ``tiff``: ``pip install
+texrs[tiff]``. CMYK is converted to sRGB by the profile of the file. Frames and pages that are not read are reported.
 
-Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last five formats, which also keep
-the distances between voxels (`read_spacing`). The axes plane, row and column are z, y and x there, and x runs fastest
-in the file. Volumes larger than memory are written slab by slab (`write_slabs`), surfaces as
-``.stl`` (`write_surface`). A dtype that a format cannot hold is an error and is never converted. Bool is written as 0 and
-255, to ``.npy`` and ``.npz`` as bool. An opaque alpha channel is left out if the format has none. A single channel is read
-without a channel axis, from ``.npy`` and ``.npz`` as it was written. ``.npz`` files have the key ``image``.
+Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last five formats, which also keep the
+distances between voxels (`read_spacing`). In those five formats, the axes plane, row and column are called z, y and x,
+and x varies fastest in the file. Volumes larger than memory are written slab by slab (`write_slabs`), and surfaces as
+``.stl`` (`write_surface`). A dtype that a format cannot store is an error and is never converted. Bool arrays are
+written as 0 and 255, but stay bool in ``.npy`` and ``.npz``. An opaque alpha channel is omitted if the format has
+none. An image of one channel is read without a channel axis, except from ``.npy`` and ``.npz``, which keep the shape.
+``.npz`` files have the key ``image``.
 
-When a file is read, its content decides the format (for TGA, the suffix does). When it is written, the suffix decides.
-Headers are compared with the limit before memory is used. `read_metadata` reads metadata, such as ICC profiles,
-densities and the record of how texrs made a file, and `write_metadata` writes them. All files are written to a
-temporary name and renamed.
+The content of a file decides how it is read (for TGA, the suffix). The suffix decides how it is written. The size in a
+header is compared with the limit before memory is allocated. `read_metadata` reads metadata, such as ICC profiles,
+densities and the record of how texrs made a file, and `write_metadata` writes them. Every file is first written under
+a temporary name and then renamed.
 """
 
 from __future__ import annotations
@@ -115,7 +117,7 @@ __all__ = [
 ]
 
 FILM = 36.0
-"""Millimetres of the longer side of the film that focal lengths in Exif refer to."""
+"""Longer side, in millimetres, of the 35 mm film frame that focal lengths in Exif refer to."""
 
 
 def __dir__() -> list[str]:
@@ -123,15 +125,16 @@ def __dir__() -> list[str]:
 
 
 def read(path: PathLike, *, limit: int | None = None) -> Array:
-    """Return the image of a file.
+    """Read an image from a file.
 
     Parameters
     ----------
     path : path_like
-        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, .npy, .npz or the folder of a Zarr store.
-        The content decides the format (for TGA the suffix). The first frame of an animation is read.
+        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, .npy or .npz file, or the folder of a
+        Zarr store. The content decides the format (for TGA, the suffix). Only the first frame of an animation is read.
     limit : int, optional
-        Maximum number of pixels, and a sixteenth of the maximum number of bytes. Default: as `texrs.limits` allows.
+        Maximum number of pixels. The maximum number of bytes is 16 times this number. Default: as `texrs.limits`
+        allows.
 
     Returns
     -------
@@ -142,10 +145,10 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     Raises
     ------
     FileError
-        The file is missing, not readable, empty, cut off, corrupt, of another kind, or a stack of images, which
+        The file is missing, not readable, empty, truncated, corrupt, of another format, or a stack of images, which
         `read_volume` reads.
     LimitExceeded
-        More pixels or more memory than the limit.
+        The image has more pixels or needs more memory than the limit.
 
     Examples
     --------
@@ -184,22 +187,23 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
 
 
 def read_fov(path: PathLike) -> float | None:
-    """Return the angle of view that the Exif of a photograph states.
+    """Return the angle of view of a photograph, in degrees, from its Exif metadata.
 
     Parameters
     ----------
     path : path_like
-        JPEG, TIFF, PNG or WebP.
+        JPEG, TIFF, PNG or WebP file.
 
     Returns
     -------
     float or None
-        Angle of the longer side of the image that the camera took, in degrees; None if the file does not state it.
+        Angle in degrees that the longer side of the uncropped photograph spans; None if the file does not state a
+        focal length.
 
     Raises
     ------
     InvalidInput
-        Not a path.
+        ``path`` is not a path.
 
     Examples
     --------
@@ -217,22 +221,22 @@ def read_fov(path: PathLike) -> float | None:
 
 
 def read_description(path: PathLike) -> str | None:
-    """Return the description in a file.
+    """Return the description that is stored in a PNG or TIFF file.
 
     Parameters
     ----------
     path : path_like
-        PNG (a text named Description) or TIFF (its ImageDescription).
+        PNG file (text chunk "Description") or TIFF file (tag ImageDescription).
 
     Returns
     -------
     str or None
-        Text, or None if the file does not have a description.
+        Text of the description; None if the file does not have one.
 
     Raises
     ------
     InvalidInput
-        Not a path.
+        ``path`` is not a path.
 
     Examples
     --------
@@ -251,23 +255,24 @@ def read_description(path: PathLike) -> str | None:
 def read_volume(
     path: PathLike, *, shape: Sequence[int] | None = None, dtype: DTypeLike | None = None, limit: int | None = None
 ) -> Array:
-    """Return the volume in a file, or in a folder of slices.
+    """Read a volume from a file or from a folder of slices.
 
     Parameters
     ----------
     path : path_like
-        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, NRRD, NIfTI, or the folder of a Zarr
-        store. NRRD and NIfTI need the extra ``vol``, and Zarr the extra ``dask``. The content decides the format. A
-        NIfTI file that scales its samples gives float32. The finest level of OME-Zarr is read; a path inside the store
-        names another. A folder of numbered slices (``scan_1.tif`` to ``scan_48.tif``) is read in the order of the
-        numbers. Samples without a header: ``scan.raw:96x96x48:uint16`` states the width, height, depth, type and, with
-        ``:big``, the byte order.
+        TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, NRRD or NIfTI file, or the folder of a
+        Zarr store. NRRD and NIfTI need the extra ``vol``, and Zarr the extra ``dask``. The content decides the format.
+        A NIfTI file with scaled samples gives float32. The finest level of OME-Zarr is read; to read another level,
+        pass its path inside the store. A folder of numbered slices (``scan_1.tif`` to ``scan_48.tif``) is read in the
+        order of the numbers. For samples without a header, append the width, height, depth and type to the name, and
+        ``:big`` for big-endian samples: ``scan.raw:96x96x48:uint16``.
     shape : sequence of int, optional
-        (D, H, W) or (D, H, W, C) of a file without a header, if its name does not state it. Default: None.
+        Shape (D, H, W) or (D, H, W, C) of a file without a header, if it is not appended to the name. Default: None.
     dtype : dtype, optional
         Type of the samples of a file without a header, such as "uint16" or ">i2". Default: None.
     limit : int, optional
-        Maximum number of voxels, and a sixteenth of the maximum number of bytes. Default: as `texrs.limits` allows.
+        Maximum number of voxels. The maximum number of bytes is 16 times this number. Default: as `texrs.limits`
+        allows.
 
     Returns
     -------
@@ -277,9 +282,10 @@ def read_volume(
     Raises
     ------
     FileError
-        The file is missing, not readable, empty, cut off, corrupt or not a volume; or slices are missing or differ.
+        The file is missing, not readable, empty, truncated, corrupt or not a volume; or slices are missing or differ
+        in shape or dtype.
     LimitExceeded
-        More voxels or more memory than the limit.
+        The volume has more voxels or needs more memory than the limit.
 
     Examples
     --------
@@ -315,28 +321,29 @@ def write(
     description: str | None = None,
     notes: Metadata | None = None,
 ) -> None:
-    """Write an image, whole or not at all.
+    """Write an image to a file. If writing fails, an existing file is unchanged.
 
     Parameters
     ----------
     path : path_like
         The suffix decides the format; the table of `texrs.io` lists what each format can hold.
     array : array_like
-        Shape (H, W) or (H, W, C).
+        Image of shape (H, W) or (H, W, C).
     overwrite : bool
-        If True, a file that exists is replaced. Default: True.
+        If True, an existing file is replaced. Default: True.
     description : str, optional
-        Description in ASCII, which only PNG and TIFF keep (`read_description`). Default: None.
+        Description in ASCII. Only PNG and TIFF store it (`read_description`). Default: None.
     notes : Metadata, optional
-        Metadata that `write_metadata` cannot write. TIFF files keep the georeference. Colours are multiplied by alpha in EXR
-        files and divided by it in other files, if ``multiplied`` does not say that they already are. Default: None.
+        Metadata that `write_metadata` cannot write. TIFF files keep the georeference. Colours are multiplied by alpha
+        in EXR files and divided by alpha in all other files, unless ``multiplied`` states that this is already done.
+        Default: None.
 
     Raises
     ------
     InvalidInput
-        The array is not an image that the format can hold; the message names formats that can.
+        The format cannot store the array. The message names formats that can.
     FileError
-        The suffix is not known, or the file cannot be written. A former file is unchanged.
+        The suffix is unknown, or the file cannot be written. An existing file is unchanged.
 
     Examples
     --------
@@ -364,30 +371,32 @@ def write_volume(
     spacing: Sequence[float] | None = None,
     like: PathLike | None = None,
 ) -> None:
-    """Write a volume, whole or not at all.
+    """Write a volume to a file or a Zarr store. If writing fails, an existing file is unchanged.
 
     Parameters
     ----------
     path : path_like
         File with the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz or .vti, or folder with the suffix .zarr.
-        NRRD and NIfTI need the extra ``vol``. A folder .zarr needs the extra ``dask``, and is OME-Zarr of one level.
+        NRRD and NIfTI need the extra ``vol``. A .zarr folder needs the extra ``dask``, and is written as OME-Zarr of
+        one level.
     array : array_like
-        Shape (D, H, W) or (D, H, W, C).
+        Volume of shape (D, H, W) or (D, H, W, C).
     overwrite : bool
-        If True, a file that exists is replaced. Default: True.
+        If True, an existing file is replaced. Default: True.
     spacing : sequence of 3 float, optional
-        Distances between planes, rows and columns, in any unit. The last five formats keep it, and .tif of uint8, uint16
-        or float32 as ImageJ does; `read_spacing` reads it. Default: that of ``like``, or 1.
+        Distances between planes, rows and columns, in any unit. .nrrd, .nii, .nii.gz, .vti and .zarr store them. So
+        does .tif, as ImageJ does, for uint8, uint16 or float32. `read_spacing` reads them. Default: the spacing of
+        ``like``, or 1.
     like : path_like, optional
-        Volume whose spacing is copied. Its orientation, origin and units are also copied from NRRD to NRRD, from NIfTI
-        to NIfTI and from ImageJ to ImageJ. Default: None.
+        Volume whose spacing is copied. Orientation, origin and units are also copied between two NRRD files, two NIfTI
+        files or two TIFF files of ImageJ. Default: None.
 
     Raises
     ------
     InvalidInput
-        The array is not a volume that the format can hold; the message names formats that can.
+        The format cannot store the array. The message names formats that can.
     FileError
-        The suffix is not known, or the file cannot be written. A former file is unchanged.
+        The suffix is unknown, or the file cannot be written. An existing file is unchanged.
 
     Examples
     --------
@@ -404,25 +413,26 @@ def write_volume(
 
 
 def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *, overwrite: bool = True) -> None:
-    """Write a volume slab by slab, whole or not at all, with one slab in memory.
+    """Write a volume slab by slab, with only one slab in memory. If writing fails, an existing file is unchanged.
 
     Parameters
     ----------
     path : path_like
         File with the suffix .npy, .tif or .tiff.
     slabs : iterable of array_like
-        Shapes (d, H, W) or (d, H, W, C), of one dtype, that follow each other along the planes.
+        Slabs of shape (d, H, W) or (d, H, W, C) and of one dtype, in the order of the planes.
     shape : sequence of int
         Shape of the whole volume, (D, H, W) or (D, H, W, C).
     overwrite : bool
-        If True, a file that exists is replaced. Default: True.
+        If True, an existing file is replaced. Default: True.
 
     Raises
     ------
     InvalidInput
-        The slabs do not form the volume, or the format cannot hold it.
+        The slabs do not add up to ``shape``, or the format cannot store them.
     FileError
-        Another suffix, or the file cannot be written. A former file is unchanged, also if making a slab fails.
+        The suffix is not supported, or the file cannot be written. An existing file is unchanged, also if the iterable
+        of slabs raises an error.
 
     Examples
     --------
@@ -441,7 +451,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
         raise FileError(f"{target}: the suffix must be one of .npy, .tif, .tiff for slabs; got {suffix!r}")
     sides = _slabs.as_shape(shape)
     with atomic(target, overwrite=overwrite) as temporary:
-        # Errors of the function that makes the slabs are raised as they are.
+        # Errors that the iterable of slabs raises are passed on unchanged.
         parts = _slabs.check((check(slab, suffix, 3) for slab in as_items(slabs, "slabs")), sides)
         first = next(parts)
         whole = chain((first,), parts)
@@ -453,25 +463,25 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
 
 
 def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: bool = True) -> None:
-    """Write a surface of triangles as .stl, whole or not at all (see `texrs.volume.extract_surface`).
+    """Write a triangle mesh, such as one of `texrs.volume.extract_surface`, as a binary .stl file.
 
     Parameters
     ----------
     path : path_like
-        File with the suffix .stl, which becomes binary.
+        File with the suffix .stl. An existing file is unchanged if writing fails.
     vertices : (N, 3) array_like
-        Corners: x, y, z.
+        Vertices (x, y, z).
     faces : (M, 3) array_like
-        Indices of the corners of each triangle, counter-clockwise if seen from outside.
+        Indices of the three vertices of each triangle, counter-clockwise if seen from outside.
     overwrite : bool
-        If True, a file that exists is replaced. Default: True.
+        If True, an existing file is replaced. Default: True.
 
     Raises
     ------
     InvalidInput
         The faces are not triangles, or an index is out of range.
     FileError
-        Another suffix, or the file cannot be written. A former file is unchanged.
+        The suffix is not .stl, or the file cannot be written. An existing file is unchanged.
 
     Examples
     --------
@@ -517,12 +527,12 @@ def _write(
     if spacing is None and like is not None and holds_spacing(array, suffix):
         spacing = read_spacing(like)
     steps = as_spacing(spacing, suffix)
-    # Stores are folders, which another function writes whole or not at all.
+    # Stores are folders, which another function replaces as a whole.
     if suffix == STORE:
         _zarr.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
         return
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
-        # Image formats have no bool, so write 0 and 255.
+        # Image formats do not have bool, so write 0 and 255.
         if array.dtype == np.bool_ and suffix not in (".npy", ".npz"):
             array = array.astype(np.uint8) * np.uint8(255)
         flat = array[..., 0] if array.ndim > axes and array.shape[-1] == 1 else array
@@ -534,7 +544,7 @@ def _write(
             case ".tif" | ".tiff":
                 channels = flat.shape[axes] if flat.ndim > axes else 1
                 planes = flat.reshape(-1, *flat.shape[axes - 2 : axes], channels)
-                # Only ImageJ's form of TIFF stores a spacing.
+                # Only TIFF files in the form of ImageJ store a spacing.
                 if spacing is None:
                     _tiff.write_tiff(temporary, planes, channels, planes.nbytes, description, tags)
                 elif _tiff.keeps_spacing(planes.dtype, channels):
@@ -562,5 +572,5 @@ def _write(
 
 
 def _find_header(like: Path | None, *kinds: str) -> Any:
-    """Return the header of a volume if it has one of the formats."""
+    """Return the header of an NRRD or NIfTI file whose positions of voxels are copied; None for other files."""
     return _volumes.read_header(like) if like is not None and detect_kind(like) in kinds else None

@@ -1,4 +1,4 @@
-"""Metadata of files, read and written, whatever their format."""
+"""Read and write the metadata of files of all formats."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from texrs.io._notes import Metadata
 from texrs.io._zarr import is_store
 
 DIGEST = re.compile(r'"content": "[0-9a-f]{64}"')
-"""The part of a record that contains the digest of the rest of its file."""
+"""Part of a record that contains the digest of the rest of its file."""
 BLANK = f'"content": "{"0" * 64}"'
 MOST_JPEG = 65_533
-"""Maximum number of bytes of a comment of JPEG."""
+"""Maximum size of a JPEG comment in bytes."""
 
 _READERS: dict[str, Callable[[Path], dict[str, object]]] = {
     "tiff": _tiff.read_notes,
@@ -48,7 +48,7 @@ _WRITERS: dict[str, Callable[[Path, Metadata], None]] = {
     "json": _texts.write_json,
 }
 _VERBATIM = ("png", "jpeg", "gif", "tiff", "exr")
-"""Kinds of files that contain a record as it is."""
+"""Formats whose files contain the bytes of the record, so that it can be overwritten in place."""
 _DIGESTS: dict[str, Callable[[Path], str]] = {
     "npz": _texts.digest_npz,
     "html": _texts.digest_html,
@@ -58,23 +58,23 @@ _SUFFIXES = {f".{kind}": kind for kind in _WRITERS} | {".jpg": "jpeg", ".tif": "
 
 
 def read_metadata(path: PathLike) -> Metadata:
-    """Return the metadata of a file.
+    """Return the metadata of a file: colour profile, density, and the record of how texrs made it.
 
     Parameters
     ----------
     path : path_like
-        Any file. A damaged file, or one of another kind, gives empty metadata.
+        File of any format. A damaged file, or a file of an unknown format, gives empty metadata.
 
     Returns
     -------
     texrs.io.Metadata
-        The meaning of colours and pixels, and the record of how texrs made the file. The record is in the file, or in a file
-        with the same name and ``.json`` after it.
+        Metadata of the file. The record of how texrs made it is read from the file, or else from a sidecar: a file of
+        the same name with ``.json`` appended.
 
     Raises
     ------
     InvalidInput
-        Not a path.
+        ``path`` is not a path.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def read_metadata(path: PathLike) -> Metadata:
     kind = _find_kind(name)
     found: dict[str, object] = {}
     if kind in _READERS:
-        # No result depends on the metadata, so that damaged ones do not matter.
+        # Ignore damaged metadata, because no result depends on them.
         with suppress(Exception):
             found = {key: value for key, value in _READERS[kind](name).items() if value is not None}
     with suppress(Exception):
@@ -106,22 +106,23 @@ def read_metadata(path: PathLike) -> Metadata:
 
 
 def write_metadata(path: PathLike, notes: Metadata, beside: PathLike | None = None) -> Path | None:
-    """Write metadata into a file, as far as its format can hold them.
+    """Write metadata into a file, as far as its format can store them.
 
     Parameters
     ----------
     path : path_like
-        File that was just written; it is changed in place.
+        File that was just written. It is changed in place.
     notes : Metadata
-        Metadata. ``"content": "000...0"`` in ``made``, with 64 zeros, becomes the SHA-256 of the rest of the file.
+        Metadata to write. If ``made`` contains ``"content": "000...0"`` with 64 zeros, these become the SHA-256 of the
+        rest of the file.
     beside : path_like, optional
-        Final name of the file if ``path`` is temporary. If the format cannot hold ``made``, a file of this name with
-        ``.json`` after it does. Default: ``path``.
+        Final name of the file if ``path`` is temporary. If the format cannot store ``made``, it is written to a file
+        of this name with ``.json`` appended. Default: ``path``.
 
     Returns
     -------
     pathlib.Path or None
-        The file that ends in ``.json``, if one was written.
+        Path of the ``.json`` file, or None if none was written.
 
     Raises
     ------
@@ -155,7 +156,8 @@ def write_metadata(path: PathLike, notes: Metadata, beside: PathLike | None = No
         if made is None:
             return None
         if not apart:
-            # The record is a part of the file that it describes, so write zeros first, and then the digest of the rest.
+            # The digest excludes the record itself, so first write the record with zeros, and then overwrite them with
+            # the digest of the rest.
             if BLANK in made:
                 _replace_record(name, kind, made, _fill_in(name, made))
             return None
@@ -167,19 +169,19 @@ def write_metadata(path: PathLike, notes: Metadata, beside: PathLike | None = No
 
 
 def _fill_in(path: Path, made: str) -> str:
-    """Return a record with the digest of the rest of its file."""
+    """Return a record whose zeros are replaced by the digest of the rest of its file."""
     return made.replace(BLANK, f'"content": "{digest(path)}"') if BLANK in made else made
 
 
 def _read_record(path: Path, kind: str) -> bytes:
-    """Return the bytes of the record in a file; empty if there is none."""
+    """Return the bytes of the record in a file, or empty bytes if there is none."""
     with suppress(Exception):
         return _png_chunks.encode_record(kind, str(_READERS[kind](path).get("made") or ""))
     return b""
 
 
 def _replace_record(path: Path, kind: str, former: str, made: str) -> None:
-    """Write a record over one of the same length."""
+    """Overwrite the record in a file with a record of the same length."""
     record = _png_chunks.encode_record(kind, made)
     with path.open("r+b") as file:
         with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
@@ -190,17 +192,17 @@ def _replace_record(path: Path, kind: str, former: str, made: str) -> None:
 
 
 def needs_sidecar(path: Path) -> bool:
-    """Return whether files with a suffix cannot hold a record."""
+    """Return True if a file with this suffix cannot contain a record, so that it needs a ``.json`` file next to it."""
     return _SUFFIXES.get(path.suffix.lower(), "") not in (*_VERBATIM, *_DIGESTS)
 
 
 def name_sidecar(path: Path) -> Path:
-    """Return the name of the file that holds the record of a file that cannot."""
+    """Return the name of the ``.json`` file that contains the record of a file."""
     return path.with_name(path.name + ".json")
 
 
 def is_unchanged(path: PathLike, made: str) -> bool:
-    """Return whether a file has not changed since its record was written."""
+    """Return True if the digest in a record still matches the content of its file."""
     stated = DIGEST.search(made)
     return stated is not None and stated[0] == f'"content": "{digest(_files.as_path(path))}"'
 
@@ -213,7 +215,7 @@ def digest(path: Path) -> str:
     record = _read_record(path, kind) if kind in _VERBATIM else b""
     with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data, memoryview(data) as view:
         begin = max(data.find(record), 0)
-        # The checksum of a chunk of PNG follows its text.
+        # In PNG, the checksum of a chunk follows its text.
         end = begin + len(record) + 4 * (kind == "png") if begin else 0
         whole = hashlib.sha256(view[:begin])
         whole.update(view[end:])
@@ -231,7 +233,7 @@ def hash_file(path: PathLike) -> str:
 
 
 def _find_kind(path: Path) -> str:
-    """Return the format of a file by its content, or else by its suffix."""
+    """Return the format of a file according to its content, or else to its suffix."""
     suffix = path.suffix.lower()
     try:
         return detect_kind(path)

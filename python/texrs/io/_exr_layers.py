@@ -1,4 +1,4 @@
-"""OpenEXR, images and layers of any name, by the package OpenEXR of the Academy Software Foundation."""
+"""Read and write OpenEXR images, and layers of any name, with the package OpenEXR."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ from texrs.io._files import as_path, atomic, check_file, check_size, translate_e
 from texrs.io._notes import INCH, Metadata
 
 MAPS, MADE = "texrs", "texrsMade"
-"""Attributes of the header: the roles of the layers of a material, and how texrs made the file."""
+"""Attributes of the header for the roles of the layers of a material, and for the record of how texrs made the file."""
 PICTURES = (("R", "G", "B", "A"), ("R", "G", "B"), ("Y", "A"), ("Y",))
-"""Channels of images, the most first."""
+"""Sets of channels that form an image. The first set that a file contains is read."""
 SUBSAMPLED = (
     "holds luminance and subsampled chroma (channels such as Y, RY, BY), which are not read; "
     "convert it to R, G and B, for example with ImageMagick: magick IN.exr OUT.exr"
 )
-"""The package OpenEXR does not convert these channels to colours."""
+"""Rest of the error message for channels that the package OpenEXR does not convert to colours."""
 
 
 def _open(path: Path, **options: Any) -> Any:
-    """Open a file without a pool of threads, because that does not survive a fork."""
+    """Open a file without a thread pool, because thread pools do not survive a fork."""
     import OpenEXR
 
-    # The package prints a line about a damaged part: keep it out of the output of commands.
+    # The package prints a line about a damaged part. Send it to standard error, so that it is not in a command's
+    # output.
     with redirect_stdout(sys.stderr):
         return OpenEXR.File(str(path), separate_channels=True, num_threads=0, **options)
 
@@ -47,7 +48,7 @@ def _read_headers(path: Path) -> list[dict[str, Any]]:
 
 
 def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dict[str, Any]]]:
-    """Return the name of each part, its channels in the display window, and its header."""
+    """Return (name, channels in the display window, header) of each part."""
     heads = _read_headers(path)
     if not heads:
         raise FileError(f"{path}: contains no images")
@@ -59,14 +60,14 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
             raise FileError(f"{path}: contains deep images, which are not supported")
         for window in ("displayWindow", "dataWindow"):
             check_size(path, _measure(head[window])[1], 1, 4, limit)
-    # A material has many maps: each counts as an image of one channel.
+    # A material has many channels, so allow 64 times the bytes of an image of one channel.
     count = sum(len(head["channels"]) for head in heads)
     if count * int(np.prod(next(iter(sizes)))) * 4 > 64 * 4 * limit:
         raise LimitExceeded(f"{path}: {count} channels are too many for a limit of {limit} pixels")
     found = []
     with translate_errors(path, "decoding"):
         file = _open(path)
-        # The package leaves out parts that are damaged.
+        # The package omits damaged parts.
         if len(file.parts) != len(heads):
             raise FileError(f"{path}: is cut off or corrupt; some of its pixels are missing")
         for number, head in enumerate(heads):
@@ -79,10 +80,10 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
 
 
 def read_layers(path: PathLike, *, limit: int | None = None) -> tuple[dict[str, Array], str | None]:
-    """Return the channels of a file by their full names, (H, W) of float16, float32 or uint32, and the description of its maps.
+    """Return the channels of a file, (H, W) float16, float32 or uint32, by full name, and the description of its maps.
 
-    The image is the display window: data outside it is left out, and missing data is 0. If a file has several parts,
-    names begin with the name of the part.
+    The image is the display window: pixels outside it are omitted, and missing pixels are 0. If a file has several
+    parts, each channel name begins with the name of its part.
     """
     parts = _read_parts(as_path(path), as_limit(limit))
     words = parts[0][2].get(MAPS)
@@ -114,13 +115,13 @@ def list_channels(path: Path) -> list[str]:
 
 
 def _measure(window: Any) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the first row and column of a window, and its rows and columns."""
+    """Return the (row, column) of the first pixel of a window, and its (rows, columns)."""
     (left, top), (right, bottom) = ([int(v) for v in corner] for corner in window)
     return (top, left), (bottom - top + 1, right - left + 1)
 
 
 def _place(pixels: Array, head: Mapping[str, Any]) -> Array:
-    """Return the data in the display window."""
+    """Return the pixels of the display window, with 0 where the file has no data."""
     (top, left), shape = _measure(head["displayWindow"])
     (first, start), (rows, columns) = _measure(head["dataWindow"])
     if (first, start) == (top, left) and pixels.shape == shape:
@@ -133,25 +134,25 @@ def _place(pixels: Array, head: Mapping[str, Any]) -> Array:
 
 
 def write_layers(path: PathLike, channels: Mapping[str, Array], words: str) -> None:
-    """Write channels of float16, float32 or uint32, (H, W), by their full names, and a description of the maps."""
+    """Write channels, (H, W) of float16, float32 or uint32, by full name, and a description of the maps."""
     target = as_path(path)
     with atomic(target) as temporary, translate_errors(target, "writing"):
         _write(temporary, channels, {MAPS: words})
 
 
 def write_image(path: Path, image: Array) -> None:
-    """Write float16 or float32 pixels, (H, W) or (H, W, C) of up to four channels."""
+    """Write an image of float16 or float32, (H, W) or (H, W, C), with up to four channels."""
     planes = image[..., np.newaxis] if image.ndim == 2 else image
     names = next(names for names in PICTURES if len(names) == planes.shape[2])
     _write(path, {name: planes[..., k] for k, name in enumerate(names)}, {})
 
 
 def _write(path: Path, channels: Mapping[str, Array], attributes: Mapping[str, object]) -> None:
-    """Write channels and attributes, compressed by ZIP."""
+    """Write channels and header attributes with ZIP compression."""
     import OpenEXR
 
     head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **attributes}
-    # The package writes arrays that are not contiguous as if they were.
+    # The package ignores strides, so pass contiguous arrays.
     whole = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
     OpenEXR.File(head, whole, num_threads=0).write(str(path))
 
@@ -170,7 +171,7 @@ def read_notes(path: Path) -> dict[str, Any]:
 
 
 def write_notes(path: Path, notes: Metadata) -> None:
-    """Write a file again with other attributes."""
+    """Rewrite a file with other metadata."""
     file = _open(path)
     head = file.header()
     if notes.primaries is not None:

@@ -1,4 +1,4 @@
-"""Paths, errors and atomic writing of all formats."""
+"""Check paths, translate errors, and write files atomically, for all formats."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
 from texrs.io._temporary import name_temporary, put
 
 BYTES_PER_PIXEL = 16
-"""Maximum number of bytes for each pixel of the limit: four floats."""
+"""Maximum number of bytes per pixel of the limit: four float32 values."""
 _LONGEST = 255
-"""Maximum number of bytes of the name of a file or folder."""
+"""Maximum length of the name of a file or folder, in bytes."""
 
 
 def as_path(path: PathLike) -> Path:
-    """Check that a path was given."""
+    """Return the argument as a `pathlib.Path`, or raise an error if it is not a path."""
     if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
         raise InvalidInput(f"path: must be a str or a pathlib.Path, got {type(path).__name__}")
     if "\0" in os.fspath(path):
@@ -37,7 +37,7 @@ def as_path(path: PathLike) -> Path:
 
 @contextmanager
 def translate_errors(path: Path, what: str) -> Iterator[None]:
-    """Turn each error of a decoder or an encoder into one sentence that names the file."""
+    """Convert any error of a decoder or an encoder into an error whose message names the file."""
     try:
         yield
     except TexrsError:
@@ -53,7 +53,7 @@ def translate_errors(path: Path, what: str) -> Iterator[None]:
 
 
 def describe_error(error: BaseException) -> str:
-    """Return the message of an error on one line."""
+    """Return the message of an error, shortened to one line."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     text = " ".join(str(error).split())
@@ -61,7 +61,7 @@ def describe_error(error: BaseException) -> str:
 
 
 def check_file(path: Path) -> int:
-    """Check that a path is a regular, non-empty file, and return its length."""
+    """Check that a path is a regular, non-empty file, and return its length in bytes."""
     try:
         status = path.stat()
     except FileNotFoundError:
@@ -78,21 +78,21 @@ def check_file(path: Path) -> int:
 
 
 def check_length(path: Path, limit: int) -> None:
-    """Check that a file is not much larger than the pixels that it may hold."""
+    """Check that a file is not much larger than an image of ``limit`` pixels needs."""
     length = check_file(path)
     if length > BYTES_PER_PIXEL * limit + 2**26:
         raise LimitExceeded(f"{path}: has {length} bytes, too many for an image of {limit} pixels")
 
 
 def load(path: Path, limit: int) -> bytes:
-    """Read a whole file."""
+    """Return all bytes of a file, if it is not too large for ``limit`` pixels."""
     check_length(path, limit)
     with translate_errors(path, "reading"):
         return path.read_bytes()
 
 
 def check_size(path: Path, sides: tuple[int, ...], channels: int, itemsize: int, limit: int) -> int:
-    """Compare the sizes in a header with the limit, and return the number of pixels."""
+    """Check that the size in a header is within the limit, and return the number of pixels."""
     pixels = prod(sides)
     named = " x ".join(map(str, sides))
     if pixels <= 0 or channels <= 0:
@@ -108,7 +108,7 @@ def check_size(path: Path, sides: tuple[int, ...], channels: int, itemsize: int,
 
 
 def turn_upright(array: Array, orientation: int) -> Array:
-    """Apply an Exif orientation, 1 (nothing to do) to 8."""
+    """Turn an image upright according to its Exif orientation, 1 (no change) to 8."""
     if orientation in (5, 6, 7, 8):
         array = array.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
@@ -120,26 +120,28 @@ def turn_upright(array: Array, orientation: int) -> Array:
 
 @contextmanager
 def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
-    """Write a file whole or not at all.
+    """Write a file atomically: readers find either the old or the complete new file.
 
     Parameters
     ----------
     path : path_like
-        File to write. A symbolic link is followed.
+        File to write. If it is a symbolic link, its target is replaced.
     overwrite : bool
         If True, an existing file may be replaced. Default: True.
 
     Yields
     ------
     pathlib.Path
-        Temporary name in the same folder, with the same suffix. When the block ends, the file there replaces ``path`` in
-        one step, even if the power fails. If the block raises, the temporary file is removed, and an existing file is
-        unchanged. If the process is killed, the next process that writes to the folder removes the temporary file.
+        Temporary name in the same folder, with the same suffix. When the block ends, the temporary file replaces
+        ``path`` in one step, even if the power fails. If the block raises an error, the temporary file is removed, and
+        an existing file is unchanged. If the process is killed, the next process that writes to the folder removes the
+        temporary file.
 
     Raises
     ------
     FileError
-        The folder is missing or not writable, or ``path`` exists already, is a folder or is not a regular file.
+        The folder is missing or not writable, or ``path`` is a folder, is not a regular file, or exists although
+        ``overwrite`` is False.
 
     Examples
     --------
@@ -190,5 +192,5 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
 
 
 def find_suffix(path: Path) -> str:
-    """Return the suffix of a name that identifies the format. It has two parts for a compressed volume."""
+    """Return the suffix that identifies the format of a file, such as .png, or the double suffix .nii.gz."""
     return path.name[-7:] if path.name.lower().endswith(".nii.gz") else path.suffix

@@ -1,4 +1,4 @@
-"""Formats of files: how they are recognised, and what they can hold."""
+"""Recognise the formats of files, and check which arrays they can store."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ _SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
 _MOST_CHANNELS = 64
 RAW = _raw.RAW
 STORE = ".zarr"
-"""The suffix of a folder that is a Zarr store."""
+"""Suffix of a folder that is a Zarr store."""
 VOLUMES = ("nrrd", "nii", "nii.gz", "vti", "raw", "slices")
 UNIT = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """Arrays that the files of a suffix can hold."""
+    """Dtypes, numbers of channels and sizes that files with a suffix can store."""
 
     dtypes: frozenset[np.dtype[np.generic]]
     channels: range
@@ -96,17 +96,18 @@ FORMATS = {
     ".nii.gz": _NIFTI,
     ".vti": _SCIENCE,
 }
-"""The formats that are written, by suffix."""
+"""Formats that can be written, by suffix."""
 WRITTEN_IMAGES = tuple(suffix for suffix, form in FORMATS.items() if form.images)
 WRITTEN_VOLUMES = tuple(suffix for suffix, form in FORMATS.items() if form.volumes)
 READ_IMAGES = (*WRITTEN_IMAGES, ".psd")
 READ_VOLUMES = WRITTEN_VOLUMES
-"""Suffixes of files of images or volumes, without Zarr stores. All lists of suffixes in texrs come from these."""
+"""Suffixes of files that can contain a volume, without Zarr stores. All lists of suffixes in texrs derive from these.
+"""
 READ = tuple(dict.fromkeys((*READ_IMAGES, *READ_VOLUMES)))
 
 
 def detect_kind(path: Path) -> str:
-    """Return the format of a file by its content."""
+    """Return the format of a file according to its content."""
     if _zarr.is_store(path):
         return "zarr"
     if _series.is_series(path, READ_IMAGES):
@@ -123,7 +124,7 @@ def detect_kind(path: Path) -> str:
         return "webp"
     if start[4:12] in (b"ftypavif", b"ftypavis"):
         return "avif"
-    # TGA has no signature.
+    # TGA files do not have a signature.
     if path.suffix.lower() == ".tga":
         return "tga"
     if path.suffix.lower() == RAW:
@@ -132,12 +133,12 @@ def detect_kind(path: Path) -> str:
 
 
 def keeps_spacing(suffix: str) -> bool:
-    """Return whether volumes of a suffix can state the distances between voxels."""
+    """Return True if files with a suffix can state the distances between voxels for some dtypes."""
     return suffix == STORE or FORMATS.get(suffix) is _TIFF or (suffix in FORMATS and not FORMATS[suffix].images)
 
 
 def holds_spacing(volume: Array, suffix: str) -> bool:
-    """Return whether files of a suffix can state the distances between the voxels of a volume."""
+    """Return True if a file with a suffix can state the distances between the voxels of this volume."""
     channels = volume.shape[3] if volume.ndim == 4 else 1
     return keeps_spacing(suffix) and (FORMATS.get(suffix) is not _TIFF or _tiff.keeps_spacing(volume.dtype, channels))
 
@@ -151,13 +152,13 @@ def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...
 
 
 def check_spacing(spacing: Sequence[float]) -> tuple[float, ...]:
-    """Check the distances between planes, rows and columns."""
+    """Return the distances between planes, rows and columns as floats, or raise an error if one is not positive."""
     steps = as_tuple(spacing, "spacing", 3, "three numbers, of planes, rows and columns")
     return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 
 
 def _drop_alpha(array: Array, form: Format, axes: int, suffix: str) -> Array:
-    """Return an image without its alpha channel if that is opaque and the format cannot hold it."""
+    """Return the array without its alpha channel if that is opaque and the format cannot store it."""
     channels = array.shape[axes] if array.ndim > axes else 1
     if channels not in (2, 4) or channels in form.channels or channels - 1 not in form.channels:
         return array
@@ -169,7 +170,7 @@ def _drop_alpha(array: Array, form: Format, axes: int, suffix: str) -> Array:
 
 
 def check(value: object, suffix: str, axes: int) -> Array:
-    """Return the array to be written, contiguous and in native byte order."""
+    """Check that a format can store an array, and return it contiguous and in native byte order."""
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, MemoryError) as error:
@@ -182,11 +183,11 @@ def check(value: object, suffix: str, axes: int) -> Array:
     check_memory(array.size * array.itemsize, "array")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
     form, volume = _NUMPY if suffix == STORE else FORMATS[suffix], axes == 3
-    # An opaque alpha channel can be left out without loss.
+    # An opaque alpha channel can be omitted without loss.
     array = _drop_alpha(array, form, axes, suffix)
     channels = array.shape[axes] if array.ndim > axes else 1
     if not form.holds(array.dtype, channels, volume):
-        # Name formats that can hold the array, image formats first.
+        # Suggest formats that can store the array, image formats first.
         common = sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))
         able = [s for s in common if FORMATS[s].holds(array.dtype, channels, volume)]
         what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
@@ -196,7 +197,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
         raise InvalidInput(
             f"array: must have sides of at most {form.longest} pixels for {suffix}, got shape {array.shape}"
         )
-    # These formats also limit the values.
+    # GIF and HDR also limit the values.
     if suffix == ".gif":
         colours = np.unique(array.reshape(-1, channels), axis=0)
         if len(colours) > 256:

@@ -1,4 +1,4 @@
-"""Readers of grids of samples by format: volumes, arrays of vectors, and distances between samples."""
+"""Readers, by format, of volumes, of arrays of vectors, and of the distances between samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["READERS", "VECTORS", "holds_volume", "read_numpy", "read_spacing", "
 _MOST_CHANNELS = 4096
 
 Reader = Callable[[Path, int], Array]
-"""Function that reads a file within a limit of samples."""
+"""Function that reads a file of at most the given number of samples."""
 
 
 def _read_tiff(name: Path, limit: int) -> Array:
@@ -28,7 +28,7 @@ def _read_tiff(name: Path, limit: int) -> Array:
 
 
 def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
-    """Return an image or a volume from a file of NumPy."""
+    """Read an image (``axes`` = 2) or a volume (``axes`` = 3) from an .npy or .npz file."""
 
     def check(header: _npy.Header) -> None:
         shape = header.shape
@@ -55,14 +55,14 @@ READERS: dict[str, Reader] = {
     "zarr": lambda name, limit: _zarr.read_store(name, limit, 3),
     "raw": lambda name, limit: cast(_raw.Raw, _raw.parse_raw(name)).read(limit),
 }
-"""Readers of volumes."""
+"""Readers of volumes, by format."""
 VECTORS: dict[str, Reader] = READERS | {
     "npy": _npy.read_npy,
     "npz": _npy.read_npz,
     "vti": partial(_vtk.read_vti, vectors=True),
     "zarr": lambda name, limit: _zarr.read_store(name, limit, None),
 }
-"""Readers of arrays that may have more axes."""
+"""Readers of arrays with any number of axes, by format."""
 SPACINGS: dict[str, Callable[[Path], Sequence[float] | None]] = {
     "vti": _vtk.read_spacing,
     "nrrd": _volumes.read_nrrd_spacing,
@@ -74,13 +74,13 @@ SPACINGS: dict[str, Callable[[Path], Sequence[float] | None]] = {
         _tiff.read_spacing(first) if detect_kind(first := _series.list_slices(name, READ_IMAGES)[0]) == "tiff" else None
     ),
 }
-"""Readers of distances between samples, x first."""
+"""Readers of the distances between samples, in the order x, y, z, by format."""
 
 
 def holds_volume(path: PathLike) -> bool:
-    """Return whether a file is a volume: its format holds only volumes, or it has several planes.
+    """Return True if a file is a volume: its format stores only volumes, or it has several planes.
 
-    The last of three axes of an .npy file contains channels if its length is at most four.
+    An .npy file with three axes is an image if its last axis has at most four entries, the channels.
     """
     name = _files.as_path(path)
     kind = detect_kind(name)
@@ -97,23 +97,23 @@ def holds_volume(path: PathLike) -> bool:
 
 
 def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
-    """Return the distances between the voxels of a file.
+    """Return the distances between the voxels of a file, if the file states them.
 
     Parameters
     ----------
     path : path_like
-        A volume, or any other file.
+        Path of a volume, or of any other file.
 
     Returns
     -------
     (float, float, float) or None
-        Distances between planes, rows and columns, as the file states them. NRRD, NIfTI, .vti,
-        OME-Zarr, OME-TIFF and stacks of ImageJ (.tif) can. None if nothing is stated.
+        Distances between planes, rows and columns, in the unit of the file; None if the file does not state them.
+        NRRD, NIfTI, .vti, OME-Zarr, OME-TIFF and TIFF stacks of ImageJ can state them.
 
     Raises
     ------
     FileError
-        Missing, or its header is damaged.
+        The file is missing, or its header is damaged.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
 
 
 def read_unit(path: Path | None) -> str:
-    """Return the unit that a stack of ImageJ or of OME states; empty if there is none."""
+    """Return the unit of the spacing that a TIFF stack of ImageJ or OME states; empty if it states none."""
     if path is not None and detect_kind(path) == "slices":
         path = _series.list_slices(path, READ_IMAGES)[0]
     tiff = path is not None and detect_kind(path) == "tiff"

@@ -1,4 +1,4 @@
-"""Metadata of a file: the meaning of its colours and pixels, and the record of how it was made."""
+"""Metadata of a file: its colour space, pixel density, and the record of how it was made."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from texrs._checks import as_int
 
 INCH = 0.0254
-"""Metres."""
+"""Length of an inch in metres."""
 MARK = '{"texrs"'
 """Beginning of the record of how texrs made a file."""
 NODATA = 42113
@@ -18,30 +18,30 @@ NODATA = 42113
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metadata:
-    """Metadata of a file.
+    """Metadata of an image or volume file.
 
     Attributes
     ----------
     profile : bytes, optional
-        The ICC profile of the colours.
+        ICC profile of the colours. Default: None.
     density : (down, across) of float, optional
-        Pixels per metre of the image as `read` returns it.
+        Pixels per metre down and across the image as `read` returns it. Default: None.
     srgb : bool
-        If True, the file states that its colours are sRGB.
+        If True, the file states that its colours are sRGB. Default: False.
     gamma : float, optional
-        Exponent that encodes light: 1 for linear samples, 1 / 2.2 for most others.
+        Exponent that encodes light: 1 for linear samples, 1 / 2.2 for most others. Default: None.
     primaries : tuple of 8 float, optional
-        Chromaticities x and y of white, red, green and blue.
+        Chromaticities x and y of white, red, green and blue. Default: None.
     made : str, optional
-        Record of how texrs made the file, as JSON.
+        Record of how texrs made the file, as JSON. Default: None.
     palette : bytes, optional
-        Colours of an indexed image in the order of the file, four bytes each: red, green, blue, alpha.
+        Colours of an indexed image in the order of the file, four bytes each: red, green, blue, alpha. Default: None.
     georeference : tuple of (int, int, int, object)
-        Tags of a TIFF file that state the position of its pixels on the earth, and the value of pixels without data.
-        Each has a code, a type, a number of values, and a value, as tifffile returns them. `write` writes them.
+        Tags of a GeoTIFF file: the geographic position of the pixels, and the value of pixels without data. Each tag
+        is (code, type, number of values, value), as tifffile returns it. `write` writes them. Default: ().
     multiplied : bool, optional
-        If True, colours are multiplied by alpha, as in EXR files. None for an image whose alpha is not a transparency.
-        Default: False.
+        If True, colours are multiplied by alpha, as in EXR files. None for an image whose alpha channel is not a
+        transparency. Default: False.
 
     Examples
     --------
@@ -63,24 +63,24 @@ class Metadata:
 
     @property
     def nodata(self) -> float | None:
-        """The value of pixels without data, as GDAL states it."""
+        """Value of pixels without data, from the GDAL tag; None if there is none."""
         text = next((value for code, _, _, value in self.georeference if code == NODATA), None)
         with suppress(TypeError, ValueError):
             return float(text)  # type: ignore[arg-type]
         return None
 
     def fit(self, channels: int) -> Metadata:
-        """Return metadata that fit an image with a number of channels: a profile is for grey or for colours.
+        """Return the metadata without the ICC profile if that does not fit the number of channels of an image.
 
         Parameters
         ----------
         channels : int
-            1 or 2 for grey, 3 or 4 for colours; alpha counts.
+            Number of channels including alpha: 1 or 2 for grey, 3 or 4 for colours.
 
         Returns
         -------
         texrs.io.Metadata
-            Without the profile if that does not fit.
+            Same metadata, without the profile if that is for grey and the image has colours, or the other way round.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""Files of NumPy, by a reader that never unpickles and that checks headers before memory is used."""
+"""Read and write .npy and .npz files, without unpickling and with a check of headers before memory is allocated."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 10_000
 _KEY = "image"
 _PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""Compressions that NumPy uses. Python unpacks others as a whole, however few bytes are read."""
+"""Compressions that NumPy uses. Python would unpack other compressions completely, even to read a few bytes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """Header of an array in a file of NumPy.
+    """Header of an array in an .npy or .npz file.
 
     Attributes
     ----------
@@ -39,9 +39,9 @@ class Header:
     dtype : numpy.dtype
         Type of the samples.
     fortran : bool
-        If True, the first axis runs fastest.
+        If True, the first axis varies fastest.
     start : int
-        Offset of the samples in bytes.
+        Offset of the samples from the start of the header, in bytes.
 
     Examples
     --------
@@ -59,12 +59,12 @@ class Header:
 
     @property
     def size(self) -> int:
-        """Number of bytes of the samples."""
+        """Total size of the samples in bytes."""
         return prod(self.shape) * self.dtype.itemsize
 
 
 Choice = Callable[[Mapping[str, Header]], Iterable[str]]
-"""Function that returns the keys of the arrays to read, by the headers of all."""
+"""Function that gets the headers of all arrays and returns the keys of the arrays to read."""
 
 
 def read_header(path: Path) -> Header:
@@ -75,14 +75,14 @@ def read_header(path: Path) -> Header:
 
 
 def read_npy(path: Path, limit: int, check: Callable[[Header], object] | None = None) -> Array:
-    """Read an .npy file whose header passes a check."""
+    """Read an .npy file. ``check`` gets the header first and can raise an error."""
     length = check_file(path)
     with translate_errors(path, "reading the array"), path.open("rb") as file:
         return _read_array(path, file, length, limit, check)
 
 
 def read_npz(path: Path, limit: int, check: Callable[[Header], object] | None = None) -> Array:
-    """Read the only array of an .npz file, or the one with the key "image", whose header passes a check."""
+    """Read an .npz file: its only array, or the array with the key "image". ``check`` gets the header first."""
     with translate_errors(path, "reading the archive"), zipfile.ZipFile(path) as archive:
         members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
         chosen = [m for m in members if m.filename == f"{_KEY}.npy"] or members
@@ -104,17 +104,17 @@ def read_headers(path: PathLike) -> dict[str, Header]:
     Parameters
     ----------
     path : path_like
-        Archive of arrays, as `numpy.savez` writes it.
+        Archive of arrays, as written by `numpy.savez`.
 
     Returns
     -------
     dict of str to Header
-        Headers by key, in the order of the file.
+        Header of each array by key, in the order of the file.
 
     Raises
     ------
     FileError
-        The file is missing, not an archive of arrays, or damaged.
+        The file is missing, is not an archive of arrays, or is damaged.
 
     Examples
     --------
@@ -134,17 +134,19 @@ def read_headers(path: PathLike) -> dict[str, Header]:
 
 
 def read_arrays(path: PathLike, *, limit: int | None = None, choose: Choice | None = None) -> dict[str, Array]:
-    """Return the arrays of an .npz file.
+    """Return the arrays of an .npz file by key.
 
     Parameters
     ----------
     path : path_like
-        Archive of arrays of numbers, as `numpy.savez` writes it. Python objects are an error.
+        Archive of arrays of numbers, as written by `numpy.savez`. Python objects are an error.
     limit : int, optional
-        Maximum number of pixels of each array, and a sixteenth of the bytes of all. Default: as `texrs.limits` allows.
+        Maximum number of pixels of an array. The maximum number of bytes of all arrays is 16 times this number.
+        Default: as `texrs.limits` allows.
     choose : callable, optional
-        Function that gets the headers (see `read_headers`) before samples are read. It returns the keys of the arrays to
-        read, or raises an error. With it, all arrays together may have more bytes. Default: None, which reads all.
+        Function that gets the headers (see `read_headers`) before samples are read, and returns the keys of the arrays
+        to read or raises an error. If it is given, the byte limit holds for each array, not for their sum. Default:
+        None, which reads all.
 
     Returns
     -------
@@ -154,9 +156,9 @@ def read_arrays(path: PathLike, *, limit: int | None = None, choose: Choice | No
     Raises
     ------
     FileError
-        The file is missing, not an archive of arrays, or damaged.
+        The file is missing, is not an archive of arrays, or is damaged.
     LimitExceeded
-        More bytes than ``limit`` or the memory allows.
+        The arrays need more bytes than ``limit`` or the memory allows.
 
     Examples
     --------
@@ -205,7 +207,7 @@ def _open_member(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) 
 
 
 def _find_members(path: Path, archive: zipfile.ZipFile) -> dict[str, tuple[zipfile.ZipInfo, Header]]:
-    """Return the members and headers of an archive by key."""
+    """Return the (archive member, header) of each array by key."""
     found = {}
     for member in archive.infolist():
         if member.filename != MEMBER:
@@ -215,13 +217,13 @@ def _find_members(path: Path, archive: zipfile.ZipFile) -> dict[str, tuple[zipfi
 
 
 def write_npy(path: Path, array: Array) -> None:
-    """Write an .npy file."""
+    """Write an array to an .npy file."""
     with path.open("xb") as file:
         np.lib.format.write_array(file, array, allow_pickle=False)
 
 
 def write_parts(path: Path, parts: Iterable[Array], shape: tuple[int, ...], dtype: np.dtype[np.generic]) -> None:
-    """Write an .npy file of arrays that continue each other along the first axis."""
+    """Write an .npy file from parts that are consecutive along the first axis."""
     header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
     with path.open("xb") as file:
         np.lib.format.write_array_header_1_0(file, header)
@@ -230,7 +232,7 @@ def write_parts(path: Path, parts: Iterable[Array], shape: tuple[int, ...], dtyp
 
 
 def write_npz(path: Path, array: Array) -> None:
-    """Write an .npz file with the key "image"."""
+    """Write an array to an .npz file, with the key "image"."""
     with path.open("xb") as file:
         np.savez_compressed(file, allow_pickle=False, **{_KEY: array})
 
@@ -238,14 +240,14 @@ def write_npz(path: Path, array: Array) -> None:
 def _read_array(
     path: Path, file: BinaryIO, length: int, limit: int, check: Callable[[Header], object] | None = None
 ) -> Array:
-    """Read an array from a stream of ``length`` bytes."""
+    """Read an array from a stream of ``length`` bytes, within the limit."""
     header = _read_header(path, file)
     shape, dtype, size, start = header.shape, header.dtype, header.size, header.start
     if size == 0:
         raise FileError(f"{path}: contains an empty array of shape {shape}")
     if check is not None:
         check(header)
-    # The axis of channels is not known here, so compare only bytes.
+    # It is not known here which axis contains channels, so compare only bytes.
     most = limit * BYTES_PER_PIXEL
     if size > most:
         raise LimitExceeded(f"{path}: shape {shape} of {dtype} needs {size} bytes, more than the limit of {most}")
@@ -268,7 +270,7 @@ def _read_array(
 
 
 def _read_header(path: Path, file: BinaryIO) -> Header:
-    """Read the header before the samples."""
+    """Read and check the header at the start of a stream."""
     start = file.tell()
     try:
         version = np.lib.format.read_magic(file)

@@ -1,4 +1,4 @@
-"""Metadata of OME-Zarr: the axes, the levels and the position of an image."""
+"""Describe the axes, levels and position of an image in the metadata of OME-Zarr."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 __all__ = ["describe_image"]
 
 VERSION = "0.5"
-"""Version of OME-Zarr."""
+"""Version of the OME-Zarr format that is written."""
 _COLOURS = {1: ("FFFFFF",), 2: ("FFFFFF", "808080"), 3: ("FF0000", "00FF00", "0000FF")}
 
 
@@ -21,7 +21,7 @@ def describe_image(
     spacing: Sequence[float],
     unit: str | None,
 ) -> dict[str, Any]:
-    """Return the axes, the levels and the positions of an image, with channels first.
+    """Return the OME-Zarr metadata of an image: its axes, levels and positions, with channels first.
 
     References
     ----------
@@ -33,7 +33,7 @@ def describe_image(
     datasets = []
     for level in range(levels):
         step = 2**level
-        # Sample i of a level is in the middle of the samples that it averages.
+        # A sample of a coarse level is at the centre of the samples that it averages.
         first = [(o + (step - 1) / 2) * s for o, s in zip(origin, spacing, strict=True)]
         one, none = [1.0] * len(before), [0.0] * len(before)
         moves = [

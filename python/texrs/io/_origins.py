@@ -1,4 +1,4 @@
-"""The file that an array was read from, for notices, and whether that file has a palette."""
+"""Remember from which file an array was read, and whether the file has a palette, for notices."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from texrs.errors import TexrsError
 from texrs.io._grids import read_spacing
 
 _READ: dict[int, tuple[weakref.ref[Array], str, bool]] = {}
-"""By the identity of an array: the array, its file, and whether the file has a palette."""
+"""Weak reference to the array, path of its file, and whether the file has a palette, by the `id` of the array."""
 
 
 def mark(array: Array, path: Path, indexed: bool) -> Array:
-    """Remember the file of an array, as long as the array exists."""
+    """Remember the file of an array until the array is deleted, and return the array."""
     key = id(array)
     _READ[key] = weakref.ref(array, lambda _: _READ.pop(key, None)), str(path), indexed
     return array
 
 
 def find(array: Array) -> tuple[str, bool] | None:
-    """Return the file that an array was read from, and whether that file has a palette; None if it is not known."""
+    """Return the path of the file that an array was read from, and True if the file has a palette; None if unknown."""
     known = _READ.get(id(array))
     return None if known is None or known[0]() is not array else known[1:]
 
 
 def carry(array: object, copy: Array) -> None:
-    """Remember the file of an array also for its copy."""
+    """Remember the file of an array for a copy of the array as well."""
     known = find(array) if isinstance(array, np.ndarray) else None
     if known is not None:
         mark(copy, Path(known[0]), known[1])
 
 
 def find_spacing(value: object) -> tuple[tuple[float, float, float] | None, str]:
-    """Return the distances between voxels that the file of a volume states, and the name of that file.
+    """Return the voxel distances that the file of a volume states (or None), and the name of that file (or "").
 
-    The value is a path, an array that was read from a file, or an object whose ``image`` is such an array.
+    ``value`` is a path, an array that was read from a file, or an object whose ``image`` is such an array.
     """
     array = value if isinstance(value, np.ndarray) else getattr(value, "image", None)
     known = find(array) if isinstance(array, np.ndarray) else None
     path = os.fspath(value) if isinstance(value, str | os.PathLike) else "" if known is None else known[0]
-    with suppress(TexrsError):  # The file may be gone. Its reader reports files that are not readable.
+    with suppress(TexrsError):  # The file may have been removed. If it is unreadable, its reader reports it.
         return (read_spacing(path), os.path.basename(path)) if path else (None, "")
     return None, ""

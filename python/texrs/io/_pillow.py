@@ -1,6 +1,6 @@
-"""Images that Pillow decodes: JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, and TIFF files that tifffile alone cannot.
+"""Read and write images with Pillow: JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, and some TIFF files.
 
-Pillow reads the header first. The limit of the caller is compared with the size in the header before pixels are decoded.
+Pillow reads the header first. Its size is compared with the limit before pixels are decoded.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from texrs.io._files import check_size, describe_error, translate_errors, turn_u
 from texrs.io._notes import INCH, MARK, Metadata
 
 EXIF, FOCAL, SPACE, ORIENTATION, ACROSS, DOWN, UNIT, DESCRIPTION = 0x8769, 0xA405, 0xA001, 274, 282, 283, 296, 270
-"""Tags of TIFF and Exif; EXIF is the directory of the camera, and FOCAL is FocalLengthIn35mmFilm."""
+"""Tags of TIFF and Exif. EXIF is the directory of the camera, and FOCAL is FocalLengthIn35mmFilm."""
 MOST = 3.0, 2000.0
-"""Minimum and maximum of focal lengths that are used."""
+"""Minimum and maximum focal length that is used, in millimetres on 35 mm film."""
 KINDS = {
     "jpeg": "JPEG",
     "gif": "GIF",
@@ -41,22 +41,23 @@ KINDS = {
     "webp": "WEBP",
     "tiff": "TIFF",
 }
-"""Pillow's names of formats."""
+"""Names of formats in Pillow, by the names in texrs."""
 DECODED = ("webp", "jpeg", "gif", "bmp", "tga", "dds", "psd", "avif", "jxl")
-"""Formats of images that only Pillow decodes."""
+"""Formats that only Pillow can decode."""
 ANIMATED = ("gif", "png", "webp", "avif", "jxl")
 SAVED: dict[str, tuple[str, dict[str, Any]]] = {
-    # Colour is not subsampled.
+    # Do not subsample colours.
     ".jpg": ("JPEG", {"quality": 95, "subsampling": 0}),
     ".jpeg": ("JPEG", {"quality": 95, "subsampling": 0}),
     ".png": ("PNG", {}),
-    # Keep colours where alpha is 0. On a photograph of 33 MB, more effort takes 2 to 7 times as long for 1 to 3 % fewer bytes.
+    # ``exact`` keeps colours where alpha is 0. On a photograph of 33 MB, higher efforts took 2 to 7 times as long for
+    # 1 to 3 % fewer bytes.
     ".webp": ("WEBP", {"lossless": True, "exact": True, "quality": 0, "method": 0}),
     ".gif": ("GIF", {}),
     ".bmp": ("BMP", {}),
     ".tga": ("TGA", {}),
     ".dds": ("DDS", {}),
-    # One thread, because the bytes must not depend on the machine.
+    # Use one thread, because the bytes must not depend on the machine.
     ".avif": ("AVIF", {"quality": 95, "subsampling": "4:4:4", "max_threads": 1, "autotiling": False}),
     ".jxl": ("JXL", {"lossless": True}),
 }
@@ -68,17 +69,17 @@ NEEDS = {
     "avif": "AVIF needs Pillow 11.3 or newer: pip install -U pillow",
 }
 _DTYPES = {"L": "u1", "RGB": "u1", "RGBA": "u1", "LA": "u1", "I;16": "u2", "I;16B": "u2", "I": "i4", "F": "f4"}
-"""The samples of a mode of Pillow."""
+"""Dtypes of the samples, by the mode of Pillow."""
 _QUIET = threading.RLock()
 
 
 def read(path: Path, kind: str, file: bytes, limit: int) -> Array:
-    """Decode an image, the first frame if there are several, and turn it upright."""
+    """Decode an image (the first frame if there are several) and turn it upright."""
     with translate_errors(path, "decoding"), _open(path, kind, file) as image:
         _check_size(path, image, limit)
         _check_whole(path, kind, image, file)
         array = _take_pixels(path, image.convert("RGBA") if kind == "gif" else image)
-        # Pillow gives these images an alpha channel even if the file has none.
+        # Pillow adds an alpha channel to these images even if the file has none.
         if (image.mode == "P" or kind in ("gif", "dds")) and array.shape[2:] == (4,) and (array[..., 3] == 255).all():
             array = np.ascontiguousarray(array[..., :3])
         orientation = _rust.exif_orientation(bytes(image.info.get("exif", b"")).removeprefix(b"Exif\0\0"))
@@ -86,7 +87,7 @@ def read(path: Path, kind: str, file: bytes, limit: int) -> Array:
 
 
 def read_pages(path: Path, dtype: np.dtype[Any], sides: Sequence[int], pages: Sequence[int]) -> Array:
-    """Decode pages of a TIFF file to pages, rows, columns, channels, without loss except of CMYK."""
+    """Decode pages of a TIFF file as (pages, rows, columns, channels). Only CMYK colours lose precision."""
     several = []
     with _open(path, "tiff") as image:
         for page in pages:
@@ -95,7 +96,7 @@ def read_pages(path: Path, dtype: np.dtype[Any], sides: Sequence[int], pages: Se
                 pixels = _take_pixels(path, image)
             if pixels.shape[:2] != tuple(sides):
                 raise FileError(f"{path}: page {page + 1} has another size in Pillow than in tifffile")
-            # Modes of Pillow have no sign, and int16 becomes int32.
+            # Pillow has no signed modes and returns int16 as int32.
             if pixels.dtype.kind == dtype.kind == "i" and dtype.itemsize == 2:
                 pixels = pixels.astype(dtype)
             if pixels.itemsize == dtype.itemsize and dtype.kind in "ui":
@@ -107,7 +108,7 @@ def read_pages(path: Path, dtype: np.dtype[Any], sides: Sequence[int], pages: Se
 
 
 def measure(data: bytes) -> int:
-    """Return the number of samples in the header of a strip or tile that is an image file."""
+    """Return the number of samples that the header of a compressed TIFF strip or tile states."""
     from PIL import Image
 
     with _silence(), Image.open(BytesIO(data), formats=("JPEG", "JPEG2000", "PNG", "WEBP")) as image:
@@ -115,7 +116,7 @@ def measure(data: bytes) -> int:
 
 
 def count_frames(path: Path, kind: str) -> int:
-    """Return the number of frames of an animation; 1 for all other files, and for damaged ones."""
+    """Return the number of frames of an animation; 1 for other files and for damaged files."""
     if kind not in ANIMATED:
         return 1
     with suppress(Exception), _silence(), _open(path, kind) as image:
@@ -124,8 +125,8 @@ def count_frames(path: Path, kind: str) -> int:
 
 
 def ignore_frames(path: Path, kind: str, file: bytes) -> None:
-    """Report the frames of an animation that are not used."""
-    # PNG and WebP are rarely animated: do not import Pillow for them.
+    """Report that only the first frame of an animation is used."""
+    # PNG and WebP are rarely animated, so look for their markers before Pillow is imported.
     if kind in ANIMATED and (kind not in ("png", "webp") or b"acTL" in file[:4096] or b"ANIM" in file[:64]):
         count = count_frames(path, kind)
         if count > 1:
@@ -133,9 +134,9 @@ def ignore_frames(path: Path, kind: str, file: bytes) -> None:
 
 
 def is_indexed(path: Path, kind: str, file: bytes | None = None) -> bool:
-    """Return whether an image has a palette."""
+    """Return True if an image file has a palette."""
     if kind == "png":
-        # Read the colour type, so that Pillow is not imported for most files.
+        # Read the colour type directly, so that Pillow is not imported for most files.
         with path.open("rb") as opened:
             return (opened.read(26) if file is None else file[:26])[25:] == b"\x03"
     if kind not in ("gif", "bmp", "tga", "dds", "psd"):
@@ -146,7 +147,7 @@ def is_indexed(path: Path, kind: str, file: bytes | None = None) -> bool:
 
 
 def read_palette(path: Path, kind: str) -> Array | None:
-    """Return the colours of an indexed image, (N, 4) of uint8 in the order of the file; None for all others."""
+    """Return the palette of an indexed image, (N, 4) uint8 RGBA in the order of the file; None for other images."""
     if not is_indexed(path, kind):
         return None
     with suppress(Exception), _silence(), _open(path, kind) as image:
@@ -159,12 +160,13 @@ def read_palette(path: Path, kind: str) -> Array | None:
 
 
 def read_notes(path: Path, kind: str) -> dict[str, Any]:
-    """Return the metadata of a file; the density is that of the upright image."""
+    """Return the metadata of a file. The density is for the upright image."""
     from PIL import Image
 
     with path.open("rb") as file, _silence():
         try:
-            # Image.open has a limit on pixels, but only the header is read here.
+            # `Image.open` refuses images of many pixels, but only the header is read here, so open the file without
+            # it.
             image = _find_plugin(path, kind)(file, str(path))
         except ValueError as error:
             if "MAX_TEXT_CHUNK" in str(error):
@@ -192,19 +194,19 @@ def read_notes(path: Path, kind: str) -> dict[str, Any]:
 
 
 def _find_density(kind: str, info: dict[str, Any], exif: Any) -> tuple[float, float] | None:
-    """Return the density that a header states, or else its Exif."""
+    """Return the pixels per metre (down, across) from the header or else from Exif; None if not stated."""
     unit, steps, least = info.get("jfif_unit"), info.get("jfif_density"), 0.0
     if kind != "jpeg" and "dpi" in info:
         unit, steps = 1, info["dpi"]
     elif unit not in (1, 2):
-        # Exif counts units from 2. Many files have one pixel an inch, which means nothing.
+        # Exif counts units from 2. Ignore a density of one pixel per inch: many programs write it as a placeholder.
         unit, steps, least = int(exif.get(UNIT, 2)) - 1, (exif.get(ACROSS, 0), exif.get(DOWN, 0)), 1 / INCH
     across, down = (float(step) / (INCH if unit == 1 else 0.01) for step in steps or (0, 0))
     return (down, across) if unit in (1, 2) and least < min(across, down) and max(across, down) < 1e9 else None
 
 
 def write_notes(path: Path, notes: Metadata, kind: str) -> None:
-    """Write a WebP or BMP file again, with a profile or a density."""
+    """Write a WebP file again with a profile, or a BMP file with a density."""
     data = path.read_bytes()
     with _open(path, kind, data) as image:
         if kind == "webp" and notes.profile is not None and data[12:16] == b"VP8L":
@@ -214,7 +216,7 @@ def write_notes(path: Path, notes: Metadata, kind: str) -> None:
 
 
 def read_description(path: Path) -> str | None:
-    """Return the description of a PNG or a TIFF file; None if there is none."""
+    """Return the description in a PNG or TIFF file; None if there is none."""
     from PIL import Image
 
     with suppress(Exception), _silence(), Image.open(path) as image:
@@ -224,10 +226,10 @@ def read_description(path: Path) -> str | None:
 
 
 def read_focal(path: Path) -> float | None:
-    """Return the focal length that a file's Exif states, in millimetres on 36 x 24 mm film; None if there is none."""
+    """Return the focal length in Exif, in millimetres on 36 x 24 mm film, 3 to 2000; None if there is none."""
     from PIL import Image
 
-    # No result needs the metadata of the camera, so that damaged ones do not matter.
+    # Ignore damaged camera metadata, because no result depends on them.
     with suppress(Exception), _silence(), Image.open(path) as opened:
         focal = float(opened.getexif().get_ifd(EXIF).get(FOCAL, 0))
         return focal if MOST[0] <= focal <= MOST[1] else None
@@ -235,7 +237,7 @@ def read_focal(path: Path) -> float | None:
 
 
 def encode(path: Path, array: Array, suffix: str, palette: Array | None = None) -> bytes:
-    """Encode uint8 pixels; with a palette, as indices into it."""
+    """Encode uint8 pixels as a file, or as indices if a palette is given."""
     from PIL import Image
 
     name, options = SAVED[suffix]
@@ -256,7 +258,7 @@ def encode(path: Path, array: Array, suffix: str, palette: Array | None = None) 
 
 
 def write_indexed(path: Path, array: Array, palette: bytes) -> bool:
-    """Write an image with a palette; return False if the format or the palette cannot hold it."""
+    """Write an image with a palette; return False if the format or the palette cannot represent it."""
     suffix, table = path.suffix.lower(), np.frombuffer(palette, np.uint8).reshape(-1, 4)
     if suffix not in INDEXED or find_indices(array, table) is None:
         return False
@@ -269,7 +271,7 @@ def write_indexed(path: Path, array: Array, palette: bytes) -> bool:
 
 
 def find_indices(array: Array, palette: Array) -> Array | None:
-    """Return the place of each pixel's colour in a palette; None if a colour is not in it."""
+    """Return the palette index of each pixel, (H, W) uint8; None if a colour is not in the palette."""
     if array.dtype != np.uint8 or (array.ndim, *array.shape[2:]) not in ((2,), (3, 3), (3, 4)):
         return None
     pixels, table = _pack(array.reshape(-1, (*array.shape, 1)[2])), _pack(palette)
@@ -282,14 +284,14 @@ def find_indices(array: Array, palette: Array) -> Array | None:
 
 
 def _pack(colours: Array) -> Array:
-    """Return each colour as one number; colours without alpha are opaque."""
+    """Pack each colour into one integer, with alpha 255 if there is none."""
     whole = np.full((len(colours), 4), 255, np.uint32)
     whole[:, : max(colours.shape[1], 3)] = colours
     return whole @ np.array([1 << 24, 1 << 16, 1 << 8, 1], np.uint32)
 
 
 def _index(array: Array, palette: Array) -> Any:
-    """Return an image of Pillow that has a palette."""
+    """Return a palette image of Pillow."""
     from PIL import Image
 
     indices = find_indices(array, palette)
@@ -301,21 +303,21 @@ def _index(array: Array, palette: Array) -> Any:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Suppress the warnings of Pillow about headers, one thread at a time: filters of warnings belong to all threads."""
+    """Suppress the warnings of Pillow about headers, in one thread at a time, because warning filters are global."""
     with _QUIET, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 def _load_plugins(kind: str) -> None:
-    """Import the plugins of Pillow that are installed for a format."""
+    """Import the installed Pillow plugins for a format."""
     for module in PLUGINS.get(kind, ()):
         with suppress(ImportError):
             import_module(module)
 
 
 def _find_plugin(path: Path, kind: str) -> Callable[..., Any]:
-    """Return the class of Pillow that reads a format."""
+    """Return the Pillow class that reads a format."""
     from PIL import Image
 
     _load_plugins(kind)
@@ -328,7 +330,7 @@ def _find_plugin(path: Path, kind: str) -> Callable[..., Any]:
 
 @contextmanager
 def _open(path: Path, kind: str, file: bytes | None = None) -> Iterator[Any]:
-    """Open an image and read only its header."""
+    """Open an image without decoding its pixels."""
     from PIL import Image, UnidentifiedImageError
 
     _find_plugin(path, kind)
@@ -360,7 +362,7 @@ def _check_size(path: Path, image: Any, limit: int) -> None:
 
 
 def _check_whole(path: Path, kind: str, image: Any, file: bytes) -> None:
-    """Check properties that Pillow does not check."""
+    """Raise an error for DDS files that are truncated and PSD files without a flattened image."""
     if kind == "dds":
         if (
             image.tile
@@ -377,7 +379,7 @@ def _check_whole(path: Path, kind: str, image: Any, file: bytes) -> None:
 
 
 def _take_pixels(path: Path, image: Any) -> Array:
-    """Return the pixels of the current frame, (H, W) or (H, W, C)."""
+    """Return the pixels of the current frame, (H, W) or (H, W, C), with palettes applied."""
     mode = image.mode
     if mode in ("P", "PA"):
         image = image.convert("RGBA" if image.has_transparency_data else "RGB")
@@ -394,7 +396,7 @@ def _take_pixels(path: Path, image: Any) -> Array:
 
 
 def _convert_inks(path: Path, image: Any) -> Any:
-    """Return CMYK as sRGB, by the profile of the file or by the formula of Pillow."""
+    """Return a CMYK image as sRGB, converted by the profile of the file or else by Pillow's formula."""
     from PIL import ImageCms
 
     with suppress(ImageCms.PyCMSError, OSError):

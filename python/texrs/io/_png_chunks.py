@@ -1,4 +1,4 @@
-"""Metadata that are put into PNG, JPEG and GIF files without encoding their pixels again; Pillow reads them."""
+"""Add metadata to PNG, JPEG and GIF files without encoding their pixels again. Pillow reads these metadata."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from pathlib import Path
 from texrs.io._notes import INCH, Metadata
 
 KEYWORD = b"texrs\0\0\0\0\0"
-"""Keyword of a text of PNG, and the fields after it: not compressed, no language, no translation."""
+"""Keyword of a PNG text chunk, followed by its flags: not compressed, no language, no translation."""
 _START, _HEADER = 8, 33
-"""Bytes of the signature of PNG, and up to the end of its header."""
+"""Length of the PNG signature, and offset of the end of the header chunk, in bytes."""
 _COLOURS = frozenset({b"iCCP", b"sRGB", b"gAMA", b"cHRM"})
-"""Chunks of PNG that depend on each other."""
+"""PNG chunks that define colours. If one is replaced, all are."""
 _PART = 65_519
-"""Maximum number of bytes of a profile in a segment of JPEG."""
+"""Maximum number of bytes of a profile in one JPEG segment."""
 
 
 def encode_record(kind: str, made: str) -> bytes:
-    """Return the bytes of a record as a file of a kind contains them."""
+    """Return a record as the bytes that a PNG, JPEG, GIF, TIFF or EXR file contains."""
     text = made.encode()
     if kind != "gif":
         return text
@@ -28,12 +28,12 @@ def encode_record(kind: str, made: str) -> bytes:
 
 
 def _frame(kind: bytes, body: bytes) -> bytes:
-    """Return a chunk of PNG."""
+    """Return a PNG chunk with its length and checksum."""
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
 def _walk(data: bytes) -> Iterator[bytes]:
-    """Return the chunks of a PNG file."""
+    """Yield the chunks of a PNG file."""
     at = _START
     while at + 12 <= len(data):
         end = at + 12 + int.from_bytes(data[at : at + 4], "big")
@@ -42,12 +42,12 @@ def _walk(data: bytes) -> Iterator[bytes]:
 
 
 def describe_png(file: bytes, text: str) -> bytes:
-    """Return a PNG file with a description."""
+    """Return a PNG file with a text chunk for the description added."""
     return file[:_HEADER] + _frame(b"tEXt", b"Description\0" + text.encode("latin-1")) + file[_HEADER:]
 
 
 def write_png(path: Path, notes: Metadata) -> None:
-    """Put chunks after the header, and remove those that they replace."""
+    """Insert metadata chunks after the header of a PNG file, and remove the chunks that they replace."""
     new = []
     if notes.made is not None:
         new.append((b"iTXt", KEYWORD + notes.made.encode()))
@@ -74,7 +74,7 @@ def write_png(path: Path, notes: Metadata) -> None:
 
 
 def write_jpeg(path: Path, notes: Metadata, former: bytes) -> None:
-    """Put segments after the first, in place of the former record, and the density into the first."""
+    """Insert the record and the profile after the first segment of a JPEG file, and set the density in that segment."""
     data = path.read_bytes()
     if former and notes.made is not None:
         at = data.index(former)
@@ -95,7 +95,7 @@ def write_jpeg(path: Path, notes: Metadata, former: bytes) -> None:
 
 
 def write_gif(path: Path, notes: Metadata, former: bytes) -> None:
-    """Put a comment after the palette, in place of the former record."""
+    """Insert the record as a comment after the palette of a GIF file, in place of the former record."""
     if notes.made is None:
         return
     data = path.read_bytes()

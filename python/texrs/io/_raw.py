@@ -1,4 +1,4 @@
-"""Samples without a header. The size and the type follow the name of the file."""
+"""Read samples from files without a header. The size and the type are appended to the file name."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from texrs.io._files import check_file, check_size, translate_errors
 __all__ = ["RAW", "Raw", "explain_raw", "make_raw", "parse_raw", "strip_raw"]
 
 RAW = ".raw"
-"""The suffix of samples without a header."""
+"""Suffix of files of samples without a header."""
 _WORDS = re.compile(
     r"(?P<path>.+\.raw):(?P<sides>\d{1,9}(?:[x×]\d{1,9}){2,3})(?::(?P<dtype>u?int(?:8|16|32|64)|float(?:16|32|64)))?"
     r"(?::(?P<order>big|little))?",
@@ -30,15 +30,15 @@ _KINDS = "uint8, int8, uint16, int16, uint32, int32, uint64, int64, float16, flo
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """A file of samples without a header, with their size and type."""
+    """File of samples without a header, with its size and type."""
 
     path: Path
     shape: tuple[int, ...]
-    """Planes, rows, columns, and channels if there are several."""
+    """Number of planes, rows and columns, and of channels if there are several."""
     dtype: np.dtype[Any]
 
     def read(self, limit: int) -> Array:
-        """Read the samples."""
+        """Read the samples as an array."""
         length, need = check_file(self.path), prod(self.shape) * self.dtype.itemsize
         check_size(self.path, self.shape[:3], prod(self.shape[3:]), self.dtype.itemsize, limit)
         if length != need:
@@ -50,7 +50,7 @@ class Raw:
 
 
 def parse_raw(path: Path) -> Raw | None:
-    """Parse a name such as ``scan.raw:96x96x48:uint16:big``: width, height, depth, type, byte order; return None for others."""
+    """Parse a name such as ``scan.raw:96x96x48:uint16:big`` (width, height, depth, type, byte order)."""
     found = _WORDS.fullmatch(str(path))
     if found is None or path.exists():
         return None
@@ -62,13 +62,13 @@ def parse_raw(path: Path) -> Raw | None:
 
 
 def strip_raw(text: str) -> str:
-    """Return the name of a file without its size and type."""
+    """Return the name of a file without the size and type that are appended to it."""
     found = parse_raw(Path(text)) if RAW in text.lower() else None
     return text if found is None else str(found.path)
 
 
 def make_raw(path: Path, shape: Sequence[int] | None, dtype: object) -> Raw:
-    """Return a description of samples by the arguments of a call."""
+    """Return the description of a headerless file whose shape and dtype are given as arguments."""
     if shape is None or dtype is None:
         missing, other = ("shape", "dtype") if shape is None else ("dtype", "shape")
         raise InvalidInput(f"{missing}: must be given with {other}, to read samples without a header")
@@ -85,7 +85,7 @@ def make_raw(path: Path, shape: Sequence[int] | None, dtype: object) -> Raw:
 
 
 def explain_raw(path: Path) -> str:
-    """Return an error text that explains how to state the size and the type."""
+    """Return an error message that explains how to append the size and type to the name."""
     size = path.stat().st_size
     side = round(size ** (1 / 3))
     example = f"{side}x{side}x{side}:uint8" if side**3 == size else "96x96x48:uint16"

@@ -1,4 +1,4 @@
-"""Volumes in folders: one numbered image for each plane."""
+"""Read volumes from folders that contain one numbered image per plane."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ __all__ = ["is_series", "list_slices", "read_series"]
 
 _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\.[a-z]+)", re.IGNORECASE)
 _SHOWN = 8
-"""Maximum number of slices that an error names."""
+"""Maximum number of slices that an error message names."""
 LEAST = 2
-"""Minimum number of slices of a volume."""
+"""Minimum number of slices in a volume."""
 
 
 def _find_groups(folder: Path, suffixes: Collection[str]) -> dict[tuple[str, str], dict[int, str]]:
@@ -39,7 +39,7 @@ def _find_groups(folder: Path, suffixes: Collection[str]) -> dict[tuple[str, str
 
 
 def is_series(folder: Path, suffixes: Collection[str]) -> bool:
-    """Return whether a folder contains numbered slices: at least two images whose names differ only in the number."""
+    """Return True if a folder contains numbered slices: at least two images whose names differ only in the number."""
     return folder.is_dir() and any(len(group) >= LEAST for group in _find_groups(folder, suffixes).values())
 
 
@@ -60,7 +60,7 @@ def list_slices(folder: Path, suffixes: Collection[str]) -> list[Path]:
     first, last = min(group), max(group)
     missing = [n for n in range(first, last + 1) if n not in group]
     if missing:
-        # Names have as many digits as the last one.
+        # If all names are equally long, pad the numbers of missing slices with zeros.
         digits = len(group[last]) - len(before) - len(after)
         padded = len({len(name) for name in group.values()}) == 1
         names = [f"{before}{n:0{digits if padded else 1}d}{after}" for n in missing[:_SHOWN]]
@@ -75,7 +75,7 @@ def list_slices(folder: Path, suffixes: Collection[str]) -> list[Path]:
 
 
 def read_series(folder: Path, suffixes: Collection[str], limit: int, read: Callable[[Path, int], Array]) -> Array:
-    """Read the slices of a folder, of one shape and dtype, as a volume."""
+    """Read the slices of a folder as a volume. All slices must have the same shape and dtype."""
     names = list_slices(folder, suffixes)
     first = read(names[0], limit)
     check_size(folder, (len(names), *first.shape[:2]), first[0, 0].size, first.itemsize, limit)

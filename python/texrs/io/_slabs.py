@@ -1,4 +1,4 @@
-"""Volumes that are written slab by slab."""
+"""Check the slabs of a volume that is written slab by slab."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 
 
 def as_shape(shape: object) -> tuple[int, ...]:
-    """Check the shape of a volume, with or without channels."""
+    """Check and return the shape of a volume, with or without channels."""
     sides: tuple[Any, ...] = ()
     if isinstance(shape, list | tuple) or (isinstance(shape, np.ndarray) and shape.ndim == 1):
         sides = tuple(shape[:5])
@@ -23,7 +23,7 @@ def as_shape(shape: object) -> tuple[int, ...]:
 
 
 def check(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
-    """Return slabs one by one, and check that they form the volume."""
+    """Yield slabs one by one, and check that together they form the volume."""
     done, dtype = 0, None
     for slab in slabs:
         dtype = dtype or slab.dtype
@@ -41,7 +41,7 @@ def check(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
 
 
 def split_planes(slabs: Iterable[Array]) -> Iterator[Array]:
-    """Return the planes of slabs with channels, and bool as 0 and 255."""
+    """Yield the planes of slabs with a channel axis, and with bool as 0 and 255."""
     for slab in slabs:
         part = slab.astype(np.uint8) * np.uint8(255) if slab.dtype == np.bool_ else slab
         yield from part if part.ndim == 4 else part[..., np.newaxis]

@@ -1,4 +1,4 @@
-"""Temporary files: their names, the removal of those of dead processes, and the final renaming."""
+"""Name temporary files, remove the temporary files of dead processes, and rename finished files."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ from pathlib import Path
 __all__ = ["name_prefix", "name_temporary", "put", "settle", "sweep"]
 
 _NAME = re.compile(r"\.texrs-(?P<home>[0-9a-f]{8})-(?P<process>[0-9]{1,10})-\w{8}(\.(?!former$).*)?", re.DOTALL)
-"""Names that may be removed. A ``.former`` store is the file of a user, and perhaps the only copy."""
+"""Names of temporary files that may be removed.
+
+A ``.former`` store is excluded: it is a user's data, perhaps the only copy.
+"""
 _WEEK = 7 * 24 * 3600.0
-"""Seconds after which a temporary file of another machine, or of one before its restart, is removed."""
+"""Age in seconds after which a temporary file from another machine, or from before a restart, is removed."""
 
 
 def name_prefix() -> str:
@@ -28,21 +31,22 @@ def name_prefix() -> str:
 
 
 def name_temporary(final: Path, suffix: str) -> Path:
-    """Return a temporary name for a file; the first call for a folder sweeps it."""
+    """Return a temporary name for a file. The first call for a folder also removes old temporary files there."""
     sweep(os.fspath(final.parent))
-    # Short, because the final name may already have the maximum length.
+    # Keep the name short, because the final name may already have the maximum length.
     return final.with_name(f"{name_prefix()}{secrets.token_hex(4)}{suffix}")
 
 
 def put(temporary: Path, final: Path) -> None:
-    """Rename a file or a folder, so that after a loss of power either the former one or the whole new one is there.
+    """Rename a temporary file or folder to its final name, so that a power failure leaves the old or the new one.
 
-    The bytes are on the disk before the renaming, and the name is before this function returns, if the file system can do so.
+    If the file system supports it, the content is on the disk before the renaming, and the name before this function
+    returns.
 
     Raises
     ------
     OSError
-        The disk cannot take it.
+        The disk is full or not writable.
 
     """
     settle(temporary)
@@ -52,7 +56,7 @@ def put(temporary: Path, final: Path) -> None:
 
 
 def settle(path: Path) -> None:
-    """Wait until a file, or the content of a folder, is on the disk."""
+    """Wait until a file, or the content of a folder, is stored on the disk."""
     for folder, _, files in os.walk(path):
         for name in files:
             _sync(os.path.join(folder, name))
@@ -63,7 +67,7 @@ def settle(path: Path) -> None:
 
 @cache
 def sweep(folder: str) -> None:
-    """Remove the temporary files of ended processes in a folder, once."""
+    """Remove the temporary files of ended processes from a folder, once per process."""
     try:
         names = os.listdir(folder)
     except OSError:
@@ -84,7 +88,7 @@ def sweep(folder: str) -> None:
 
 @cache
 def _find_home() -> str:
-    """Return an identifier of the machine, its start and the container, where the number of a process is unique."""
+    """Return an identifier of the machine, its last start and the container. Process numbers are unique within it."""
     parts = [platform.node()]
     with suppress(OSError):
         parts.append(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii"))
@@ -93,8 +97,8 @@ def _find_home() -> str:
 
 
 def _is_gone(process: int) -> bool:
-    """Return whether it is certain that no process has a number."""
-    if os.name != "posix":  # On other systems os.kill would end the process.
+    """Return True if a process with this number certainly does not exist."""
+    if os.name != "posix":  # On other systems, os.kill would end the process.
         return False
     try:
         os.kill(process, 0)
@@ -106,14 +110,14 @@ def _is_gone(process: int) -> bool:
 
 
 def _sync(path: str | os.PathLike[str]) -> None:
-    """Wait until the content of a file or a folder is on the disk."""
-    if os.name != "posix" and os.path.isdir(path):  # Windows does not open folders.
+    """Wait until the content of a file or a folder is stored on the disk."""
+    if os.name != "posix" and os.path.isdir(path):  # Windows cannot open folders.
         return
     number = os.open(path, os.O_RDONLY if os.name == "posix" else os.O_RDWR)
     try:
         os.fsync(number)
     except OSError as error:
-        # Some file systems do not support this.
+        # Some file systems do not support fsync.
         if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EROFS):
             raise
     finally:

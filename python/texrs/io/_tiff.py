@@ -1,4 +1,4 @@
-"""TIFF, images and stacks, by tifffile. Pillow or the compiled decoder read what tifffile needs imagecodecs for."""
+"""Read and write TIFF images and stacks with tifffile."""
 
 from __future__ import annotations
 
@@ -32,31 +32,37 @@ _UNFOLDING: dict[int, float] = {
     _LZMA: inf,
     **dict.fromkeys(_ZSTD, inf),
 }
-"""Maximum ratio of each compression. tifffile collects the bytes of PackBits in a list, at nine bytes each."""
+"""Maximum ratio of unpacked to packed bytes for each compression.
+
+The ratio of PackBits, 64, is multiplied by nine, because tifffile keeps unpacked bytes in a list of nine bytes each.
+"""
 _PICTURES = frozenset({6, 7, 33003, 33004, 33005, 34712, 34933, 50001})
-"""Compressions whose strips and tiles are JPEG, JPEG 2000, PNG and WebP files."""
+"""Compressions whose strips and tiles are JPEG, JPEG 2000, PNG or WebP files."""
 _HARMLESS = 2**26
-"""Maximum number of unpacked bytes of a strip that is not checked."""
+"""Maximum number of unpacked bytes of a strip that is accepted without a check."""
 _DICTIONARY = 2**28
-"""Maximum number of bytes of the dictionary of LZMA."""
+"""Maximum number of bytes of an LZMA dictionary."""
 _ORIENTATION, _ACROSS, _DOWN, _UNIT, _SOFTWARE, _PROFILE = 274, 282, 283, 296, 305, 34675
 GEOREFERENCE = frozenset({33550, 33922, 34264, 34735, 34736, 34737, NODATA})
-"""Tags of GeoTIFF, and of GDAL."""
+"""Tags of GeoTIFF and of GDAL."""
 SOFTWARE = "texrs"
-"""Value of the tag Software, which a record replaces."""
+"""Value of the tag Software, which is later replaced by the record of how texrs made the file."""
 _SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317, 320, 322, 323, 324, 325, 338, 339})
-"""Tags of the layout of pixels. tifffile continues without a tag that it cannot read."""
+"""Tags that the layout of the pixels depends on.
+
+tifffile skips a tag that it cannot read, so their presence is checked.
+"""
 _ASSOCIATED = 1
-"""Type of an extra sample: an alpha that the colours are multiplied by."""
+"""Type of an extra sample that is an associated alpha: the colours are multiplied by it."""
 _OME = 2**16
-"""Maximum number of characters of the metadata of OME that are searched."""
+"""Maximum number of characters of the OME metadata that are searched."""
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _SEPARATED, _YCBCR = 0, 1, 2, 3, 5, 6
 
 
 def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
-    """Read planes, rows, columns, channels, and the orientation that is still to be applied.
+    """Return an array (planes, rows, columns, channels), and the orientation that must still be applied.
 
-    Images of another size than the first (previews, resolution levels) are not read.
+    Previews and lower resolution levels are not read.
     """
     import tifffile
 
@@ -84,8 +90,9 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         try:
             array = series.asarray(maxworkers=1)
         except Exception as error:
-            # tifffile learns late that a predictor or a width of samples needs imagecodecs, which refuses strips that
-            # are filled up. Pillow reads both. It prints a line for a corrupt strip, so do not ask it about those.
+            # Only while decoding, tifffile finds that a predictor or sample width needs imagecodecs, and imagecodecs
+            # rejects padded strips. Pillow reads both. Do not use it for corrupt strips, because it prints a line for
+            # each.
             reasons = ("imagecodecs", "INSUFFICIENT_SPACE")
             if not isinstance(error, ImportError) and not any(reason in str(error) for reason in reasons):
                 raise
@@ -98,7 +105,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
 
 
 def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channels: int, limit: int) -> Array:
-    """Return planes, rows, columns, channels of a file that tifffile cannot decode alone."""
+    """Return (planes, rows, columns, channels) of a file that tifffile cannot decode without imagecodecs."""
     first, size = series.keyframe, dict(zip(series.axes, series.shape, strict=True))
     outer = series.axes[: len(series.axes) - len(first.axes)]
     pages = [page.index for page in series.pages if page is not None]
@@ -108,7 +115,7 @@ def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channe
     def decode() -> Array:
         return _part_alpha(path, _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels), first)
 
-    # The compiled decoder prints nothing about corrupt strips, but it does not read all tiles.
+    # Prefer the compiled decoder, which prints nothing about corrupt strips, but does not read all tiles.
     if compiled and not first.is_tiled and (channels > 1 or series.dtype.kind == "u"):
         return decode()
     with suppress(FileError, OSError, ValueError, SyntaxError, TypeError, KeyError):
@@ -117,7 +124,7 @@ def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channe
             array = array.reshape(*(size[a] for a in outer), *array.shape[1:])
             if "C" in outer:
                 array = np.moveaxis(array, outer.index("C"), -2)
-            # Pillow has divided the colours by an associated alpha.
+            # Pillow has already divided the colours by an associated alpha.
             return _part_alpha(path, np.ascontiguousarray(array.reshape(*sides, -1)), first, divided=True)
     with suppress(FileError):
         if compiled:
@@ -131,9 +138,9 @@ def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channe
 
 
 def _report_others(path: Path, tif: Any, series: Any) -> None:
-    """Report the pages of a file that are not in the series that is read, reduced copies apart."""
+    """Report pages that are not read, except reduced copies of other pages."""
     taken = {page.index for page in series.pages if page is not None}
-    # Only the first page of a contiguous stack is listed.
+    # tifffile lists only the first page of a contiguous stack, so unused pages cannot be counted there.
     if all(page is not None for page in series.pages):
         unused = sum(page.index not in taken and not page.is_reduced for page in tif.pages)
         if unused:
@@ -149,17 +156,17 @@ def count_planes(path: Path) -> int:
 
 
 def read_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that ImageJ or OME states, x first."""
+    """Return the voxel distances (x, y, z) that ImageJ or OME metadata state; None if they state none."""
     found = read_imagej(path) or read_ome(path)
     return None if found is None else found[0]
 
 
 def read_ome(path: Path) -> tuple[tuple[float, float, float], str] | None:
-    """Return the distances between voxels that OME states, x first, and their unit; None if it states none."""
+    """Return the voxel distances (x, y, z) in the OME metadata and their unit; None if there are none."""
     with _open(path, "reading") as (tif, _):
         pixels = re.search(r"<(?:\w+:)?Pixels\b[^>]*>", (tif.ome_metadata or "")[:_OME])
     stated = dict(re.findall(r'\bPhysicalSize([XYZ](?:Unit)?)="([^"]*)"', pixels[0])) if pixels else {}
-    # The default unit of OME is a micrometre.
+    # The default unit of OME is the micrometre.
     units = {stated.get(f"{axis}Unit", "µm") for axis in "XYZ"}
     with suppress(KeyError, ValueError):
         x, y, z = (float(stated[axis]) for axis in "XYZ")
@@ -168,7 +175,7 @@ def read_ome(path: Path) -> tuple[tuple[float, float, float], str] | None:
 
 
 def read_imagej(path: Path) -> tuple[tuple[float, float, float], str] | None:
-    """Return the distances between voxels that ImageJ states, x first, and their unit; None if it states none."""
+    """Return the voxel distances (x, y, z) in the ImageJ metadata and their unit; None if there are none."""
     with _open(path, "reading") as (tif, _):
         said = tif.imagej_metadata
         if not said or not isinstance(said.get("spacing"), int | float) or not tif.pages:
@@ -176,14 +183,14 @@ def read_imagej(path: Path) -> tuple[tuple[float, float, float], str] | None:
         steps = []
         for name in ("XResolution", "YResolution"):
             tag = tif.pages.first.tags.get(name)
-            # ImageJ states the number of pixels in a unit as a fraction.
+            # ImageJ states the number of pixels per unit as a fraction.
             over, under = tag.value if tag is not None and isinstance(tag.value, tuple) else (1, 1)
             steps.append(under / over if over and under else 1.0)
         return (steps[0], steps[1], abs(float(said["spacing"]))), str(said.get("unit", ""))
 
 
 def take_image(path: Path, planes: Array, orientation: int) -> Array:
-    """Return the only plane of a file."""
+    """Return the only plane of a file as an upright image."""
     if planes.shape[0] != 1:
         raise FileError(
             f"{path}: contains {planes.shape[0]} planes; read them with texrs.io.read_volume, or save one page only"
@@ -192,7 +199,7 @@ def take_image(path: Path, planes: Array, orientation: int) -> Array:
 
 
 def take_volume(path: Path, planes: Array, orientation: int) -> Array:
-    """Return all planes of a file."""
+    """Return all planes of a file as a volume of upright planes."""
     if orientation != 1:
         planes = np.stack([turn_upright(plane, orientation) for plane in planes])
     return planes[..., 0] if planes.shape[3] == 1 else planes
@@ -206,7 +213,7 @@ def write_tiff(
     description: str | None = None,
     tags: Sequence[tuple[int, int, int, Any]] = (),
 ) -> None:
-    """Write planes of rows, columns, channels, of ``size`` bytes in all: one page per plane, uncompressed."""
+    """Write planes (rows, columns, channels) of ``size`` bytes in total, uncompressed, one page per plane."""
     import tifffile
 
     options: dict[str, Any] = {
@@ -219,21 +226,21 @@ def write_tiff(
         "extratags": [(*tag, True) for tag in tags],
         "metadata": None,
     }
-    # Offsets of 32 bits end at 4 GB.
+    # Use BigTIFF for large files, because 32-bit offsets end at 4 GB.
     with tifffile.TiffWriter(path, bigtiff=size > 2**32 - 2**25) as tif:
         for number, plane in enumerate(planes):
-            # The first page has a place for a record.
+            # Reserve the tag Software of the first page for the record.
             software = SOFTWARE if number == 0 else False
             tif.write(plane if channels > 1 else plane[..., 0], software=software, **options)
 
 
 def keeps_spacing(dtype: np.dtype[Any], channels: int) -> bool:
-    """Return whether stacks of ImageJ can hold volumes of a dtype."""
+    """Return True if the TIFF form of ImageJ, which stores the spacing, supports a dtype and number of channels."""
     return (dtype.name, channels) in {("uint8", 1), ("uint16", 1), ("float32", 1), ("uint8", 3)}
 
 
 def write_imagej(path: Path, volume: Array, spacing: Sequence[float], unit: str) -> None:
-    """Write a volume (D, H, W, C) with its spacing, z first, as ImageJ states it."""
+    """Write a volume (D, H, W, C) and its spacing (z, y, x) in the TIFF form of ImageJ."""
     import tifffile
 
     coloured = volume.shape[3] == 3
@@ -281,7 +288,10 @@ def write_notes(path: Path, notes: Metadata) -> None:
 
 
 def _add_profile(tif: Any, profile: bytes) -> None:
-    """Write the directory of the first page again at the end of its file, with a profile: tifffile does not add tags."""
+    """Add an ICC profile to the first page.
+
+    tifffile cannot add tags, so the directory is rewritten at the end of the file.
+    """
     file, layout = tif.filehandle, tif.tiff
     file.seek(tif.pages.first.offset)
     count = int(struct.unpack(layout.tagnoformat, file.read(layout.tagnosize))[0])
@@ -302,18 +312,21 @@ def _add_profile(tif: Any, profile: bytes) -> None:
 
 @contextmanager
 def _open(path: Path, what: str) -> Iterator[tuple[Any, int]]:
-    """Open a file whose pages form a chain, and return its length."""
+    """Open a file, check that its chain of pages ends, and return tifffile's object and the length in bytes."""
     import tifffile
 
     length = check_file(path)
-    # OME files can name other files to read; this one is all that was asked for.
+    # OME metadata can name other files. Read only the file that was asked for.
     with translate_errors(path, what), _mute(), tifffile.TiffFile(path, _multifile=False) as tif:
         _check_chain(path, tif, length)
         yield tif, length
 
 
 def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, int, int], int]:
-    """Return (planes, rows, columns) and channels: S and C are channels, T, Z and others planes."""
+    """Return (planes, rows, columns), and the number of channels.
+
+    S and C axes are channels; T, Z and others are planes.
+    """
     size = dict(zip(axes, shape, strict=True))
     if "Y" not in size or "X" not in size or len(size) != len(axes):
         raise FileError(f"{path}: has the axes {axes}; an image needs rows and columns")
@@ -323,7 +336,7 @@ def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[in
 
 
 def _check_chain(path: Path, tif: Any, length: int) -> None:
-    """Check that the chain of pages of a file ends, and that pages do not overlap."""
+    """Check that the chain of pages ends, and is not longer than the file allows."""
     layout, file, at = tif.tiff, tif.filehandle, tif.pages.first.offset if tif.pages else 0
     order: Any = "big" if tif.byteorder == ">" else "little"
     least, seen = layout.tagnosize + layout.tagsize + layout.offsetsize, set()
@@ -338,7 +351,7 @@ def _check_chain(path: Path, tif: Any, length: int) -> None:
 
 
 def _check_tags(path: Path, tif: Any, page: Any) -> None:
-    """Check that all tags that the pixels depend on were read, because the file may be cut off."""
+    """Check that all tags that the pixels depend on were read, because the file may be truncated."""
     layout, file = tif.tiff, tif.filehandle
     order: Any = "big" if tif.byteorder == ">" else "little"
     file.seek(page.offset)
@@ -350,12 +363,12 @@ def _check_tags(path: Path, tif: Any, page: Any) -> None:
 
 
 def _check_segments(path: Path, series: Any, length: int) -> None:
-    """Check that all strips and tiles are in the file, because missing ones would be read as zeros."""
+    """Check that all strips and tiles are in the file, because missing pixels would be read as zeros."""
     cut = FileError(f"{path}: is cut off or corrupt; some of its pixels are missing")
     if series.dataoffset is not None and series.dataoffset + series.nbytes > length:
         raise cut
     for page in series.pages:
-        if page is None:  # A contiguous stack has one page; the others are where it says.
+        if page is None:  # A contiguous stack has only one page, whose offset was checked above.
             continue
         offsets, counts = page.dataoffsets, page.databytecounts
         if not offsets or len(offsets) != len(counts):
@@ -366,12 +379,12 @@ def _check_segments(path: Path, series: Any, length: int) -> None:
 
 
 def _check_unfolded(path: Path, file: Any, series: Any) -> None:
-    """Check that no strip or tile unpacks to many more bytes than its pixels need, because tifffile unpacks it as a whole."""
+    """Check that no strip or tile unpacks to many more bytes than its pixels need, because tifffile has no limit."""
     for page in series.pages:
         key = None if page is None else page.keyframe
         if key is None or (key.compression not in _UNFOLDING and key.compression not in _PICTURES):
             continue
-        # Some writers fill up strips.
+        # Allow twice the bytes, because some writers pad strips.
         most = 2 * prod(key.chunks) * max(key.dtype.itemsize, 1) + 2**16
         for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
             if count * _UNFOLDING.get(key.compression, inf) <= max(most, _HARMLESS):
@@ -396,7 +409,7 @@ def _measure(compression: int, data: bytes, most: int) -> int:
     if compression == _PACKBITS:
         return _measure_packbits(data, most)
     try:
-        # tifffile uses that of Python 3.14, and cannot unpack without it.
+        # tifffile also uses this module of Python 3.14, and cannot unpack zstd without it.
         zstd: Any = import_module("compression.zstd")
     except ImportError:
         return 0
@@ -404,22 +417,22 @@ def _measure(compression: int, data: bytes, most: int) -> int:
 
 
 def _measure_packbits(data: bytes, most: int) -> int:
-    """Return the number of unpacked bytes of runs, or a number above ``most`` if it is larger."""
+    """Return the number of unpacked bytes of PackBits runs, or a number above ``most`` if it is larger."""
     size = at = 0
     while at < len(data) and size <= most:
         step = data[at]
-        # A run contains plain bytes, nothing, or one byte that is repeated.
+        # A run contains plain bytes, nothing, or one repeated byte.
         run, length = (step + 1, step + 2) if step < 128 else (0, 1) if step == 128 else (257 - step, 2)
         size, at = size + run, at + length
     return size
 
 
 def _apply_colours(path: Path, array: Array, page: Any) -> Array:
-    """Apply the properties of the samples: palettes, white as zero, single bits."""
+    """Convert samples to plain values: apply palettes, invert white-is-zero, and scale single bits to 0 and 255."""
     photometric = page.photometric
     if photometric == _PALETTE and page.colormap is not None and array.dtype.kind == "u":
         table = page.colormap
-        # Palettes of 8 bits are spread to 16 by 257 or by 256, and by some writers not at all.
+        # Writers scale 8-bit palettes to 16 bits by 257, by 256, or not at all.
         if (table < 256).all():
             table = table.astype(np.uint8)
         elif (table % 257 == 0).all() or (table % 256 == 0).all():
@@ -429,7 +442,7 @@ def _apply_colours(path: Path, array: Array, page: Any) -> Array:
         array = (array != 0).astype(np.uint8) * np.uint8(255)
     if photometric == _WHITE_IS_ZERO and array.dtype.kind == "u":
         return np.subtract(np.iinfo(array.dtype).max, array)
-    # tifffile converts YCbCr to RGB only if it is compressed by JPEG.
+    # tifffile converts YCbCr to RGB only if it is JPEG-compressed.
     if photometric in (_BLACK_IS_ZERO, _RGB) or (photometric, page.compression) == (_YCBCR, _JPEG):
         return array
     name = getattr(photometric, "name", str(photometric))
@@ -437,7 +450,7 @@ def _apply_colours(path: Path, array: Array, page: Any) -> Array:
 
 
 def _part_alpha(path: Path, array: Array, page: Any, *, divided: bool = False) -> Array:
-    """Return colours that are not multiplied by alpha, as in all other files and verbs."""
+    """Return colours divided by an associated alpha, because texrs uses unassociated alpha everywhere."""
     if array.shape[-1] not in (2, 4) or tuple(page.extrasamples) != (_ASSOCIATED,) or array.dtype.kind not in "uf":
         return array
     assume(f"{path.name}: colours are divided by alpha, because the file has them multiplied by it (associated alpha)")
@@ -453,7 +466,7 @@ def _part_alpha(path: Path, array: Array, page: Any, *, divided: bool = False) -
 
 @contextmanager
 def _mute() -> Iterator[None]:
-    """Do not print the log of tifffile about a corrupt file, because the error contains it."""
+    """Suppress the log of tifffile about a corrupt file in this thread, because the error already contains it."""
     mine = threading.get_ident()
 
     def others(record: logging.LogRecord) -> bool:

@@ -1,4 +1,4 @@
-"""Arrays of vectors and matrices, from files of all formats."""
+"""Read arrays of vectors and matrices from files of all formats."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from texrs.io._formats import detect_kind
 from texrs.io._grids import VECTORS
 
 SPATIAL = ("nrrd", "nii", "nii.gz", "vti")
-"""Formats of programs whose vectors are x, y, z."""
+"""Formats whose vectors have the components x, y, z."""
 
 
 def read_vectors(path: PathLike, *, limit: int | None = None) -> tuple[Array, bool]:
-    """Return an array of directions or frames at places, with all its axes.
+    """Read an array of directions or frames, with all its axes.
 
     Parameters
     ----------
     path : path_like
-        .npy, .npz (of a single array), a Zarr store, NRRD, NIfTI or .vti (the vectors, if there are several
-        arrays), or a TIFF file with one channel per component.
+        .npy file, .npz file (with a single array), Zarr store, NRRD or NIfTI file, .vti file (its vectors, if there
+        are several arrays), or TIFF file with one channel per component.
     limit : int, optional
-        Sixteenth of the maximum number of bytes. Default: the voxels that `texrs.limits` allows.
+        Maximum number of bytes, divided by 16. Default: the voxels that `texrs.limits` allows.
 
     Returns
     -------
     array : ndarray
-        The axes of the places are first, in the order of arrays: (plane, row, column).
+        Array whose first axes are the positions (plane, row, column), followed by the components.
     spatial : bool
-        Whether the components are x, y, z, as in the programs that use the format.
+        True if the components are x, y, z, as programs that use the format expect; False if they are in array order.
 
     Raises
     ------
     FileError
         The file is missing, not readable, damaged, or of another format.
     LimitExceeded
-        More memory than the limit.
+        The array needs more memory than the limit allows.
 
     Examples
     --------

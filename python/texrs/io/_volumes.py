@@ -1,9 +1,10 @@
-"""Volumes for other programs: NRRD by pynrrd, NIfTI by nibabel (extra ``vol``), STL surfaces.
+"""Read and write volumes of other programs: NRRD with pynrrd, NIfTI with nibabel (extra ``vol``), and STL surfaces.
 
-The libraries read and write headers. This module reads samples, after it has compared the header with the limit and
-with the length of the file. Neither a huge header nor a bomb of compressed zeros can therefore fill the memory.
+The libraries read and write only headers. This module reads the samples, after it has compared the header with the
+limit and with the length of the file. Neither a huge size in a header nor highly compressed zeros can therefore fill
+the memory.
 
-NRRD and NIfTI list the axis that runs fastest first, so that plane, row and column are z, y and x.
+NRRD and NIfTI list the fastest axis first. Plane, row and column are therefore their z, y and x.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from texrs.io._files import check_file, check_size, translate_errors
 NRRD_MAGIC = b"NRRD000"
 GZIP_MAGIC = b"\x1f\x8b"
 NIFTI_MAGIC = (b"\x5c\x01\0\0", b"\0\0\x01\x5c", b"\x1c\x02\0\0", b"\0\0\x02\x1c")
-"""Lengths of the header, with which files of both versions and byte orders begin."""
+"""First bytes of NIfTI files: the length of the header, for versions 1 and 2 in both byte orders."""
 
 _MOST_CHANNELS = 64
 _LONGEST_HEADER = 2**16
@@ -58,10 +59,11 @@ _STL_TITLE = b"texrs".ljust(80)
 
 
 def read_nrrd(path: Path, limit: int) -> Array:
-    """Read an NRRD volume whose samples are in the file or in another file of its folder, raw or compressed by gzip."""
+    """Read an NRRD volume whose samples are in the file or in another file of its folder, raw or gzip-compressed."""
     with _open(path) as (file, length):
         header, end = _read_nrrd_header(path, file, length)
-        # Read one file of samples in the same folder only, because a header must not name any file of the machine.
+        # Accept only one file of samples in the same folder, so that a header cannot make texrs read any file of the
+        # machine.
         beside = header.get("data file", header.get("datafile"))
         if beside is not None and (
             not isinstance(beside, str) or beside in ("", ".", "..") or re.search(r"[/\\%\s]|^LIST$", beside)
@@ -78,7 +80,7 @@ def read_nrrd(path: Path, limit: int) -> Array:
         dtype = np.dtype(_NRRD_TYPES[kind])
         if header.get("endian", "little") == "big":
             dtype = dtype.newbyteorder(">")
-        # NRRD lists the fastest axis first. The channels can be any axis.
+        # NRRD lists the fastest axis first. Any axis can contain the channels.
         sizes = [int(n) for n in np.atleast_1d(header["sizes"])]
         kinds = [str(kind).lower() for kind in header.get("kinds", [])]
         channel = _find_channel(path, sizes, kinds)
@@ -102,7 +104,10 @@ def read_nrrd(path: Path, limit: int) -> Array:
 
 
 def read_nrrd_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that a header states in the order of the file, as numbers or as the lengths of vectors."""
+    """Return the voxel distances that a header states, in the order of the file.
+
+    Directions are replaced by their lengths.
+    """
     header = read_header(path)
     steps = header.get("spacings")
     if steps is None and header.get("space directions") is not None:
@@ -111,13 +116,13 @@ def read_nrrd_spacing(path: Path) -> Sequence[float] | None:
 
 
 def _read_nrrd_header(path: Path, file: BinaryIO, length: int) -> tuple[dict[str, Any], int]:
-    """Return the fields of a header, and its length."""
+    """Return the fields of a header, and its length in bytes."""
     nrrd: Any = _import_library("nrrd", "pynrrd", path)
-    # The library reads lines of any length, so limit the header.
+    # The library reads lines of any length, so limit the length of the header.
     start = file.read(_LONGEST_HEADER)
     end = min((at + n for n, at in ((2, start.find(b"\n\n")), (4, start.find(b"\r\n\r\n"))) if at >= 0), default=-1)
     if end < 0 and length == len(start) and re.search(rb"^data ?file:", start, re.MULTILINE):
-        # A header without samples ends with its file.
+        # The header of a file without samples ends with the file.
         end = length
     if end < 0:
         raise FileError(f"{path}: its NRRD header does not end within {_LONGEST_HEADER} bytes")
@@ -127,7 +132,7 @@ def _read_nrrd_header(path: Path, file: BinaryIO, length: int) -> tuple[dict[str
 
 
 def read_header(path: Path) -> Any:
-    """Return the header of an NRRD file as pynrrd reads it, or that of a NIfTI file as nibabel does."""
+    """Return the header of an NRRD file as pynrrd reads it, or the header of a NIfTI file as nibabel reads it."""
     with _open(path) as (file, length):
         start = file.read(2)
         file.seek(0)
@@ -135,7 +140,7 @@ def read_header(path: Path) -> Any:
 
 
 def _place_nrrd(known: dict[str, Any], steps: list[float], before: int) -> dict[str, Any]:
-    """Return the fields of another header for the positions of voxels, with the given distances."""
+    """Return the header fields that place the voxels in space, from another header but with the given distances."""
     placed: dict[str, Any] = {
         key: known[key] for key in ("space", "space dimension", "space units", "measurement frame") if key in known
     }
@@ -143,7 +148,7 @@ def _place_nrrd(known: dict[str, Any], steps: list[float], before: int) -> dict[
     units = [u for u in known.get("units", []) if u][-3:]
     if len(units) == 3:
         placed["units"] = [""] * before + units
-    # Only three directions can belong to the axes.
+    # Direction vectors can only be assigned to the axes if there are three of them.
     if rows is None or not placed.keys() & {"space", "space dimension"}:
         return placed | {"spacings": [float("nan")] * before + steps}
     found = np.array([[np.nan] * 3 if row is None else row for row in rows], float)
@@ -157,7 +162,7 @@ def _place_nrrd(known: dict[str, Any], steps: list[float], before: int) -> dict[
 
 
 def write_nrrd(path: Path, volume: Array, spacing: Sequence[float], like: dict[str, Any] | None = None) -> None:
-    """Write an NRRD volume, raw, with the positions of voxels in the header ``like``."""
+    """Write an uncompressed NRRD volume, with the positions of voxels in the header ``like``."""
     nrrd: Any = _import_library("nrrd", "pynrrd", path)
     steps = [float(s) for s in reversed(spacing)]
     header: dict[str, Any] = {"encoding": "raw", "endian": "little"}
@@ -169,7 +174,7 @@ def write_nrrd(path: Path, volume: Array, spacing: Sequence[float], like: dict[s
     little = volume.astype(volume.dtype.newbyteorder("<"), copy=False)
     with path.open("xb") as file:
         nrrd.write(file, little, header, index_order="C", compression_level=1)
-    # The library writes the date, but the same volume must give the same bytes.
+    # The library writes the date. Remove it, because the same volume must give the same bytes.
     with path.open("r+b") as file:
         start = file.read(256)
         first = start.find(b"# on ")
@@ -179,7 +184,7 @@ def write_nrrd(path: Path, volume: Array, spacing: Sequence[float], like: dict[s
 
 
 def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
-    """Return the axis of the channels: without kinds, the fastest of four."""
+    """Return the axis of the channels: as the header states, or the fastest of four axes."""
     if len(sizes) == 3:
         return None
     if len(sizes) != 4:
@@ -203,7 +208,7 @@ def read_nifti(path: Path, limit: int) -> Array:
         colours = len(fields) if fields and all(dtype[n] == np.uint8 for n in fields) else 0
         if not colours and (dtype.kind not in "uif" or dtype.itemsize > 8):
             raise FileError(f"{path}: must contain integers, floats or RGB, got {dtype}")
-        # Missing axes have length 1. Axes after the third one are channels.
+        # Axes that the header omits have length 1. Axes after the third one are channels.
         count = int(header["dim"][0])
         sizes = [int(n) for n in header["dim"][1 : 1 + max(0, min(count, 7))]]
         sizes += [1] * (3 - len(sizes))
@@ -221,7 +226,7 @@ def read_nifti(path: Path, limit: int) -> Array:
         file.seek(int(offset))
         whole = prod(sizes)
         flat = _read_samples(path, file, length and length - int(offset), whole, dtype, compressed=False)
-        # Samples with a scale factor become floats, as other programs read them.
+        # Convert samples with a scale factor to floats, as other programs do.
         slope, intercept = header.get_slope_inter() if not colours else (None, None)
     if colours:
         volume = flat.view(np.uint8).reshape(*sizes[2::-1], colours)
@@ -235,12 +240,12 @@ def read_nifti(path: Path, limit: int) -> Array:
 
 
 def read_nifti_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that a header states, x first."""
+    """Return the voxel distances (x, y, z) that a header states."""
     return [abs(float(s)) for s in read_header(path)["pixdim"][1:4]]
 
 
 def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], int]:
-    """Return a header, the dtype of the samples, and the length of the header."""
+    """Return the header, the dtype of the samples, and the length of the header in bytes."""
     nibabel: Any = _import_library("nibabel", "nibabel", path)
     start = file.read(540)
     if start[:4] not in NIFTI_MAGIC:
@@ -259,9 +264,10 @@ def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], 
 
 
 def write_nifti(path: Path, volume: Array, spacing: Sequence[float], like: Any = None, *, compressed: bool) -> None:
-    """Write a NIfTI volume: bytes of three or four channels as colours, others as vectors.
+    """Write a NIfTI volume. Three or four channels of uint8 become colours, and other channels vectors.
 
-    The header ``like`` states the positions of the voxels. Without one, the version is 1 and the first voxel is the origin.
+    The header ``like`` states the positions of the voxels. Without ``like``, the version is 1 and the first voxel is
+    at the origin.
     """
     nibabel: Any = _import_library("nibabel", "nibabel", path)
     channels = volume.shape[3] if volume.ndim == 4 else 1
@@ -286,7 +292,7 @@ def write_nifti(path: Path, volume: Array, spacing: Sequence[float], like: Any =
 
 
 def _place_nifti(nibabel: Any, data: Array, steps: NDArray[np.float64], like: Any) -> Any:
-    """Return an image with the positions of voxels in a header, and with the given distances."""
+    """Return a NIfTI image whose voxels are placed as in the header ``like``, but with the given distances."""
     second = isinstance(like, nibabel.Nifti2Header)
     header = (nibabel.Nifti2Header if second else nibabel.Nifti1Header)()
     for key in ("qform_code", "sform_code", "xyzt_units", "quatern_b", "quatern_c", "quatern_d"):
@@ -307,7 +313,7 @@ def _place_nifti(nibabel: Any, data: Array, steps: NDArray[np.float64], like: An
 
 
 def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int64]) -> None:
-    """Write triangles with corners x, y, z."""
+    """Write triangles, with vertices (x, y, z), as a binary STL file."""
     facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     with path.open("xb") as file:
         file.write(_STL_TITLE + len(faces).to_bytes(4, "little"))
@@ -325,7 +331,7 @@ def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int64
 
 @contextmanager
 def _open(path: Path) -> Iterator[tuple[BinaryIO, int]]:
-    """Open a file, unpack it if it is compressed as a whole, and return its length: 0 if that is not known."""
+    """Open a file, decompress it if it is gzip-compressed, and return its length in bytes, or 0 if that is unknown."""
     length = check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as raw:
         packed = raw.read(2) == GZIP_MAGIC
@@ -336,13 +342,13 @@ def _open(path: Path) -> Iterator[tuple[BinaryIO, int]]:
 def _read_samples(
     path: Path, file: BinaryIO, left: int, count: int, dtype: np.dtype[Any], *, compressed: bool
 ) -> Array:
-    """Read ``count`` samples, and no byte more than they need, in native byte order."""
+    """Read ``count`` samples in native byte order, without reading more bytes than they need."""
     size = count * dtype.itemsize
     if left and not compressed and left < size:
         raise FileError(f"{path}: is cut off; its samples need {size} bytes, but only {left} follow")
     inflate = zlib.decompressobj(31) if compressed else None
     out, filled, rest = bytearray(), 0, b""
-    # A compressed file may contain less than its header states, so let memory grow with the content.
+    # A compressed file can contain less than its header states, so let the memory grow with the content.
     while filled < size:
         part = rest or file.read(min(2**20, size - filled) if inflate is None else 2**20)
         if inflate is not None:
@@ -362,7 +368,7 @@ def _read_samples(
 
 
 def _check_sides(path: Path, sizes: list[int]) -> None:
-    """Refuse sizes below 1, because the product of two negative sides is positive."""
+    """Raise an error for sizes below 1, because the product of two negative sizes would be positive."""
     if min(sizes) < 1:
         raise FileError(f"{path}: contains no voxels ({' x '.join(map(str, sizes))})")
 

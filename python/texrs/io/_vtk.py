@@ -1,6 +1,6 @@
-"""Image data of VTK (.vti), as ParaView and simulations write them, in every encoding.
+"""Read and write image data of VTK (.vti), as used by ParaView and simulations, in every encoding.
 
-The package vtk also reads them, but takes half a gigabyte. A grid needs only its sides and its samples.
+The package vtk could read them, but needs half a gigabyte. Regular grids consist only of a size and samples.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _WORDS = {"u": "UInt", "i": "Int", "f": "Float"}
 _TYPES = {f"{_WORDS[kind]}{8 * size}": f"{kind}{size}" for kind in "ui" for size in (1, 2, 4, 8)}
 _TYPES |= {"Float32": "f4", "Float64": "f8"}
 _STEP = 3 * 2**20
-"""Bytes that are encoded at once; a multiple of three, so that the parts form one stream."""
+"""Number of bytes that are encoded at once. It is a multiple of three, so that the base64 parts form one stream."""
 
 
 def read_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that a header states, x first."""
+    """Return the voxel distances (x, y, z) that a header states."""
     check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as file:
         found = _SPACING.search(file.read(2**16))
@@ -42,14 +42,14 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
     """Read the points or cells of one piece of image data."""
     check_length(path, limit)
     with translate_errors(path, "reading"), path.open("rb") as file:
-        # The samples are decoded from this file without a copy of their text.
+        # Decode the samples directly from the mapped file, without a copy of their text.
         content = mmap(file.fileno(), 0, access=ACCESS_READ)
         start = content.find(b"<AppendedData")
         root = ElementTree.fromstring(content[:] if start < 0 else content[:start] + b"</VTKFile>")
         pieces = root.findall("ImageData/Piece")
         if root.tag != "VTKFile" or len(pieces) != 1:
             raise FileError(f"{path}: must be image data of one piece")
-        # The extent counts points. Cells are one fewer along each axis.
+        # The extent counts points. There is one cell fewer along each axis.
         low, high = (np.array(pieces[0].get("Extent", "").split(), int)[a::2] for a in (0, 1))
         groups = {kind: pieces[0].find(kind) for kind in ("PointData", "CellData")}
         kind, group = next(((k, g) for k, g in groups.items() if g is not None and len(g)), ("", None))
@@ -68,7 +68,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         size = dtype.itemsize * channels * check_size(path, tuple(sides), channels, dtype.itemsize, limit)
         header = np.dtype(end + ("u8" if root.get("header_type") == "UInt64" else "u4"))
         data = memoryview((chosen.text or "").strip().encode())
-        # Samples are text, or base64 in place, or appended at the end of the file.
+        # The samples are text, inline base64, or data at the end of the file.
         form, encoded = chosen.get("format", "ascii"), True
         if form == "appended":
             mark = content.find(b"_", content.find(b">", start)) + 1
@@ -88,7 +88,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
 
 
 def _choose(path: Path, names: Mapping[str, object], active: list[str | None]) -> str:
-    """Return the name of the active array, or of the only one."""
+    """Return the name of the active array, or the name of the only array."""
     for name in active:
         if name is not None and name in names:
             return name
@@ -98,7 +98,7 @@ def _choose(path: Path, names: Mapping[str, object], active: list[str | None]) -
 
 
 def _decode(data: bytes | memoryview, length: int) -> bytes:
-    """Return the first ``length`` bytes of a text of base64, or up to two more."""
+    """Decode the first ``length`` bytes of a base64 text, or up to two bytes more."""
     need = -(-length // 3) * 4
     text = b"".join(bytes(data).split())[:need] if re.search(rb"\n", data[:need]) else data[:need]
     return base64.b64decode(text[: len(text) // 4 * 4])
@@ -107,7 +107,7 @@ def _decode(data: bytes | memoryview, length: int) -> bytes:
 def _unpack(
     path: Path, data: memoryview, header: np.dtype[np.generic], encoded: bool, packer: str | None, size: int
 ) -> bytes | memoryview:
-    """Return the samples. They follow their length, or are in compressed blocks that follow the lengths of all blocks."""
+    """Return the samples. They follow their length, or are in compressed blocks after the lengths of all blocks."""
     one = header.itemsize
     if packer is None:
         there = _decode(data, one + size) if encoded else data
@@ -120,7 +120,7 @@ def _unpack(
         raise FileError(f"{path}: states that its samples are in {blocks} blocks")
     whole = (3 + blocks) * one
     lengths = np.frombuffer(_decode(data, whole) if encoded else data, header, count=3 + blocks)[3:].tolist()
-    # The lengths are a separate text.
+    # The lengths of the blocks are encoded separately from the blocks.
     body = _decode(b"".join(bytes(data).split())[-(-whole // 3) * 4 :], sum(lengths)) if encoded else data[whole:]
     out, place = bytearray(), 0
     for length in lengths:
@@ -136,7 +136,7 @@ def _unpack(
 
 
 def write_vti(path: Path, volume: Array, spacing: Sequence[float]) -> None:
-    """Write a value per point, at the middle of each voxel, in base64."""
+    """Write a volume as point data in base64, with one point at the centre of each voxel."""
     channels = volume.shape[3] if volume.ndim == 4 else 1
     kind = f"{_WORDS[volume.dtype.kind]}{8 * volume.dtype.itemsize}"
     extent = " ".join(f"0 {n - 1}" for n in volume.shape[2::-1])
@@ -151,7 +151,7 @@ def write_vti(path: Path, volume: Array, spacing: Sequence[float]) -> None:
             f'<DataArray type="{kind}" Name="texture" NumberOfComponents="{channels}" format="appended" offset="0"/>\n'
             '</PointData>\n<CellData/>\n</Piece>\n</ImageData>\n<AppendedData encoding="base64">\n_'.encode()
         )
-        # The length and the samples are one stream.
+        # The length and the samples are encoded together.
         head, data = little.nbytes.to_bytes(8, "little"), little.reshape(-1).view(np.uint8).data
         file.write(base64.b64encode(head + bytes(data[: _STEP - 8])))
         for start in range(_STEP - 8, len(data), _STEP):

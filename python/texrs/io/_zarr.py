@@ -1,4 +1,4 @@
-"""Zarr stores: read plain arrays and the finest level of OME-Zarr images, and write images of one level."""
+"""Read plain Zarr arrays and the finest level of OME-Zarr images, and write OME-Zarr images of one level."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from texrs.io._ome import describe_image
 from texrs.io._temporary import name_temporary, put, settle
 
 MARKS = ("zarr.json", ".zarray", ".zgroup")
-"""The folder of each array and group contains one of these files."""
+"""Files that mark a folder as a Zarr array or group. Each such folder contains one of them."""
 _RECORD = "texrs"
 _MOST_CHANNELS = 64
 _SPACE = "zyx"
@@ -26,12 +26,12 @@ _CHUNK = {2: 512, 3: 128}
 
 
 def is_store(path: str | os.PathLike[str]) -> bool:
-    """Return whether a folder is an array or a group of Zarr.
+    """Return True if a folder is an array or a group of Zarr.
 
     Parameters
     ----------
     path : path_like
-        Folder, which need not exist.
+        Folder. It need not exist.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def is_store(path: str | os.PathLike[str]) -> bool:
     Raises
     ------
     InvalidInput
-        Not a path.
+        ``path`` is not a path.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def is_store(path: str | os.PathLike[str]) -> bool:
 
 
 def read_store(path: Path, limit: int, axes: int | None) -> Array:
-    """Return the array of a store with ``axes`` spatial axes and the channels last; if ``axes`` is None, as it is stored."""
+    """Read a store with ``axes`` spatial axes, and the channels last. If ``axes`` is None, keep all axes."""
     with translate_errors(path, "reading the store"):
         array, names = _find(path)
         _check_complete(path, array)
@@ -71,7 +71,7 @@ def read_store(path: Path, limit: int, axes: int | None) -> Array:
 
 
 def count_axes(path: Path) -> int:
-    """Return the number of spatial axes of the array of a store; channels have a name or come last."""
+    """Return the number of spatial axes of a store's array. Channels have a name, or are the last axis."""
     with translate_errors(path, "reading the store"):
         array, names = _find(path)
     if names is None:
@@ -81,7 +81,7 @@ def count_axes(path: Path) -> int:
 
 
 def read_store_spacing(path: Path) -> Sequence[float] | None:
-    """Return the distances that OME-Zarr states for the finest level, x first."""
+    """Return the voxel distances (x, y, z) that OME-Zarr states for the finest level; None if it states none."""
     with translate_errors(path, "reading the store"):
         node = _import_zarr(path).open(os.fspath(path), mode="r")
         said = node.attrs.get("ome", node.attrs)
@@ -101,7 +101,7 @@ def read_store_spacing(path: Path) -> Sequence[float] | None:
 
 
 def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *, overwrite: bool) -> None:
-    """Write an image or a volume as OME-Zarr of one level, whole or not at all; only a store is replaced."""
+    """Write an image or a volume as OME-Zarr of one level, as a whole. Only an existing Zarr store is replaced."""
     zarr, final = _import_zarr(path), Path(os.path.realpath(path))
     if final.exists() and not (overwrite and is_store(final)):
         raise FileError(
@@ -125,8 +125,8 @@ def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *
             )
             stored[...] = values
             if final.exists():
-                settle(temporary)  # Settle now, so that the time without either store is short.
-                # Move the existing store away, and back if the new one cannot take its name.
+                settle(temporary)  # Write to the disk now, so that the time without either store is short.
+                # Move the existing store away, and move it back if the new store cannot take its name.
                 os.replace(final, former := temporary.with_suffix(".former"))
                 try:
                     put(temporary, final)
@@ -146,7 +146,7 @@ def _tidy(values: Any) -> Array:
 
 
 def _find(path: Path) -> tuple[Any, tuple[str, ...] | None]:
-    """Return the array at a path, or of the group there, and the names of its axes."""
+    """Return the array at a path, or the array of the group at a path, and the names of its axes (or None)."""
     zarr = _import_zarr(path)
     node = zarr.open(os.fspath(path), mode="r")
     if isinstance(node, zarr.Array):
@@ -178,7 +178,7 @@ def _name_axes(array: Any) -> tuple[str, ...] | None:
 
 
 def _check_complete(path: Path, array: Any) -> None:
-    """Refuse a store of an interrupted run of texrs, because missing chunks would be read as zeros."""
+    """Raise an error for an unfinished store of texrs, because missing chunks would be read as zeros."""
     store = array.store_path.store
     root = getattr(store, "root", None)
     if root is None:
@@ -198,7 +198,7 @@ def _check_complete(path: Path, array: Any) -> None:
 def _arrange(
     path: Path, shape: tuple[int, ...], names: tuple[str, ...] | None, axes: int
 ) -> tuple[tuple[Any, ...], list[int], int | None]:
-    """Return the index for each axis, the order of the axes, and the axis of channels."""
+    """Return the index for each axis, the order of the axes, and the axis of channels (or None)."""
     space = _SPACE[-axes:]
     what = ("a picture", "a volume")[axes - 2]
     keep: list[Any] = [slice(None)] * len(shape)
@@ -210,7 +210,7 @@ def _arrange(
             keep[a] = 0
             others.remove(a)
     else:
-        # Axes without names are in the order of arrays, with the channels last.
+        # Axes without names are (plane, row, column) in this order, followed by the channels.
         order, others = list(range(min(axes, len(shape)))), list(range(axes, len(shape)))
     if len(order) < axes or len(others) > 1:
         called = f" ({', '.join(names)})" if names else ""
