@@ -1,4 +1,7 @@
-"""Materials: maps of one surface in register. Every verb takes them as examples and returns all their maps."""
+"""Materials: several maps of one surface, aligned pixel by pixel.
+
+Every verb takes a material as an example and returns all of its maps.
+"""
 
 from texrs._lighting_correction import flatten_lighting
 from texrs.materials._applying import apply

@@ -1,4 +1,4 @@
-"""Look-up of one map through a source map, according to its name or its values."""
+"""Apply a source map to one map of a material. The file name or the values of the map decide how it is resampled."""
 
 from __future__ import annotations
 
@@ -37,51 +37,50 @@ def apply(
     finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
-    """Apply a source map to a map of the exemplar, and correct it as the result was corrected.
+    """Apply a source map to a map of the exemplar, with the finish that its verb used.
 
-    ``apply(result.source_map, exemplar)`` is ``result.image``, bit for bit, unless `texrs.splice` has changed the
-    light on elements. Seams are corrected, samples are interpolated, and known pixels are kept, in the same way. A
-    source map without a finish is not corrected.
+    ``apply(result.source_map, exemplar)`` equals ``result.image`` bit for bit, except that `texrs.splice` can relight
+    elements. It corrects seams, interpolates samples and keeps known pixels in the same way. If the source map has no
+    finish, nothing is corrected.
 
     Parameters
     ----------
     source : SourceMap
         Source map of an image or a volume.
     exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one per exemplar
-        Any map with the exemplar's height and width (and depth), of any real dtype and number of channels. The name of
-        a file gives its role, as in a folder of maps (`texrs.materials.guess_role`). Each channel of a packed map is
-        looked up separately.
+        Any map of the height and width (and depth) of the exemplar, with any dtype and channels. For several
+        exemplars, a sequence with one map each. A file name gives the role of the map, as in a folder of maps
+        (`texrs.materials.guess_role`). Each channel of a packed map is processed separately.
     map_type : {"colour", "normal", "vector", "label"}, optional
-        Type of the map. "colour": also heights and other values that may be mixed. If the finish removes uneven light,
-        it does so here. "normal", "vector": normals in tangent space, or directions on the surface. They are rotated
-        as in `SourceMap.render`. "label": unordered classes. The nearest sample is used, and nothing is corrected.
-        Default: from the file name. Without a role: "label" for integers that form regions of unrelated values, else
-        "colour".
+        Type of the map. "colour": colours, heights and other values that can be mixed. If the finish removes uneven
+        light, it does so here. "normal", "vector": normals in tangent space, or directions on the surface. They are
+        rotated as in `SourceMap.render`. "label": unordered classes. The nearest sample is used, and nothing is
+        corrected. Default: from the file name. If the name gives no role: "label" for integers that form regions of
+        unrelated values, else "colour".
     green : {"up", "down"}, optional
         Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: from the file name,
         else "up".
     finish : RenderOptions, optional
-        Finish instead of the source map's own.
+        Finish to use instead of the finish of the source map. Default: None.
     progress : callable or True, optional
-        Called as ``progress("blend", share)`` during the seam correction. An exception that it raises stops the work.
-        True shows a bar.
+        Function that is called as ``progress("blend", share)`` during the seam correction, with a share from 0 to 1.
+        An exception that it raises stops the work. True shows a progress bar. Default: None.
 
     Returns
     -------
     array
-        Output with the map's channels, in the map's dtype.
+        Output with the channels and the dtype of the map.
 
     Raises
     ------
     InvalidInput
-        If the number or size of exemplars differs from the source map, or the type is unknown.
+        The number or size of the exemplars differs from the source map, or the type is unknown.
     FileError
-        If a file cannot be read.
+        A file cannot be read.
 
     See Also
     --------
-    texrs.SourceMap.render : The look-up only.
-    texrs.blend : The correction only, in any strength.
+    texrs.SourceMap.render : Only the look-up. texrs.blend : Only the seam correction, with any strength.
 
     Examples
     --------
@@ -110,7 +109,7 @@ def apply(
 
 
 def find_named(name: str | None, *, report: bool = False) -> Role | None:
-    """Return the role in a file name, by itself or with the other names in its folder. Report the latter."""
+    """Return the role that a file name gives, alone or with the other names in its folder; None if there is none."""
     if name is None:
         return None
     file = FilePath(name)
@@ -124,7 +123,7 @@ def find_named(name: str | None, *, report: bool = False) -> Role | None:
 
 
 def find_packed(name: str | None) -> Role | None:
-    """Return the role in a file name if its channels are different quantities, and report it."""
+    """Return the role in a file name if its channels are different quantities (a packed map), and report it."""
     role = find_named(name)
     if role is None or not role.packed:
         return None
@@ -136,7 +135,7 @@ def find_packed(name: str | None) -> Role | None:
 def look_up(
     source: SourceMap, several: Sequence[Map], finish: RenderOptions | None, watch: Callable[[float], object]
 ) -> Array:
-    """Return a source map applied to one map of each exemplar. Each group of channels is treated by its role."""
+    """Apply a source map to one map of each exemplar. Each group of channels is processed according to its role."""
     groups = list(zip(*(split_channels(each, source.axes) for each in several), strict=True))
     made = []
     for done, group in enumerate(groups):
@@ -154,7 +153,7 @@ def look_up(
 def choose_kind(
     name: str | None, pixels: Sequence[Array], axes: int, map_type: Kind | None = None, green: Green | None = None
 ) -> tuple[Kind, Green]:
-    """Return the look-up of a map: as stated, by its file name, or by its values. Report the last two."""
+    """Return the type of a map and its direction of y: as given, from its file name, or from its values."""
     if map_type is not None:
         as_choice(map_type, "map_type", ("colour", "normal", "vector", "label"))
     if green is not None:
@@ -171,7 +170,7 @@ def choose_kind(
     elif map_type is None and role is not None and usual == "label":
         assume(f"{title}: read as labels, the values of which are not mixed")
     elif name is not None and map_type is None and role is None and found == "colour":
-        # A short name such as stone_n has a role only next to other maps.
+        # A short name such as stone_n only has a role next to other maps of the same material.
         if cut_name(FilePath(name).stem) != FilePath(name).stem:
             assume(f"{title}: read as colours, because no other map in the folder explains the name")
     elif green is None and found in ("normal", "vector"):
@@ -180,7 +179,7 @@ def choose_kind(
 
 
 def find_kind(role: Role | None) -> Kind:
-    """Return the look-up of maps of a role."""
+    """Return the type of look-up for maps of a role: "colour", "normal", "vector" or "label"."""
     if role is None:
         return "colour"
     if role.labelled:
@@ -191,7 +190,7 @@ def find_kind(role: Role | None) -> Kind:
 
 
 def choose_finish(finish: RenderOptions, name: str | None) -> RenderOptions:
-    """Return a finish that removes uneven light from colours only."""
+    """Return the finish for a map: only colours get their uneven light removed."""
     role = find_named(name)
     return (
         replace(finish, flatten_lighting=False)

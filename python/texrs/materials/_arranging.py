@@ -1,4 +1,4 @@
-"""Arrangement of a material's maps as the files of a convention: its names, its packings and its direction of y."""
+"""Arrange the maps of a material as the files of a naming convention, with its names, packings and direction of y."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from texrs.materials._surface import list_signed
 __all__ = ["arrange_maps"]
 
 SAME = {"smoothness": "roughness", "reflectance": "metallic", "emissiveness": "emission"}
-"""Quantities with the same meaning as another."""
+"""Quantities that another quantity replaces because they contain the same information."""
 METAL, DULL = 255, 10
-"""Reflectance of labPBR, of 255: metal with the colour of its albedo, and other surfaces (4 %)."""
+"""Reflectance codes of labPBR, 0 to 255: metals with the colour of their albedo, and other surfaces (4 %)."""
 ANY = "material"
-"""Name of a material without a name, if a convention needs one."""
+"""Name of an unnamed material, if a convention needs a name."""
 
 
 def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]:
-    """Return the files of a convention by name. Maps whose role is in the convention keep their pixels.
+    """Return the maps of the files of a convention, by file name. A map whose role is in the convention is not changed.
 
-    A quantity without a file in the convention becomes a map of its own, under its own name.
+    A quantity for which the convention has no file stays a map of its own, under its own name.
     """
     convention, name = CONVENTIONS[key], _name_set(maps, key)
     plain = unpack_maps(make_plain(maps))
@@ -41,7 +41,7 @@ def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]
     kept: set[Role] = set()
     covered: set[str] = set()
     built: set[str] = set()
-    # Existing files come first, so that they are not derived from others.
+    # Handle files whose map exists first, so that they are not computed from other maps.
     for file in sorted(convention.files, key=lambda file: file.role not in roles):
         stem = convention.start + (name + file.end).lstrip("_")
         words = _find_words(file.role) | ({"opacity"} if file.opacity else set())
@@ -57,7 +57,7 @@ def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]
         if one is not None:
             made[stem] = replace(one, file=stem)
             covered |= words
-    # Maps whose quantities are in no file of the convention stay under their own names.
+    # Keep maps under their own names if no file of the convention contains their quantities.
     for title, each in maps.items():
         lost = _find_words(each.role) - built
         if find_map(maps, each.role) is not each:
@@ -75,12 +75,12 @@ def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]
 
 
 def _find_words(role: Role) -> set[str]:
-    """Return the quantities of a role, each by one word."""
+    """Return the quantities that a map of a role contains, with one word for quantities of the same meaning."""
     return {SAME.get(word, word) for word in role.quantities if word}
 
 
 def _name_set(maps: Mapping[str, Map], key: str) -> str:
-    """Return the name that the files have in common."""
+    """Return the common part of the file names."""
     base = find_map(maps, Role.COLOUR) or next(iter(maps.values()))
     files = [base.file, *(each.file for each in maps.values())]
     name = cut_name(next((file for file in files if file), "")).removeprefix("T_")
@@ -90,7 +90,7 @@ def _name_set(maps: Mapping[str, Map], key: str) -> str:
 
 
 def _list_all(plain: Mapping[str, Map], axes: int) -> dict[str, Map]:
-    """Return the map of each quantity and of each letter of a layout."""
+    """Return the map of each quantity, and of each component of the normals."""
     found = {word: each for word, (_, each) in list_quantities(plain, axes).items()}
     for role in (Role.COLOUR, Role.EMISSION):
         each = find_map(plain, role)
@@ -113,14 +113,14 @@ def _list_all(plain: Mapping[str, Map], axes: int) -> dict[str, Map]:
     if "emission" in found:
         light = to_light(found["emission"].pixels, found["emission"].space)
         light = light if light.ndim == axes else light[..., :3].max(axis=-1)
-        # The last code means that there is none.
+        # Code 255 means no emission, so the largest emission is 254.
         codes = np.rint(np.clip(light, 0, 1) * 254).astype(np.uint8)
         found.setdefault("emissiveness", Map(codes, Role.OTHER, "linear"))
     return found
 
 
 def _make_file(file: File, found: Mapping[str, Map], shape: tuple[int, ...], stem: str) -> Map | None:
-    """Return the map of a file, from the existing quantities."""
+    """Return the map of one file, packed from the existing quantities."""
     role = file.role
     if role is Role.COLOUR:
         colour = found.get("colour")
@@ -136,13 +136,13 @@ def _make_file(file: File, found: Mapping[str, Map], shape: tuple[int, ...], ste
         shares[word] = replace(found[word], pixels=(found[word].pixels + 1) / 2)
     made = join(shares, role, shape, stem)
     if role in (Role.LABPBR_NORMAL, Role.LABPBR_SPECULAR) and made.pixels.dtype != np.uint8:
-        # The codes are those of 8 bits.
+        # The codes of labPBR are defined for 8 bits.
         made = replace(made, pixels=to_pixels(to_share(made.pixels), np.dtype(np.uint8)))
     return made
 
 
 def _set_alpha(colour: Map, opacity: Map | None, axes: int) -> Map:
-    """Return colours with this opacity as alpha, or without alpha."""
+    """Return colours with the given opacity as alpha, or without alpha if there is none."""
     pixels = colour.pixels if colour.pixels.ndim > axes else colour.pixels[..., np.newaxis]
     bare = pixels[..., :-1] if pixels.shape[-1] in (2, 4) else pixels
     if opacity is None:

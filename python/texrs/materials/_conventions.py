@@ -1,4 +1,4 @@
-"""Conventions of tools and libraries: file names, and the content of each channel."""
+"""Naming conventions of tools and libraries: file names, and the quantity in each channel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["CONVENTIONS", "File", "as_convention", "cut_name", "guess_roles", "l
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """One file of a convention: the end of its name, its role, and whether its alpha is the opacity."""
+    """One file of a convention: the end of its name, its role, and whether its alpha channel is the opacity."""
 
     end: str
     role: Role
@@ -25,7 +25,7 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """Names and packings that belong together. If several files contain one quantity, the first is written."""
+    """File names and packings of one tool. If several files contain the same quantity, only the first is written."""
 
     title: str
     files: tuple[File, ...]
@@ -33,12 +33,15 @@ class Convention:
 
     @property
     def down(self) -> bool:
-        """Whether normals have y down."""
+        """True if the y axis of normals points down."""
         return next(file.role.down for file in self.files if file.role.normal)
 
 
 def _list(text: str) -> tuple[File, ...]:
-    """Return the files from lines: the end of the name, the role, and "+ opacity" if alpha is the opacity."""
+    """Parse the files of a convention.
+
+    Each line has the end of the name, the role, and "+ opacity" if alpha is the opacity.
+    """
     files = []
     for line in text.strip().splitlines():
         end, role, *more = line.split()
@@ -154,7 +157,7 @@ _Emissive emission
 """),
     ),
 }
-"""Conventions by the words of ``--convention``."""
+"""Conventions by the value of ``convention``."""
 LETTERS = {file.end[1:].lower(): file.role for file in CONVENTIONS["unreal"].files} | {
     "bc": Role.COLOUR,
     "s": Role.OTHER,
@@ -172,12 +175,12 @@ MEANINGS = {
 
 
 def as_convention(value: object, name: str) -> str:
-    """Return the convention with a name.
+    """Return the convention with a given name.
 
     Raises
     ------
     InvalidInput
-        If the convention is not known.
+        The convention is unknown.
 
     """
     if not isinstance(value, str) or value not in CONVENTIONS:
@@ -186,7 +189,7 @@ def as_convention(value: object, name: str) -> str:
 
 
 def list_conventions() -> str:
-    """Return the table of conventions, in Markdown."""
+    """Return a Markdown table of all conventions."""
     lines = ["| `--convention` | For | File | Role | Channels |", "|---|---|---|---|---|"]
     for key, convention in CONVENTIONS.items():
         for number, file in enumerate(convention.files):
@@ -198,17 +201,17 @@ def list_conventions() -> str:
 
 
 def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
-    """Return the roles of the files of a folder by their names, and the source of uncertain roles.
+    """Return the roles that the file names of a folder give, and the reason for each uncertain role.
 
-    Words at the end of a name count first (see `guess_role`). Then short ends count if other files make them clear, as
-    in Unreal (``T_Rock_N``) and labPBR (``stone``, ``stone_n``, ``stone_s``). Last, a name that is the beginning of
-    others is the colour map (``rock`` next to ``rock_normal``).
+    First, words at the end of a name give the role (see `guess_role`). Next, short endings do if other names confirm
+    them, as in Unreal (``T_Rock_N``) and labPBR (``stone``, ``stone_n``, ``stone_s``). Last, a name with which other
+    names begin is the colour map (``rock`` next to ``rock_normal``).
     """
     found = {stem: each[0] for stem in stems if (each := find_role(stem)) is not None}
     why: dict[str, str] = {}
     bases = {stem: _cut(stem) for stem in stems}
     shared = Counter(base for base in bases.values() if base)
-    # Consecutive letters, as in shot_a, shot_b and shot_d, are numbers.
+    # Single letters after the same base can be a numbering, as in shot_a, shot_b and shot_d, and then give no role.
     ends = {stem: words[-1][1] for stem in stems if (words := split_name(stem))}
     doubtful = {bases[s] for s, end in ends.items() if len(end) == 1 and end not in LETTERS and s not in found}
     for stem in stems:
@@ -230,8 +233,8 @@ def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
     plain = [stem for stem in stems if stem not in found and shared[stem] and Role.COLOUR not in found.values()]
     for stem in plain[:1]:
         found[stem], why[stem] = Role.COLOUR, "the other maps go on from its name"
-    # A word in the middle counts if no other file has its role: rock_albedo_wet, not rock_color_chart next to
-    # rock_color.
+    # A word in the middle of a name gives the role if no other file has this role. Example: rock_albedo_wet, but not
+    # rock_color_chart next to rock_color.
     pairs = zip(min(stems, default=""), max(stems, default=""), strict=False)
     common = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     common = common[: max(common.rfind(sign) for sign in "_-. ") + 1]
@@ -248,14 +251,14 @@ def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
 
 
 def report_guesses(why: Mapping[str, str], roles: Mapping[str, Role], said: Collection[str]) -> None:
-    """Report the roles that one name alone does not give, except those that the caller states."""
+    """Report the roles that depend on more than one name, except roles that the caller states."""
     for name, reason in why.items():
         if name not in said:
             assume(f"{name}: read as {roles[name].value} ({reason})")
 
 
 def cut_name(file: str) -> str:
-    """Return the name of a file without the word of its map, the same for all files of a material."""
+    """Return a file name without the word for its map, so that it is the same for all files of a material."""
     found, words = find_role(file), split_name(file)
     if found is not None:
         return (file[: found[1]].rstrip("_-. ") + file[found[2] :]).lstrip("_-. ")
@@ -263,7 +266,7 @@ def cut_name(file: str) -> str:
 
 
 def _cut(stem: str) -> str:
-    """Return a name without the word of its map, or ""."""
+    """Return the part of a name before the word for its map, or ""."""
     found, words = find_role(stem), split_name(stem)
     place = found[1] if found else words[-1][0] if len(words) > 1 else 0
     return stem[:place].rstrip("_-. ")

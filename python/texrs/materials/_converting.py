@@ -1,10 +1,11 @@
-"""Maps in another depth: the same light, directions, shares and labels, encoded as readers of the format expect.
+"""Convert maps to another bit depth without changing the light, directions, fractions or labels that they store.
 
-* Colours and emission are sRGB as integers, and linear light as floats. Their alpha is a share in both.
-* Components of normals and vectors, -1 to 1, are 0 to the maximum as integers. Floats stay as they are.
-* Labels are the same whole numbers in every dtype.
-* Heights and values without a role are shares as integers. A range beyond 0 to 1 is spread. Floats stay as they are.
-* All other roles are shares as integers. Floats stay as they are.
+* Colours and emission are sRGB as integers, and linear light as floats. Their alpha is a fraction, 0 to 1, in both.
+* Components of normals and vectors, -1 to 1, become 0 to the maximum as integers. Floats are unchanged.
+* Labels keep their values in every dtype.
+* Heights and values without a role become fractions of the range of integers. If they exceed 0 to 1, their range is
+  rescaled. Floats are unchanged.
+* All other roles become fractions of the range of integers. Floats are unchanged.
 """
 
 from __future__ import annotations
@@ -24,25 +25,25 @@ from texrs.materials._roles import Role
 __all__ = ["choose_dtype", "convert"]
 
 SPREAD = (Role.HEIGHT, Role.OTHER)
-"""Roles whose values have no fixed range."""
+"""Roles whose values do not have a fixed range."""
 WHOLE = 2**24
-"""Largest whole number up to which single precision holds all."""
+"""Largest integer up to which float32 represents all integers."""
 
 
 def choose_dtype(dtype: np.dtype[Any], depth: int | None) -> np.dtype[Any]:
-    """Return the dtype of a depth: integers of 8 or 16 bits, floats of 32. Without a depth the dtype is unchanged."""
+    """Return the dtype for a depth: integers for 8 and 16 bits, floats for 32. None keeps the dtype."""
     if depth is None or dtype == np.bool_:
         return dtype
     return np.dtype(np.float32 if depth == 32 else f"u{depth // 8}")
 
 
 def convert(name: str, each: Map, depth: int | None, axes: int = 2) -> Map:
-    """Return a map in a depth, in the colour space that readers of its dtype expect.
+    """Return a map in another depth, in the colour space that is usual for the new dtype.
 
     Raises
     ------
     InvalidInput
-        If labels are larger than the dtype allows.
+        Labels are larger than the dtype allows.
 
     """
     pixels, dtype = each.pixels, choose_dtype(each.pixels.dtype, depth)
@@ -61,7 +62,7 @@ def convert(name: str, each: Map, depth: int | None, axes: int = 2) -> Map:
 
 
 def keep_labels(name: str, pixels: Array, dtype: np.dtype[Any]) -> Array:
-    """Return labels in another dtype, with the same values."""
+    """Return labels with the same values in another dtype."""
     most = WHOLE if dtype.kind == "f" else np.iinfo(dtype).max
     low, high = pixels.min(), pixels.max()
     if high > most or low < (-WHOLE if dtype.kind == "f" else 0):
@@ -70,7 +71,7 @@ def keep_labels(name: str, pixels: Array, dtype: np.dtype[Any]) -> Array:
 
 
 def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any], axes: int) -> Floats:
-    """Return values in the other colour space. Alpha stays a share."""
+    """Convert values between sRGB and linear light. Alpha is not converted."""
     clear = each.pixels.shape[axes:] in ((2,), (4,))
     light = to_light(each.pixels, each.space)
     if clear:
@@ -86,19 +87,19 @@ def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any], axes: int) 
 
 
 def to_float(pixels: Array, dtype: np.dtype[Any]) -> Array:
-    """Return integers as shares of their range. Floats are unchanged."""
+    """Return integers as fractions of their range, and floats unchanged."""
     return to_pixels(pixels, dtype) if pixels.dtype.kind == "f" else to_unit(pixels)
 
 
 def read_vectors(pixels: Array, role: Role) -> Floats:
-    """Return signed integers as floats: -1 to 1 for normals and vectors, shares for others."""
+    """Return signed integers as floats: -1 to 1 for normals and vectors, 0 to 1 for other values."""
     if role.normal or role is Role.VECTOR:
         return np.asarray(pixels / np.float32(np.iinfo(pixels.dtype).max), np.float32)
     return to_unit(pixels)
 
 
 def find_shares(name: str, pixels: Array, role: Role) -> Floats:
-    """Return values as shares, 0 to 1."""
+    """Return the values of a map scaled to 0 to 1."""
     kind = pixels.dtype.kind
     if role.normal or role is Role.VECTOR:
         if kind == "i":
@@ -122,6 +123,6 @@ def find_shares(name: str, pixels: Array, role: Role) -> Floats:
 
 
 def report_cut(name: str, values: Array) -> None:
-    """Report values that integers cannot hold."""
+    """Report values outside 0 to 1, which integers cannot store."""
     if values.min() < 0 or values.max() > 1:
         ignore(f"{name}: values below 0 and above 1 are not kept: integers end there, floats of 32 bits do not")

@@ -1,4 +1,4 @@
-"""Display and files of a material."""
+"""Methods of a material that render and save it."""
 
 from __future__ import annotations
 
@@ -20,46 +20,47 @@ __all__ = ["Exports"]
 
 
 class Exports(Mapping[str, Map]):
-    """Maps in register that can be shown and written."""
+    """Base class of materials: renders their maps and writes them to files."""
 
     @property
     @abstractmethod
     def axes(self) -> int:
-        """2 for images, 3 for volumes."""
+        """Number of axes: 2 for images, 3 for volumes."""
 
     @property
     @abstractmethod
     def weights(self) -> Mapping[str, float]:
-        """Given weights of maps for decisions."""
+        """Weights of maps for decisions, as given by the caller."""
 
     def preview(
         self, *, tiles: tuple[int, int] = (2, 2), light: tuple[float, float] = (135.0, 45.0), side: int = 2048
     ) -> NDArray[np.uint8]:
-        """Render an image of the material under a light, seen from straight above.
+        """Render an image of the lit material, seen from straight above.
 
-        Colours, normals (or heights without normals), roughness, metallic, occlusion, emission and opacity are used.
-        Without colours the surface is grey. A flat, dull surface shows its own colours. Transparent parts are shown
-        over squares.
+        The image shows colours, normals (or heights if there are no normals), roughness, metallic, occlusion, emission
+        and opacity. Without colours the surface is grey. A flat, rough surface shows exactly its colours. Transparent
+        parts are shown over a checkerboard.
 
         Parameters
         ----------
         tiles : (int, int)
-            Number of repetitions down and across. More than one shows whether the material is tileable.
+            Number of repetitions (down, across), 1 to 64 each. More than one shows whether the material is tileable.
+            Default: (1, 1).
         light : (float, float)
-            Direction of the light in degrees: counter-clockwise from the right, so 135 is the upper left; and
-            elevation above the surface, 1 to 90.
+            Direction of the light (azimuth, elevation) in degrees. The azimuth, -360 to 360, is counter-clockwise from
+            the right, so 135 is the upper left. The elevation above the surface is 1 to 90.
         side : int
-            Maximum length of the longer side of the image in pixels. Larger materials are averaged.
+            Maximum length of the longer side of the image in pixels, 1 to 65536. Larger materials are averaged.
 
         Returns
         -------
         (H, W, 3) uint8 array
-            Image in sRGB.
+            Rendered image in sRGB.
 
         Raises
         ------
         InvalidInput
-            If it is a volume, or cannot be shown.
+            The material is a volume, or an argument is out of range.
 
         Examples
         --------
@@ -85,46 +86,47 @@ class Exports(Mapping[str, Map]):
         convention: str | None = None,
         mipmaps: bool = False,
     ) -> list[FilePath]:
-        """Write all maps to files, or none.
+        """Write all maps to files of a folder. If an error occurs, no file is changed.
 
-        A map that was read from a file gets the name of that file, others get their own name.
+        A map that was read from a file is written under the name of that file, and other maps under their own names.
 
         Parameters
         ----------
         folder : path_like
-            Folder, created if needed. Files with these names are replaced.
+            Folder. It is created if needed. Files with the same names are replaced.
         depth : {8, 16, 32}, optional
-            Bits of each sample: integers of 8 or 16, floats of 32. Default: the bits of each map.
+            Bits per sample: integers of 8 or 16 bits, or floats of 32. Default: the bits of each map.
         suffix : str, optional
-            Suffix of all files, such as ``".tif"``, which selects the format. Default: PNG, or TIFF and EXR for maps
-            that PNG cannot hold.
+            Suffix of all files, such as ``".tif"``, which selects the format. Default: PNG, or TIFF or EXR for maps
+            that PNG cannot store.
         pack : {"orm", "none"}, optional
             "orm" writes occlusion, roughness and metallic, if present, to one file ``orm`` as red, green and blue.
-            "none" writes each quantity of packed maps to its own file. Default: maps are not repacked.
+            "none" writes each quantity of packed maps to its own file. Default: packed maps stay as they are.
         convention : str, optional
-            Names, packings and direction of y: "ambientcg", "polyhaven", "gltf", "unreal", "unity", "urp", "hdrp",
-            "labpbr", "substance" or "substance-unreal". Default: those of the maps that were read.
+            Naming convention of the files, with its packings and direction of y: "ambientcg", "polyhaven", "gltf",
+            "unreal", "unity", "urp", "hdrp", "labpbr", "substance" or "substance-unreal". Default: the names and
+            packings of the maps that were read.
         mipmaps : bool
-            If True, each map is also written at a half, a quarter, ... of its size, until each side is 1. The folder
-            is ``mipmaps``: ``albedo.1.png``, ``albedo.2.png``, ... Colours are averaged as light, normals keep their
-            length, and labels and masks are not mixed.
+            If True, each map is also written at half, a quarter, ... of its size, down to a side of 1. These files are
+            in the subfolder ``mipmaps``: ``albedo.1.png``, ``albedo.2.png``, ... Colours are averaged as light,
+            normals are normalised, and labels and masks are not mixed. Default: False.
 
         Returns
         -------
         list of pathlib.Path
-            The files, in the order of the maps, and then their mipmaps.
+            Written files in the order of the maps, followed by their mipmaps.
 
         Raises
         ------
         FileError
-            If a file cannot be written. Existing files are unchanged.
+            A file cannot be written. Existing files are unchanged.
         InvalidInput
-            If the depth, the packing or the convention is invalid, or the format cannot hold the values.
+            The depth, the packing or the convention is invalid, or the format cannot store the values.
 
         Warns
         -----
         InputWarning
-            If the convention has no file for a channel of a packed map.
+            The convention has no file for a channel of a packed map.
 
         Examples
         --------
@@ -148,7 +150,7 @@ class Exports(Mapping[str, Map]):
         return write_maps(maps, folder, axes=self.axes, depth=depth, suffix=suffix, mipmaps=mipmaps)
 
     def _list_files(self, pack: str | None, convention: str | None) -> Mapping[str, Map]:
-        """Return the maps that are written."""
+        """Return the maps to be written, repacked and renamed as requested."""
         from texrs.materials._arranging import arrange_maps
         from texrs.materials._conventions import as_convention
         from texrs.materials._packing import pack_maps, unpack_maps
@@ -164,31 +166,32 @@ class Exports(Mapping[str, Map]):
         return pack_maps(self, self.axes) if pack == "orm" else unpack_maps(self)
 
     def save_exr(self, path: Path, *, depth: Literal[16, 32] | None = None) -> FilePath:
-        """Write all maps to one EXR file, each as a layer, for `Material.read`.
+        """Write all maps to one EXR file, with one layer per map, which `Material.read` can read.
 
-        The channels of ``albedo`` are ``albedo.R``, ``albedo.G`` and ``albedo.B``. Names of normals end in X, Y and Z,
-        others in Y. Colours are linear light, as in all EXR files: sRGB is decoded. The header stores roles, spaces
-        and dtypes, so that integers of up to 16 bit, labels and linear floats are restored to the bit.
+        The channels of ``albedo`` are named ``albedo.R``, ``albedo.G`` and ``albedo.B``. Channels of normals end in X,
+        Y and Z, and single channels in Y. Colours are linear light, as in all EXR files: sRGB is decoded. The header
+        stores roles, colour spaces and dtypes. Integers of up to 16 bits, labels and linear floats are therefore
+        restored exactly.
 
         Parameters
         ----------
         path : path_like
             File with the suffix .exr.
         depth : {16, 32}, optional
-            Bits of the floats that are written, which are then also read. Default: enough for the values. Labels are
-            always whole numbers.
+            Bits of the floats in the file. If given, the file is read as these floats. Default: enough bits for exact
+            values. Labels are always stored as integers.
 
         Returns
         -------
         pathlib.Path
-            The file.
+            Path of the file.
 
         Raises
         ------
         FileError
-            If the suffix differs, or the file cannot be written. An existing file is unchanged.
+            The suffix is not .exr, or the file cannot be written. An existing file is unchanged.
         InvalidInput
-            If it is a volume, the depth is invalid, or EXR cannot hold the values exactly.
+            The material is a volume, the depth is invalid, or EXR cannot store the values exactly.
 
         Examples
         --------
@@ -215,35 +218,36 @@ class Exports(Mapping[str, Map]):
         repeat: int = 2,
         depth: Literal[8, 16] = 8,
     ) -> list[FilePath]:
-        """Write a glTF 2.0 scene with the material on a plane and on a sphere.
+        """Write a glTF 2.0 scene that shows the material on a plane and on a sphere.
 
-        The material follows the standard. Base colours have opacity as alpha. Occlusion, roughness and metallic are
-        packed as red, green and blue. Normals have y up (DirectX normals are converted, and heights replace missing
-        normals). Emission may be brighter than white. It repeats without a step if it is tileable.
+        The material follows the glTF standard. Opacity is the alpha of the base colours. Occlusion, roughness and
+        metallic are packed as red, green and blue. Normals have y up: DirectX normals are converted, and heights
+        replace missing normals. Emission can be brighter than white. A tileable material repeats without visible
+        borders.
 
         Parameters
         ----------
         path : path_like
-            File with the suffix .glb, one file; or .gltf, with a .bin and the images next to it
-            (``stones_basecolor.png``, ...).
+            File with the suffix .glb, which contains everything, or .gltf. With .gltf, a .bin file and the images
+            (``stones_basecolor.png``, ...) are written next to it.
         shapes : sequence of {"plane", "sphere"}
-            Shapes that show it, from left to right.
+            Shapes that show the material, from left to right.
         repeat : int
-            Number of repetitions along each side of the plane and from pole to pole, 1 to 64.
+            Number of repetitions along each side of the plane, and from pole to pole of the sphere, 1 to 64.
         depth : {8, 16}
-            Bits of the images. Some viewers read 8 only.
+            Bits per channel of the images. Some viewers read only 8.
 
         Returns
         -------
         list of pathlib.Path
-            The files, the scene first.
+            Written files, with the scene first.
 
         Raises
         ------
         FileError
-            If the suffix differs, or a file cannot be written. Existing files are unchanged.
+            The suffix is not .glb or .gltf, or a file cannot be written. Existing files are unchanged.
         InvalidInput
-            If it is a volume, or a shape, number or depth is invalid.
+            The material is a volume, or a shape, ``repeat`` or ``depth`` is invalid.
 
         Examples
         --------
@@ -263,31 +267,31 @@ class Exports(Mapping[str, Map]):
         return write_gltf(self, path, shapes, repeat, depth)
 
     def save_materialx(self, path: Path, *, depth: Literal[8, 16, 32] | None = None) -> list[FilePath]:
-        """Write a MaterialX document: a standard surface with the maps as inputs, in files next to it.
+        """Write a MaterialX document with a standard surface. Its inputs are the maps, which are written next to it.
 
-        Normals have y up (DirectX normals are converted, and heights replace missing normals). Heights displace the
-        surface by the amount that fits the normals, on a surface as wide as one repetition. Occlusion, which renderers
-        compute, and maps without an input in the surface are left out.
+        Normals have y up: DirectX normals are converted, and heights replace missing normals. Heights displace the
+        surface. Their scale is fitted to the normals, for a surface that is one repetition wide. Occlusion, which
+        renderers compute themselves, and maps without an input in the standard surface are omitted.
 
         Parameters
         ----------
         path : path_like
-            File with the suffix .mtlx. Names of maps are its name and their own: ``stones.mtlx``,
+            File with the suffix .mtlx. The names of the map files begin with its name: ``stones.mtlx``,
             ``stones_albedo.png``.
         depth : {8, 16, 32}, optional
-            Bits of each sample of the maps: integers of 8 or 16, floats of 32. Default: the bits of each map.
+            Bits per sample of the maps: integers of 8 or 16 bits, or floats of 32. Default: the bits of each map.
 
         Returns
         -------
         list of pathlib.Path
-            The files, the document first.
+            Written files, with the document first.
 
         Raises
         ------
         FileError
-            If the suffix differs, or a file cannot be written. Existing files are unchanged.
+            The suffix is not .mtlx, or a file cannot be written. Existing files are unchanged.
         InvalidInput
-            If it is a volume, the depth is invalid, or no map is an input of a surface.
+            The material is a volume, the depth is invalid, or no map is an input of a standard surface.
 
         Examples
         --------

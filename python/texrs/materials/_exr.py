@@ -1,4 +1,4 @@
-"""A material in one EXR file, each map as a layer.
+"""Read and write a material as one EXR file, with one layer per map.
 
 ================ ================================ ===========================================================
 Role             Channels of the layer            Values
@@ -9,9 +9,9 @@ labels           Y                                whole numbers of 32 bit
 more than 4      0, 1, 2, ...                     as above, also normals without z that have 3 or 4 channels
 ================ ================================ ===========================================================
 
-Linear floats are stored unchanged. The header contains roles, spaces, dtypes and weights, so that integers are
-restored to the bit. 8-bit integers are half floats in the file, and 16-bit integers are floats. Files of other
-programs are read by the names of layers.
+Linear floats are stored unchanged. The header contains roles, colour spaces, dtypes and weights, so that integers are
+restored exactly. In the file, 8-bit integers are half floats, and 16-bit integers are floats. In files of other
+programs, the names of layers give the roles.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ __all__ = ["read_exr", "write_exr"]
 NAMES = ("Y", "YA", "RGB", "RGBA")
 VECTORS = ("X", "XY", "XYZ", "XYZA")
 ORDER = "RGBXYZUVWA"
-"""Order of the letters of channels."""
+"""Order of channels by their letters."""
 PASSES = {
     **dict.fromkeys(["combined", "beauty", "rgba", "rgb", "image", "noisyimage"], Role.COLOUR),
     **dict.fromkeys(["indexob", "indexma", "objectid", "materialid"], Role.LABELS),
@@ -52,13 +52,16 @@ PASSES = {
     ),
     "n": Role.NORMAL,
 }
-"""Roles of the layers of renderers, Blender's first, by their names without capitals; other names are as in folders."""
+"""Roles of the layers that renderers, such as Blender, write, by lower-case layer name.
+
+Other names are read as in folders.
+"""
 PICTURE = "colour"
-"""Map whose channels are in no layer."""
+"""Name of the map for channels that do not belong to a layer."""
 
 
 def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: Mapping[str, float]) -> FilePath:
-    """Write each map as a layer. The header stores the other properties."""
+    """Write each map as a layer, and the other properties of the maps in the header."""
     target = as_path(path)
     if target.suffix.lower() != ".exr":
         raise FileError(f"{path}: the suffix must be .exr for layers, got {target.suffix!r}")
@@ -85,16 +88,16 @@ def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: M
 
 
 def name_channels(role: Role, count: int) -> list[str]:
-    """Return the channel names of a map."""
+    """Return the channel names of a map, such as R, G, B or X, Y, Z."""
     if count > 4 or (role.bare and count > 2):
-        # The third channel of normals without z is not their z.
+        # Use numbers, because the third channel of normals without z must not be called Z.
         return [str(k) for k in range(count)]
     letters = VECTORS if count > 1 and (role.normal or role is Role.VECTOR) else NAMES
     return list(letters[count - 1])
 
 
 def store(name: str, pixels: Array, each: Map, depth: int | None) -> Array:
-    """Return values in the type of a layer: float16, float32, or uint32 for labels."""
+    """Return the values of a map as stored in a layer: float16, float32, or uint32 for labels."""
     kind, size = pixels.dtype.kind, pixels.dtype.itemsize
     if kind != "f" and (each.role is Role.LABELS or (each.role is Role.MASK and size == 4)):
         return pixels.astype(np.int32 if kind == "i" else np.uint32).view(np.uint32)
@@ -109,18 +112,18 @@ def store(name: str, pixels: Array, each: Map, depth: int | None) -> Array:
         return (pixels / largest * (2 if kind == "u" else 1) - (1 if kind == "u" else 0)).astype(wanted)
     light = to_light(pixels, each.space)
     if each.space == "srgb" and pixels.shape[-1] in (2, 4):
-        # Transparency is a share, for any encoding of colours.
+        # Alpha is a fraction, whatever the encoding of the colours.
         light[..., -1:] = to_light(pixels[..., -1:], "linear")
     stored = light.astype(wanted)
     return multiply(stored, name) if each.role.coloured and has_alpha(stored) else stored
 
 
 def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Array:
-    """Return the original values from a layer."""
+    """Return the values of a map as they were before `store`."""
     if stored.dtype == np.uint32:
         return stored.view(np.int32).astype(dtype) if dtype.kind == "i" else stored.astype(dtype)
     if role.coloured and has_alpha(stored):
-        # Half precision would round the quotient.
+        # Divide by alpha in single precision, because half precision would round the quotient.
         stored = undo(stored.astype(dtype if dtype.kind == "f" else np.float32))
     if dtype == stored.dtype and space == "linear":
         return stored
@@ -138,12 +141,12 @@ def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Arra
 
 
 def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role], dict[str, float]]:
-    """Return the maps of a file, one for each layer, their given roles, and the weights."""
+    """Return the maps of a file, the roles that the caller or the header states, and the weights."""
     channels, words = read_layers(path)
     known = parse(words, channels)
     full_names = {id(pixels): full for full, pixels in channels.items()}
     layers: dict[str, dict[str, Array]] = {}
-    # A file of texrs lists its maps in the header. Other files are divided by the names of channels.
+    # A file that texrs wrote lists its maps in the header. Split other files by the names of their channels.
     if known:
         layers = {
             name: {str(k): channels[full] for k, full in enumerate(told["names"])} for name, told in known.items()
@@ -152,12 +155,12 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
         for full, pixels in channels.items():
             title, _, letter = full.rpartition(".")
             if not title and len(letter) > 1 and letter[0].isalpha():
-                # A whole word is the name of a map, not of a channel.
+                # A channel name that is a whole word is the name of a map.
                 title, letter = letter, "Y"
             layers.setdefault(title or PICTURE, {})[letter] = pixels
         layers = {name: part for layer, letters in layers.items() for name, part in split_layer(layer, letters).items()}
         layers = dict(zip(shorten(list(layers)), layers.values(), strict=True))
-    # Roles that the caller states come first, then roles of the header, then roles of names.
+    # Roles that the caller states have priority, followed by roles of the header and roles that names give.
     said = {name: as_role(role, f"roles[{name!r}]") for name, role in roles.items()}
     if unknown := said.keys() - layers.keys():
         raise InvalidInput(f"roles: must name layers of {path} ({', '.join(layers)}), got {sorted(unknown)[0]!r}")
@@ -184,7 +187,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
         if role.coloured and has_alpha(stored):
             stored = divide(stored, f"{path}: {name}")
         maps[name] = Map(stored if stored.shape[-1] > 1 else stored[..., 0], role, "linear", layer=layer)
-    # Report the layers that are not used, and the assumptions about the others.
+    # Report the layers that are not used, and what was assumed about the others.
     lines = [f"{show_names(names)} not used: {why}" for why, names in left.items()]
     if not maps:
         raise FileError(f"{path}: no layer has a name that gives its role; give roles ({'; '.join(lines)})")
@@ -199,7 +202,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
 
 
 def split_layer(name: str, letters: Mapping[str, Array]) -> dict[str, dict[str, Array]]:
-    """Return the image of a layer, and each other channel, such as a depth, under its own name."""
+    """Split a layer into its colours and its other channels, such as a depth, which get names of their own."""
     picture = next((p for p in ("RGBA", "YA") if p[0] in letters and not {"X", "Y"} <= letters.keys()), None)
     if picture is None:
         return {name: dict(letters)}
@@ -209,7 +212,7 @@ def split_layer(name: str, letters: Mapping[str, Array]) -> dict[str, dict[str, 
 
 
 def guess_pass(name: str, pixels: Array) -> tuple[Role | None, str]:
-    """Return the role of a layer of another program, and the assumption; or None, and the reason."""
+    """Return the role of a layer of another program and what was assumed, or None and the reason."""
     word = re.sub(r"[^a-z0-9]", "", name.rpartition(".")[2].lower())
     if word.startswith("crypto"):
         return None, "Cryptomatte is not read"
@@ -217,7 +220,7 @@ def guess_pass(name: str, pixels: Array) -> tuple[Role | None, str]:
     if role is None:
         return None, "the name gives no role"
     if role is Role.VECTOR and pixels.shape[-1] > 3:
-        # Motion to the frame before and to the one after.
+        # More than three channels are motion vectors to the previous and to the next frame, and not one direction.
         role = Role.OTHER
     if role is Role.OTHER and not np.isfinite(pixels).all():
         return None, "it contains infinite values or NaN"
@@ -252,7 +255,7 @@ def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
 
 
 def parse(words: str | None, there: Container[str]) -> dict[str, dict[str, Any]]:
-    """Return the description of maps and their channels in a header, or nothing if it has another content."""
+    """Return the description of the maps in a header, or an empty dictionary if it is not valid."""
     try:
         maps = json.loads(words or "{}").get("maps", {})
         for each in maps.values():

@@ -1,4 +1,4 @@
-"""Folders of maps: read by their usual names, written under the same names."""
+"""Read a folder of maps by their usual file names, and write it under the same names."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from texrs.source_map._vectors import stores_z
 __all__ = ["read_maps", "write_maps"]
 
 DOCUMENTS = (".txt", ".md", ".json", ".html", ".htm", ".pdf", ".csv", ".yaml", ".yml", ".toml", ".url")
-"""Suffixes of files that describe maps and are not maps."""
+"""Suffixes of files that accompany maps but are not maps."""
 SYSTEM = ("thumbs.db", "desktop.ini")
-"""Files of file managers that are not hidden."""
+"""Files that file managers create, without a leading dot."""
 NAMED = 8
-"""Maximum number of names in a notice."""
+"""Maximum number of names that a notice lists."""
 PRIMARIES = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
-"""White, red, green and blue of sRGB, as x and y of each."""
+"""Chromaticities (x, y) of white, red, green and blue of sRGB."""
 LOSSY = (".jpg", ".jpeg")
-"""Suffixes of lossy formats."""
+"""Suffixes of formats with lossy compression."""
 FULL = 255
-"""Value of the third channel of normals whose z is not stored."""
+"""Value of the third channel in normal maps whose z is not stored."""
 MOST = 64
 """Maximum number of maps in a material."""
 AT_ONCE = 4
-"""Number of files that are written in parallel."""
+"""Maximum number of files that are written in parallel."""
 SMALLER = "mipmaps"
-"""Folder of mipmaps, so that reading finds maps of one size."""
+"""Subfolder for mipmaps. They are not in the folder itself, so that all maps there have the same size."""
 
 
 def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Map], set[str]]:
-    """Return the maps of a folder by their names without the common part, and the maps with a given role."""
+    """Return the maps of a folder by the distinctive part of their names, and the maps whose role the caller gives."""
     path, there = list_places(path)
     files, left = list_files(there, axes)
     stems = {name: split_suffix(name)[0] for name in files}
@@ -78,7 +78,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
         raise FileError(f"{path}: must have at most {MOST} maps, got {len(taken)}")
     maps = {name: read_map(files[name], role, axes) for name, role in taken.items()}
     shape = next(iter(maps.values())).pixels.shape[:axes]
-    # A file without a role in its name can still contain labels, by its values.
+    # A file whose name gives no role can still be recognised as labels from its values.
     labels = {name: pixels for name in unknown if (pixels := read_labels(files[name], shape)) is not None}
     left["the name gives no role"] = [name for name in unknown if name not in labels]
     for line in describe_unused(left):
@@ -86,7 +86,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
     if labels:
         assume(f"{path}: {show_names(list(labels))} read as {REASON}")
     maps |= {name: Map(pixels, Role.LABELS, "linear") for name, pixels in labels.items()}
-    # The names of the maps are the file names without their common beginning.
+    # Name the maps after their files, without the common beginning.
     short = shorten([stems[name] for name in maps])
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)
@@ -97,7 +97,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
 
 
 def list_files(places: Iterable[FilePath], axes: int) -> tuple[dict[str, FilePath], dict[str, list[str]]]:
-    """Return the files that may be maps, by name, and the names of all others by reason."""
+    """Return the files that can be maps, by name, and the names of all other files, by the reason."""
     files: dict[str, FilePath] = {}
     formats, inner = list[str](), list[str]()
     known = READ_IMAGES if axes == 2 else READ_VOLUMES
@@ -121,19 +121,19 @@ def list_files(places: Iterable[FilePath], axes: int) -> tuple[dict[str, FilePat
 
 
 def split_suffix(name: str, known: Sequence[str] = READ) -> tuple[str, str]:
-    """Return the name of a file without its suffix, and the suffix; an empty one if it is not known."""
+    """Return the name of a file without its suffix, and the suffix, or "" if the suffix is unknown."""
     suffix = max((s for s in known if name.lower().endswith(s)), key=len, default="")
     return name[: len(name) - len(suffix)], suffix
 
 
 def show_names(names: Sequence[str]) -> str:
-    """Return names on one line, and the number of further names."""
+    """Return up to eight names as text, followed by the number of further names."""
     shown = ", ".join(names[:NAMED])
     return shown if len(names) <= NAMED else f"{shown} and {len(names) - NAMED} more"
 
 
 def read_labels(file: FilePath, shape: tuple[int, ...] | None = None) -> Array | None:
-    """Return the labels in a file whose name gives no role, if its values are labels, of a shape."""
+    """Return the labels in a file whose name gives no role, or None if its values are not labels of this shape."""
     form = FORMATS.get(find_suffix(file).lower())
     if form is None or not any(dtype.kind == "u" for dtype in form.dtypes):
         return None
@@ -146,12 +146,12 @@ def read_labels(file: FilePath, shape: tuple[int, ...] | None = None) -> Array |
 
 
 def describe_unused(left: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return a line for each reason why files are not used."""
+    """Return a sentence for each reason why files are not used."""
     return [f"{show_names(names)} not used: {reason}" for reason, names in left.items() if names]
 
 
 def read_map(file: FilePath, role: Role, axes: int) -> Map:
-    """Return the map in a file. Its colours are encoded as the file states, or as usual."""
+    """Read a map from a file. Colours are sRGB or linear as the file states, or else as usual for the dtype."""
     pixels = (io.read if axes == 2 else io.read_volume)(file)
     space = find_space(role, pixels.dtype)
     if role.coloured:
@@ -167,7 +167,7 @@ def read_map(file: FilePath, role: Role, axes: int) -> Map:
 
 
 def restore_z(file: FilePath, pixels: Array) -> Array:
-    """Return normals with the z of their x and y, if only the loss of a JPEG file keeps their length from 1."""
+    """Recompute z of normals from x and y, if the vectors have unit length apart from JPEG artefacts."""
     if pixels.shape[-1] != 3 or pixels.dtype != np.uint8 or stores_z([pixels]) or np.median(pixels[..., 2]) >= FULL:
         return pixels
     vectors = pixels / np.float32(127.5) - 1
@@ -180,7 +180,7 @@ def restore_z(file: FilePath, pixels: Array) -> Array:
 
 
 def report_colours(file: Path, notes: io.Metadata, space: Space) -> None:
-    """Report the colour space in a file if it is not sRGB."""
+    """Report the colour space that a file states, if it is not sRGB."""
     stated = []
     if notes.profile is not None and (title := name_profile(notes.profile)) is not None:
         stated.append(f"the ICC profile {title!r}")
@@ -194,18 +194,18 @@ def report_colours(file: Path, notes: io.Metadata, space: Space) -> None:
 
 
 def name_profile(profile: bytes) -> str | None:
-    """Return the name of an ICC profile, unless it is sRGB."""
+    """Return the name of an ICC profile; None if it is sRGB."""
     from PIL import ImageCms
 
     title = "unknown"
-    # Nothing depends on what a damaged profile contains.
+    # A damaged profile does not affect the result.
     with suppress(OSError, ImageCms.PyCMSError):
         title = " ".join(ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).split())
     return None if "srgb" in title.lower() else title
 
 
 def list_places(path: Path | Sequence[Path]) -> tuple[Path, list[FilePath]]:
-    """Return a folder and its files, or the folder of a list of files and the files."""
+    """Return the folder and its files. ``path`` is a folder, or a list of files in one folder."""
     if not isinstance(path, list | tuple):
         folder = as_path(cast(Path, path))
         if not folder.is_dir():
@@ -221,7 +221,7 @@ def list_places(path: Path | Sequence[Path]) -> tuple[Path, list[FilePath]]:
 
 
 def shorten(names: list[str]) -> list[str]:
-    """Return names without their common beginning, up to a word boundary.
+    """Remove the common beginning of names, up to a word boundary.
 
     Examples
     --------
@@ -247,7 +247,7 @@ def write_maps(
     suffix: str | None = None,
     mipmaps: bool = False,
 ) -> list[FilePath]:
-    """Write each map under its name. All files get their names after all are written."""
+    """Write each map under its name. Files are renamed to their final names only after all are written."""
     place = as_path(folder)
     smaller = place / SMALLER
     for needed in (place, smaller) if mipmaps else (place,):
@@ -277,13 +277,13 @@ def write_maps(
 
 
 def prepare(name: str, each: Map, file: FilePath) -> Array:
-    """Return values in the convention of the format: EXR files have colours multiplied by alpha."""
+    """Return the values as the format stores them: in EXR files, colours are multiplied by alpha."""
     multiplied = file.suffix.lower() == ".exr" and each.role.coloured and has_alpha(each.pixels)
     return multiply(each.pixels, name) if multiplied else each.pixels
 
 
 def choose_suffix(each: Map, depth: int | None, axes: int = 2) -> str:
-    """Return the format that keeps a map exactly: PNG for 8 and 16 bit of up to four channels, TIFF or EXR for others."""
+    """Return the suffix of a format that stores a map exactly: PNG if possible, else EXR or TIFF."""
     shape, dtype = each.pixels.shape, choose_dtype(each.pixels.dtype, depth)
     if axes == 3 or (len(shape) == 3 and shape[-1] > 4):
         return ".tif"

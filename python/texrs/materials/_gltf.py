@@ -1,8 +1,8 @@
-"""A material as glTF 2.0 for viewers: on a plane and on a sphere, in one .glb, or with its images next to it.
+"""Write a material as a glTF 2.0 scene with a plane and a sphere, as one .glb file or with its images next to it.
 
-According to the standard (sections 3.9 and 3.7.2), base colours are in sRGB with opacity as their alpha. Occlusion,
-roughness and metallic are red, green and blue of one image. Normals have y up, and tangents have w = 1, because
-nothing is mirrored.
+The standard (sections 3.9 and 3.7.2) requires base colours in sRGB with opacity as alpha. Occlusion, roughness and
+metallic are the red, green and blue of one image. Normals have y up. Tangents have w = 1, because no image is
+mirrored.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ VERTICES, INDICES = 34962, 34963
 LINEAR, MIPMAPS, REPEAT = 9729, 9987, 10497
 BEAM = "KHR_materials_emissive_strength"
 APART = 1.15
-"""Distance of the centres of two shapes."""
+"""Distance between the centres of neighbouring shapes, in the unit of their size."""
 WORDS = {"VEC2": 2, "VEC3": 3, "VEC4": 4, "SCALAR": 1}
 
 
 def write_gltf(maps: Mapping[str, Map], path: Path, shapes: Sequence[str], repeat: int, depth: int) -> list[FilePath]:
-    """Write a material on shapes, and return the files."""
+    """Write a scene with a material on shapes, and return the paths of the files."""
     target = as_path(path)
     suffix = target.suffix.lower()
     if suffix not in (".gltf", ".glb"):
@@ -78,13 +78,13 @@ def write_shapes(
     *,
     apart: float = 0.0,
 ) -> list[FilePath]:
-    """Write shapes and their materials, whose textures are image numbers, and return the files."""
+    """Write a scene of shapes whose materials refer to images by number, and return the paths of the files."""
     suffix = target.suffix.lower()
     document, data = lay_out(shapes, materials, target.stem, apart)
     files: dict[FilePath, bytes] = {}
     for number, (name, picture) in enumerate(pictures.items()):
         coded = encode(name, picture, "png")
-        # A .gltf file names files of images. A .glb file contains them.
+        # A .gltf file names image files, and a .glb file contains the images.
         if suffix == ".gltf":
             beside = target.with_name(f"{target.stem}_{name}.png")
             files[beside] = coded
@@ -106,7 +106,7 @@ def write_shapes(
         files[target] = json.dumps(document, indent=1).encode()
     else:
         files[target] = pack(json.dumps(document, separators=(",", ":")).encode(), data)
-    # The document, which is opened first, gets its name last, after all files that it names.
+    # Rename the document last, so that all files that it names exist when it appears.
     order = list(files)[::-1]
     with ExitStack() as stack:
         for file in order:
@@ -115,7 +115,7 @@ def write_shapes(
 
 
 def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the images of a material by name, and the material whose textures are their numbers from the first."""
+    """Return the images of a material by name, and the glTF material that refers to them by number."""
     maps = make_plain(maps)
     pictures: dict[str, Array] = {}
     rough: dict[str, Any] = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0], "metallicFactor": METAL, "roughnessFactor": ROUGH}
@@ -128,7 +128,8 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
     colour, opacity = find_map(maps, Role.COLOUR), find_opacity(maps)
     see_through = opacity is not None and bool((opacity < 1).any())
     shape = next(iter(maps.values())).pixels.shape[:2]
-    # Opacity is the alpha of the base colours. If all values are 0 or 1, viewers need not blend.
+    # Opacity is the alpha of the base colours. If all its values are 0 or 1, use a mask, which is cheaper for viewers
+    # than blending.
     if colour is not None or see_through:
         shown = to_depth(encode_srgb(take_colour(colour, shape)), depth)
         if see_through and opacity is not None:
@@ -139,7 +140,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
         rough["baseColorTexture"] = add("basecolor", shown)
     else:
         rough["baseColorFactor"] = [GREY, GREY, GREY, 1.0]
-    # Occlusion, roughness and metallic share one image, as red, green and blue.
+    # One image has occlusion, roughness and metallic as red, green and blue.
     packed = find_map(maps, Role.ORM) is not None
     open_ = packed or find_map(maps, Role.OCCLUSION) is not None
     surface = packed or find_map(maps, Role.ROUGHNESS, Role.METALLIC) is not None
@@ -159,7 +160,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
     emission = find_map(maps, Role.EMISSION)
     if emission is not None:
         light = take_colour(emission, shape)
-        # Images hold values up to 1, so store brighter light with a factor.
+        # Images store values up to 1, so store a factor for brighter light.
         strength = max(1.0, float(light.max()))
         material["emissiveTexture"] = add("emission", to_depth(encode_srgb(light / np.float32(strength)), depth))
         material["emissiveFactor"] = [1.0, 1.0, 1.0]
@@ -169,7 +170,7 @@ def make_pictures(maps: Mapping[str, Map], depth: int, first: int = 0) -> tuple[
 
 
 def to_depth(values: Floats, depth: int) -> Array:
-    """Return shares as integers of a number of bits."""
+    """Return values from 0 to 1 as integers of 8 or 16 bits."""
     kind = np.dtype(f"u{depth // 8}")
     return np.rint(np.clip(values, 0, 1) * np.float64(np.iinfo(kind).max)).astype(kind)
 
@@ -177,7 +178,7 @@ def to_depth(values: Floats, depth: int) -> Array:
 def lay_out(
     shapes: Sequence[tuple[str, Mesh]], materials: Sequence[dict[str, Any]], name: str, apart: float
 ) -> tuple[dict[str, Any], bytes]:
-    """Return a document with the shapes side by side, and the buffer of their vertices."""
+    """Return the glTF document with the shapes in a row, and the buffer of their vertices."""
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": f"texrs {__version__}"},
         "scene": 0,
@@ -194,7 +195,7 @@ def lay_out(
     extensions = sorted({name for material in materials for name in material.get("extensions", ())})
     if extensions:
         document["extensionsUsed"] = extensions
-    # Append every array to one buffer, and describe it by an accessor.
+    # Append each array to one buffer, with an accessor that describes it.
     data = b""
     for number, (shape, mesh) in enumerate(shapes):
         numbers: dict[str, int] = {}
@@ -218,7 +219,7 @@ def lay_out(
         primitive = {"attributes": numbers, "indices": indices, "material": mesh.material}
         before = next((mesh for mesh in document["meshes"] if mesh["name"] == shape), None)
         if before is not None:
-            # This is another material of the same shape.
+            # This mesh is another part of the same shape, with another material.
             before["primitives"].append(primitive)
             continue
         document["meshes"].append({"name": shape, "primitives": [primitive]})
@@ -230,7 +231,7 @@ def lay_out(
 
 
 def describe(array: NDArray[Any], kind: str, view: int, bounds: bool) -> dict[str, Any]:
-    """Return an accessor of a whole view."""
+    """Return a glTF accessor for one complete buffer view."""
     count = array.size // WORDS[kind]
     found: dict[str, Any] = {
         "bufferView": view,
@@ -246,12 +247,12 @@ def describe(array: NDArray[Any], kind: str, view: int, bounds: bool) -> dict[st
 
 
 def pad(data: bytes, by: bytes) -> bytes:
-    """Return bytes padded to a multiple of four."""
+    """Pad bytes to a multiple of four."""
     return data + by * (-len(data) % 4)
 
 
 def pack(document: bytes, data: bytes) -> bytes:
-    """Return a .glb from a document and its buffer."""
+    """Return the bytes of a .glb file with a document and its buffer."""
     parts = b""
     for kind, content in ((b"JSON", pad(document, b" ")), (b"BIN\0", pad(data, b"\0"))):
         parts += struct.pack("<I", len(content)) + kind + content

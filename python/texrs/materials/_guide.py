@@ -1,7 +1,8 @@
-"""Guide image of several maps: the three most informative channels of all of them.
+"""Compute the guide image of several maps: the three most informative combinations of their channels.
 
-A seam that the albedo hides may be visible in the normals. Each map is scaled so that equal differences are about
-equally visible, and weighted. The leading principal components of all channels together are kept.
+A seam that is invisible in the albedo can be visible in the normals. Each map is therefore scaled so that equal
+differences are about equally visible, and weighted. The guide contains the leading principal components of all
+channels together.
 """
 
 from __future__ import annotations
@@ -27,28 +28,32 @@ WEIGHTS: dict[Role, float] = dict.fromkeys(Role, 0.5) | {
     Role.LABELS: 0.0,
     Role.OTHER: 0.25,
 }
-"""Default weights of maps: light depends on normals, and heights are visible through them."""
+"""Default weights of maps for decisions. Normals have a high weight because shading depends on them.
+
+Heights have a lower weight, because they are visible only through normals.
+"""
 DISPLAY = 1 / 2.2
-"""Exponent for the display of light."""
+"""Exponent that converts linear light to values for display."""
 TAILS = 0.005
-"""Share of heights at either end that their range leaves out."""
+"""Fraction of the lowest and of the highest heights that is clipped."""
 CHANNELS = 3
 LEAST = 1e-3
-"""Minimum share of the variance of a useful component."""
+"""Minimum fraction of the total variance that a component must explain."""
 SAMPLES = 1 << 18
-"""Approximate number of pixels that determine the components."""
+"""Approximate number of pixels from which the components are computed."""
 
 
 def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:
-    """Return the features of a map, (..., C) float32. A difference of 1 is as visible as black against white."""
+    """Return the features of a map, (..., C) float32. A difference of 1 is as visible as black next to white."""
     image = pixels if pixels.ndim > axes else pixels[..., np.newaxis]
     if role.normal or role is Role.VECTOR:
-        # Slopes determine the light. The third number follows from them.
+        # Shading depends on x and y. The z component follows from them.
         vector = _decode(image)
         return vector[..., : min(2, vector.shape[-1])] * np.float32(0.5)
     if role is Role.HEIGHT:
         values = to_unit(image) if image.dtype.kind in "b" else image.astype(np.float32)
-        # Use halves, because the difference of two heights may exceed single precision. Shares are the same.
+        # Halve the values, because the difference of two heights can exceed the range of float32. The scaled result is
+        # the same.
         if float(values.max()) - float(values.min()) > float(np.finfo(np.float32).max):
             values = values * np.float32(0.5)
         low, high = np.quantile(values, [TAILS, 1 - TAILS])
@@ -64,7 +69,7 @@ def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:
 
 
 def _decode(image: Array) -> Floats:
-    """Return vectors within [-1, 1]. Unsigned values, and floats that are never negative, mean 2 v - 1."""
+    """Return vectors with components in [-1, 1]. Unsigned integers and non-negative floats are decoded as 2 v - 1."""
     values = to_unit(image) if image.dtype.kind in "ub" else image.astype(np.float32)
     if image.dtype.kind == "i":
         return np.asarray(values / np.float32(np.iinfo(image.dtype).max), np.float32)
@@ -72,7 +77,7 @@ def _decode(image: Array) -> Floats:
 
 
 def make_guides(features: Sequence[Sequence[Floats]]) -> list[Floats]:
-    """Return comparable guides of several exemplars: the same components of all, in [0, 1]."""
+    """Return guides of several exemplars, with values in [0, 1] and the same principal components for all."""
     stacks = [np.concatenate(list(each), axis=-1) for each in features]
     channels = stacks[0].shape[-1]
     flat = [s.reshape(-1, channels) for s in stacks]
@@ -80,15 +85,15 @@ def make_guides(features: Sequence[Sequence[Floats]]) -> list[Floats]:
     some = np.concatenate([f[::step] for f in flat]).astype(np.float64)
     mean = some.mean(axis=0)
     some -= mean
-    # Sum in one order, because the last bits of matrix products depend on the processor.
+    # Sum in a fixed order, because the last bits of a matrix product depend on the processor.
     spread = np.einsum("ni,nj->ij", some, some) / len(some)
-    # The last bits of a decomposition depend on it too.
+    # Round, because the last bits of the eigenvectors also depend on the processor.
     values, vectors = np.linalg.eigh(np.round(spread, 9))
     count = max(1, int(np.count_nonzero(values[::-1][:CHANNELS] > LEAST * values.sum())))
     leading = np.round(vectors[:, : -count - 1 : -1], 6)
     leading *= np.where(leading[np.abs(leading).argmax(axis=0), np.arange(count)] < 0, -1.0, 1.0)
     if count == 2:
-        # The second of two channels would be taken for transparency.
+        # Add a third channel, because the second of two channels would be read as alpha.
         leading = np.pad(leading, ((0, 0), (0, 1)))
     middle = (mean[:, np.newaxis] * leading).sum(axis=0)
     found = [np.einsum("nc,ck->nk", f, leading, dtype=np.float64) - middle for f in flat]

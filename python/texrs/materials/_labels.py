@@ -1,4 +1,4 @@
-"""Recognition of labels by their values: numbers of regions, without meaningful values between them."""
+"""Recognise label images by their values: numbers of regions, between which other values have no meaning."""
 
 from __future__ import annotations
 
@@ -12,39 +12,50 @@ from texrs._typing import Array
 __all__ = ["REASON", "holds_labels"]
 
 REASON = "labels, because its integers form regions of unrelated values"
-"""Text after "read as" in notices."""
+"""Text after "read as" in notices about labels."""
 FEWEST = 8
-"""Minimum number of different values. Images with fewer are masks, phases or palettes, whose steps look like labels."""
+"""Minimum number of different values.
+
+Images with fewer values are masks, phases or palettes, whose steps resemble labels.
+"""
 UNRELATED = 0.9
-"""Mean step between different neighbours, in ranks, divided by the mean step between any two of them: 0.76 in
-photographs.
+"""Minimum mean step between different neighbours, in ranks, divided by the mean step between random pixels.
+
+In photographs it is 0.76.
 """
 UNIFORM, LARGELY = 0.9, 0.6
-"""Shares of pixels in squares of one value, among all values except the most frequent: for solid regions, and for
-regions with holes.
+"""Minimum fractions of pixels in 2 x 2 squares of one value, for solid regions and for regions with holes.
+
+Pixels of the most frequent value are not counted.
 """
 COMPACT = 4.0
-"""Median area of the box around a value, divided by its pixels: numbered regions are compact, levels of grey are not."""
+"""Maximum median ratio of the bounding box area of a value to its number of pixels.
+
+Numbered regions are compact, and grey levels are not.
+"""
 GRADUAL = 0.7
-"""Share of steps from one value to the next. Bands of a smooth image are compact too, but are side by side in order."""
+"""Maximum fraction of steps from one value to the next.
+
+Bands of a smooth image are also compact, but neighbouring bands have consecutive values.
+"""
 LARGEST = 2**22
-"""Number of pixels that are examined, from the middle."""
+"""Maximum number of pixels that are examined, from the centre."""
 
 
 def holds_labels(pixels: Array, axes: int) -> bool:
-    """Return whether integers are numbers of regions, and neither an image nor heights.
+    """Return True if the integers of an image or a volume are numbers of regions, and not grey levels or heights.
 
-    Measured on 106 images in 14 versions each (smoothed, posterised, doubled, of 8 and 16 bit) and in 9 segmentations.
-    One half chose the thresholds: none of its 742 images is taken for labels, and 474 of its 477 segmentations are.
-    The other half has 1 of 742, an image of doubled pixels, and 474 of 477. The six missing segmentations have fewer
-    than eight labels.
+    This was measured on 106 images in 14 versions each (smoothed, posterised, doubled, 8 and 16 bits) and on 9
+    segmentations. One half was used to choose the thresholds: none of its 742 images is taken for labels, and 474 of
+    its 477 segmentations are. In the other half, 1 of 742 images is, with doubled pixels, and 474 of 477 segmentations
+    are. The six missed segmentations have fewer than eight labels.
 
     Parameters
     ----------
     pixels : ndarray
         Values of any dtype, with or without a channel axis.
     axes : int
-        2 for images, 3 for volumes.
+        Number of spatial axes: 2 for images, 3 for volumes.
 
     """
     if pixels.dtype.kind not in "ui" or pixels.shape[axes:] not in ((), (1,)) or min(pixels.shape[:axes]) < 2:
@@ -69,7 +80,7 @@ def holds_labels(pixels: Array, axes: int) -> bool:
 
 
 def find_uniform(ranks: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return a mask of the pixels in a square, or a cube, of two pixels a side with one value."""
+    """Return a mask of the pixels that belong to a square (or cube) of two pixels per side with one value."""
     corners = [
         tuple(slice(start, n - 1 + start) for start, n in zip(corner, ranks.shape, strict=True))
         for corner in product((0, 1), repeat=ranks.ndim)
@@ -82,7 +93,7 @@ def find_uniform(ranks: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def measure_boxes(ranks: NDArray[np.int64], count: int) -> NDArray[np.float64]:
-    """Return the area of the box around the pixels of each value."""
+    """Return the area of the bounding box of each value, in pixels."""
     area = np.ones(count)
     for axis, side in enumerate(ranks.shape):
         along = [side if k == axis else 1 for k in range(ranks.ndim)]

@@ -1,4 +1,4 @@
-"""Maps for lighting: found by their roles, with normals as vectors."""
+"""Find the maps that lighting needs by their roles, and decode normals."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ ONE = np.float32(1)
 
 
 def find_map(maps: Mapping[str, Map], *roles: Role) -> Map | None:
-    """Return the first map with one of the roles, in the order of the roles."""
+    """Return the first map that has one of the given roles; earlier roles have priority."""
     return next((each for role in roles for each in maps.values() if each.role is role), None)
 
 
 def decode_normals(pixels: Array, role: Role, *, signed: bool) -> Floats:
-    """Return normals (..., 3) of unit length, x to the right, y up and z out of the image.
+    """Return unit normals (..., 3) with x to the right, y up and z towards the viewer.
 
-    Unsigned values mean 2 v - 1. Floats mean the same unless ``signed``: some value of the map is negative. If z is
-    not stored, it is computed for unit vectors.
+    Unsigned values v mean 2 v - 1. Floats do too, unless ``signed`` is True because the map contains negative values.
+    If z is not stored, it is computed so that vectors have unit length.
     """
     values = pixels[..., : 2 if role.bare else 3]
     if values.dtype.kind == "i":

@@ -1,4 +1,4 @@
-"""One map of a material: its values, its role, and its encoding of light."""
+"""One map of a material: its pixels, role and colour encoding."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Map", "Space", "find_space", "split_channels", "take_channels"]
 
 
 def find_space(role: Role, dtype: np.dtype[Any]) -> Space:
-    """Return the usual encoding of a map in a file: integers of colours are sRGB, everything else is linear."""
+    """Return the usual encoding of a map in a file: "srgb" for integer colours, "linear" for everything else."""
     return "srgb" if role.coloured and dtype.kind in "ui" else "linear"
 
 
@@ -26,17 +26,17 @@ class Map:
     Attributes
     ----------
     pixels : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array
-        Values, in any dtype of an image.
+        Pixels, of any dtype that images can have.
     role : Role
-        Role of the map.
+        Role of the map, such as colour, normal or height.
     space : {"srgb", "linear"}
-        Encoding of light. Default: integers of colours are sRGB, and everything else is linear.
+        Encoding of the values. Default: "srgb" for integer colours, and "linear" for everything else.
     file : str
-        Name of the file that the map was read from, without the suffix; empty for a map made from an array. The map is
-        written to a file of this name again.
+        Name, without the suffix, of the file that the map was read from, and to which it is written again. Empty for a
+        map from an array. Default: "".
     layer : tuple of str
         Full names of the channels in the EXR file that the map was read from, such as ``"ViewLayer.Depth.Z"``. The map
-        is written to channels of these names again. Default: none.
+        is written to channels of the same names. Default: ().
 
     Examples
     --------
@@ -56,29 +56,29 @@ class Map:
 
     @property
     def depth(self) -> int:
-        """Number of bits of each sample."""
+        """Number of bits per sample."""
         return 1 if self.pixels.dtype == np.bool_ else 8 * self.pixels.itemsize
 
     @property
     def channels(self) -> int:
-        """Number of values of each pixel."""
+        """Number of channels, including alpha."""
         return 1 if self.pixels.ndim == 2 else self.pixels.shape[-1]
 
     def __repr__(self) -> str:
-        """Return the role, the size and the dtype."""
+        """Return a description with the role, size and dtype."""
         sides = " x ".join(map(str, self.pixels.shape))
         return f"<{self.role.value} map of {sides}, {self.pixels.dtype}, {self.space}>"
 
 
 def take_channels(each: Map, first: int, last: int, role: Role) -> Map:
-    """Return some channels of a map as a map of another role."""
+    """Return a range of channels as a map with another role."""
     return replace(each, pixels=np.ascontiguousarray(each.pixels[..., first:last]), role=role)
 
 
 def split_channels(each: Map, axes: int) -> list[Map]:
-    """Return the channels of a map in groups with the same treatment: normals, codes, other values.
+    """Split a map into groups of channels that are processed in the same way: normals, codes, or other values.
 
-    Most maps are one group. Packed data has no transparency, so the last of four channels is a group of its own.
+    Most maps are one group. The fourth channel of packed data is not an alpha channel, so it is a group of its own.
     """
     count = each.pixels.shape[-1] if each.pixels.ndim > axes else 1
     if not (each.role.packed or each.role.bare):

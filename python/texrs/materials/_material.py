@@ -1,4 +1,4 @@
-"""Materials: maps in register, each with its role, in place of an example."""
+"""Materials, which replace an example in all verbs: aligned maps of one surface, each with its role."""
 
 from __future__ import annotations
 
@@ -38,39 +38,40 @@ CHANNELS: dict[Role, tuple[int, ...]] = {
     Role.VECTOR: (2, 3),
     Role.LABELS: (1,),
 }
-"""Number of channels that maps of a role may have; others have any."""
+"""Allowed numbers of channels of maps, by role. Other roles allow any number."""
 AT_ONCE = 2
-"""Number of maps that are made in parallel. Each takes up to 0.4 GB in addition to its result."""
+"""Maximum number of maps that are computed in parallel. Each needs up to 0.4 GB in addition to its result."""
 SHOWN = 512
-"""Maximum length of the longer side in a notebook, in pixels."""
+"""Maximum length of the longer side of previews in notebooks, in pixels."""
 
 
 class Material(Exports):
-    """Maps in register, by name, such as the albedo, the normals and the heights of one surface.
+    """Maps of one surface by name, such as albedo, normals and heights, aligned pixel by pixel.
 
     A material can replace an example in `texrs.design`, `texrs.tile`, `texrs.inpaint` and all other verbs. They decide
-    from all maps together (`guide`), and apply one source map to every map, so that all stay in register. Colours and
+    from all maps together (`guide`), and apply one source map to every map, so that the maps stay aligned. Colours and
     heights are blended, normals are rotated and normalised, and labels and masks are never mixed.
 
     Parameters
     ----------
     maps : mapping of str to array or Map
-        Maps by name. The name gives the role (see `texrs.materials.guess_role`), unless ``roles`` does. Integers that
-        form regions of unrelated values are labels if nothing else is stated (`notices`). All have the same size.
+        Maps by name, all of the same size. The name gives the role (see `texrs.materials.guess_role`), unless
+        ``roles`` does. Integers that form regions of unrelated values are read as labels if neither gives a role, and
+        `notices` reports it.
     roles : mapping of str to Role or str, optional
-        Roles of maps whose name gives none, or a wrong one.
+        Roles of maps whose names give no role or a wrong role. Default: None.
     spaces : mapping of str to {"srgb", "linear"}, optional
-        Encoding of light in maps. Default: integers of colours and emission are sRGB, and everything else is linear.
+        Colour encoding of maps. Default: "srgb" for integer colours and emission, and "linear" for everything else.
     weights : mapping of str to float, optional
         Weights of maps for decisions, 0 to 100. Default: 1 for colours and normals, 0.75 for heights, 0.5 for
-        roughness, metallic, occlusion, opacity, emission and masks, 0.25 for others and 0 for labels.
+        roughness, metallic, occlusion, opacity, emission and masks, 0.25 for other maps, and 0 for labels.
     axes : int
-        2 for images, 3 for volumes.
+        Number of spatial axes: 2 for images, 3 for volumes. Default: 2.
 
     Raises
     ------
     InvalidInput
-        If maps are missing, sizes differ, a name gives no role, or a map does not fit its role.
+        There are no maps, sizes differ, a name gives no role, or a map does not fit its role.
 
     Examples
     --------
@@ -104,7 +105,7 @@ class Material(Exports):
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
                 raise InvalidInput(f"{option}: must name maps ({', '.join(maps)}), got {sorted(unknown)[0]!r}")
-        # The names of arrays give their roles. Maps have a role already.
+        # Arrays get their roles from their names. `Map` objects already have a role.
         new = [name for name, each in maps.items() if not isinstance(each, Map)]
         guessed, why = guess_roles([str(name) for name in new])
         with collect() as self._notices:
@@ -121,7 +122,7 @@ class Material(Exports):
                 )
         with collect() as settled:
             report_guesses(why, guessed, said)
-            # The caller chooses the name of an array, so the name states that y is up.
+            # The caller named the arrays, so treat their y direction as stated.
             self._settle(new, new)
         self._notices.assumed.extend(settled.assumed)
         self._weights = {name: as_float(w, f"weights[{name!r}]", 0, 100) for name, w in share.items()}
@@ -163,7 +164,7 @@ class Material(Exports):
         return Map(kept, chosen, space or usual)
 
     def _settle(self, names: Collection[str], said: Collection[str]) -> None:
-        """Give normals the role that matches their values."""
+        """Set the role of normal maps (with or without z, y up or down) according to their values."""
         if self._axes == 2:
             self._maps |= settle_normals(self._maps, names, said)
 
@@ -171,36 +172,36 @@ class Material(Exports):
     def read(
         cls, path: Path | Sequence[Path], *, roles: Mapping[str, Role | str] | None = None, axes: int = 2
     ) -> Material:
-        """Read a material from the files of a folder or the layers of a file, by their usual names.
+        """Read a material from the files of a folder or the layers of an EXR file, by their usual names.
 
         Parameters
         ----------
         path : path_like, or a list of path_like
-            A folder, some files of a folder, or an EXR file of several layers.
+            Folder, list of files of one folder, or EXR file with several layers.
         roles : mapping of str to Role or str, optional
-            Roles of files by their names, with or without the suffix, or of layers by theirs.
+            Roles by file name, with or without the suffix, or by layer name. Default: None, which uses the names.
         axes : int
-            2 for images, 3 for volumes.
+            Number of spatial axes: 2 for images, 3 for volumes. Default: 2.
 
         Returns
         -------
         Material
-            Its maps have the names of the files or layers without their common beginning (``albedo`` of
-            ``rock_albedo``). `save` writes the whole names. Normals have the role that matches their values: without
-            z, or with y down, if no name or role states the contrary. `notices` lists these facts.
+            Material whose maps are named after the files or layers, without their common beginning (``albedo`` for
+            ``rock_albedo``). `save` writes the complete names. The values of normals decide whether they are read
+            without z or with y down, unless a name or ``roles`` states otherwise. `notices` reports this.
 
         Raises
         ------
         FileError
-            If it is neither a folder nor such a file, contains no map, or cannot be read.
+            ``path`` is neither a folder nor a list of files nor an EXR file, contains no map, or cannot be read.
         InvalidInput
-            If maps have several sizes, or a role names a missing file or layer.
+            Maps differ in size, or ``roles`` names a missing file or layer.
 
         Warns
         -----
         InputWarning
-            If files, subfolders or layers are not used, because the name gives no role, the format is not supported,
-            and so on. `notices` contains the reasons. Hidden files, texts, reports and mipmaps do not count.
+            Files, subfolders or layers are not used, for example because the name gives no role or the format is not
+            supported. `notices` contains the reasons. Hidden files, texts, reports and mipmaps are not reported.
 
         Examples
         --------
@@ -241,7 +242,7 @@ class Material(Exports):
         return self._maps[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Return the names."""
+        """Iterate over the names of the maps."""
         return iter(self._maps)
 
     def __len__(self) -> int:
@@ -249,49 +250,49 @@ class Material(Exports):
         return len(self._maps)
 
     def __repr__(self) -> str:
-        """Return the size, and the name, role and dtype of each map."""
+        """Return a description with the size, and the name, role and dtype of each map."""
         maps = ", ".join(f"{name} ({each.role.value}, {each.pixels.dtype})" for name, each in self.items())
         return f"<Material of {' x '.join(map(str, self._shape))}: {maps}>"
 
     def _repr_png_(self) -> bytes:
-        """Return an image of the lit material for a notebook, or of the middle plane of a volume."""
+        """Return a PNG preview of the lit material for notebooks, or of the middle plane of a volume."""
         if self._axes == 3:
             return as_png(self.base[self._shape[0] // 2])
         return as_png(self.preview(tiles=(1, 1), side=SHOWN))
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of samples along each axis, without the channels."""
+        """Number of samples along each spatial axis."""
         return self._shape
 
     @property
     def axes(self) -> int:
-        """2 for images, 3 for volumes."""
+        """Number of spatial axes: 2 for images, 3 for volumes."""
         return self._axes
 
     @property
     def notices(self) -> Notices:
-        """Notices of reading the maps: sentences, in ``ignored`` and ``assumed``."""
+        """Notices from reading the maps, as sentences in the lists ``ignored`` and ``assumed``."""
         return self._notices
 
     @property
     def weights(self) -> Mapping[str, float]:
-        """Given weights of maps for decisions. Other maps have the weights of their roles."""
+        """Weights of maps for decisions, as given by the caller. Other maps have the default weights of their roles."""
         return MappingProxyType(self._weights)
 
     @property
     def base(self) -> Array:
-        """The map that represents the material: its colours, or its first map."""
+        """The map that represents the material: its colour map, or else its first map."""
         return self[self.base_name].pixels
 
     @property
     def base_name(self) -> str:
-        """Name of this map."""
+        """Name of the map that `base` returns."""
         return self.find(Role.COLOUR) or next(iter(self))
 
     @cached_property
     def key(self) -> str:
-        """Digest of all maps, their roles and weights."""
+        """Digest of the maps, their roles and their weights."""
         parts = [(name, each.role.value, each.space) for name, each in self.items()]
         return content_hash(self._axes, parts, sorted(self._weights.items()), *(m.pixels for m in self.values())).hex()
 
@@ -301,7 +302,7 @@ class Material(Exports):
         Parameters
         ----------
         role : Role or str
-            Role to find.
+            Role of the map.
 
         Returns
         -------
@@ -310,7 +311,7 @@ class Material(Exports):
         Raises
         ------
         InvalidInput
-            If the role does not exist.
+            The role does not exist.
 
         Examples
         --------
@@ -324,12 +325,12 @@ class Material(Exports):
         return next((name for name, each in self.items() if each.role is wanted), None)
 
     def replace(self, **maps: Array) -> Material:
-        """Return a material with other values in some of its maps.
+        """Return a copy of the material with new values in some of its maps.
 
         Parameters
         ----------
         **maps : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array
-            New values by name. Roles do not change.
+            New pixels by name of the map. Roles do not change.
 
         Returns
         -------
@@ -338,7 +339,7 @@ class Material(Exports):
         Raises
         ------
         InvalidInput
-            If a map does not exist, or its size differs.
+            A map does not exist, or the size of the new pixels differs.
 
         Examples
         --------
@@ -358,14 +359,14 @@ class Material(Exports):
     def flatten_lighting(
         self, amount: float = 1.0, *, wrap: bool | tuple[bool, bool] = False, size: float | None = None
     ) -> Material:
-        """Return the material with its colours in even light. Other maps do not change.
+        """Return the material with uneven light removed from its colours. Other maps do not change.
 
         Parameters
         ----------
         amount : float
-            Share of the unevenness to remove, 0 to 1.
+            Fraction of the unevenness to remove, 0 to 1.
         wrap : bool or (bool, bool)
-            Axes along which the maps are periodic. They stay periodic.
+            Axes along which the maps are periodic. They remain periodic.
         size : float, optional
             Size in pixels above which variation counts as light (see `texrs.materials.flatten_lighting`).
 
@@ -376,7 +377,7 @@ class Material(Exports):
         Raises
         ------
         InvalidInput
-            If it is a volume, or the amount or size is invalid.
+            The material is a volume, or ``amount`` or ``size`` is invalid.
 
         Examples
         --------
@@ -402,16 +403,19 @@ class Material(Exports):
 
     @property
     def guide(self) -> Array:
-        """Guide image for decisions: (..., C) uint16, up to three informative channels of all maps; or the only map."""
+        """Guide image for the decisions of verbs, (..., C) uint16: up to three combinations of all maps.
+
+        If there is only one map, the guide is this map, unchanged.
+        """
         return guide_materials([self])[0]
 
     def features(self) -> list[Floats]:
-        """Return the features of each map times its weight, in one size and on comparable scales.
+        """Return the features of each map, multiplied by its weight, on comparable scales.
 
         Returns
         -------
         list of (..., F) float32
-            One array for each map with a weight above 0, with the material's rows and columns.
+            One array for each map whose weight is above 0, of the size of the material.
 
         Examples
         --------
@@ -432,24 +436,25 @@ class Material(Exports):
         return found
 
     def apply(self, source: SourceMap, *, progress: Progress | bool | None = None) -> Material:
-        """Apply a source map to this material, with the finish of the verb that made the map.
+        """Apply a source map to this material, with the finish that the verb used.
 
         Parameters
         ----------
         source : SourceMap
-            Source map into one exemplar of the size of the maps.
+            Source map from one exemplar of the size of this material.
         progress : callable or True, optional
-            Called as ``progress(stage, share)``. An exception that it raises stops the work. True shows a bar.
+            Function that is called as ``progress(stage, share)``, with a share from 0 to 1. An exception that it
+            raises stops the work. True shows a progress bar. Default: None.
 
         Returns
         -------
         Material
-            Material with the same maps, dtypes, roles and names.
+            Material with the same names, roles and dtypes of maps.
 
         Raises
         ------
         InvalidInput
-            If the source map has exemplars of another size, or several.
+            The source map has several exemplars, or an exemplar of another size.
 
         Examples
         --------
@@ -465,25 +470,26 @@ class Material(Exports):
 
 
 def guide_materials(materials: Sequence[Material]) -> list[Array]:
-    """Return comparable guide images of materials with the same maps."""
+    """Return guide images of materials with the same maps, on a common scale."""
     check_alike(materials)
     first = materials[0]
     if len(first) == 1:
-        # Decisions are made from this image.
+        # With a single map, verbs decide from that map itself.
         return [np.asarray(next(iter(m.values())).pixels) for m in materials]
-    # Large guides in 16 bit take half the memory, and are the same on every processor.
+    # Use 16 bits, which need half the memory of floats and give the same values on every processor.
     return [
         np.rint(guide * np.float32(65535)).astype(np.uint16) for guide in make_guides([m.features() for m in materials])
     ]
 
 
 def apply_materials(materials: Sequence[Material], source: SourceMap, progress: Progress | None = None) -> Material:
-    """Return a source map applied to several materials with the same maps."""
+    """Apply a source map with one exemplar per material to all of their maps."""
     check_alike(materials)
     first, made = materials[0], dict[str, Map]()
     finish = source.finish
     if finish is not None and finish.flatten_lighting:
-        # Only colours have light, and each map states its encoding.
+        # Remove uneven light from the colours here, because only the maps of a material state which are colours and
+        # how they are encoded.
         materials, finish = [m.flatten_lighting() for m in materials], replace(finish, flatten_lighting=False)
     names = list(first)
 
@@ -501,7 +507,7 @@ def apply_materials(materials: Sequence[Material], source: SourceMap, progress: 
 
 
 def check_alike(materials: Sequence[Material]) -> None:
-    """Check that materials have the same maps, with the same roles, dtypes and channels."""
+    """Check that materials have the same maps with the same roles, dtypes and channels."""
     first = materials[0]
     for other in materials[1:]:
         if list(other) != list(first):

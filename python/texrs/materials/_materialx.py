@@ -1,6 +1,6 @@
-"""A material as a MaterialX 1.38 document: a standard surface with its maps as inputs, in files next to it.
+"""Write a material as a MaterialX 1.38 document: a standard surface whose inputs are maps in files next to it.
 
-Maps without an input in a standard surface are left out: occlusion, which renderers compute, and masks, labels and
+Maps for which the standard surface has no input are omitted: occlusion, which renderers compute, and masks, labels and
 directions.
 """
 
@@ -31,7 +31,7 @@ VERSION = "1.38"
 INTEGERS = (np.dtype(np.uint8), np.dtype(np.uint16))
 FLOATS = (np.dtype(np.float16), np.dtype(np.float32))
 UPWARD = {"DirectX": "OpenGL", "directx": "opengl", "DX": "GL", "Dx": "Gl", "dx": "gl"}
-"""Words for normals with y down, and their replacements with y up."""
+"""Words in file names for y down, and their replacements for y up."""
 SPACES = {"srgb": "srgb_texture", "linear": "lin_rec709"}
 USED = (
     Role.COLOUR,
@@ -47,7 +47,7 @@ USED = (
 
 
 def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> list[FilePath]:
-    """Write a document and the maps that it names, and return the files."""
+    """Write the document and the maps that it names, and return the paths of the files."""
     target = as_path(path)
     if target.suffix.lower() != ".mtlx":
         raise FileError(f"{path}: the suffix must be .mtlx, got {target.suffix!r}")
@@ -81,7 +81,7 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
 
 
 def rename(name: str, role: Role) -> str:
-    """Return the name of a map that is written with y up, even if its own name states y down.
+    """Return the file name of a map that is written with y up. Words for y down are replaced.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def rename(name: str, role: Role) -> str:
 
 
 def prepare(name: str, maps: Mapping[str, Map], depth: int | None) -> Map:
-    """Return a map as renderers expect it: colours of three or four channels, normals with y up, else one number."""
+    """Return a map as renderers expect it: colours with 3 or 4 channels, normals with y up, others with one channel."""
     each = maps[name]
     pixels = each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis]
     if each.role.coloured:
@@ -119,7 +119,7 @@ def prepare(name: str, maps: Mapping[str, Map], depth: int | None) -> Map:
 
 
 def spread_grey(pixels: Array) -> Array:
-    """Return colours of three channels, or of four with transparency."""
+    """Convert grey colours to three channels, or to four with alpha."""
     channels = pixels.shape[-1]
     if channels > 2:
         return pixels[..., :4]
@@ -127,7 +127,7 @@ def spread_grey(pixels: Array) -> Array:
 
 
 def turn_green(pixels: Array) -> Array:
-    """Return normals with the opposite y."""
+    """Return normals with inverted y."""
     turned = pixels.copy()
     turned[..., 1] = np.iinfo(pixels.dtype).max - turned[..., 1]
     return turned
@@ -136,7 +136,7 @@ def turn_green(pixels: Array) -> Array:
 def compose(
     name: str, files: Mapping[Role, str], maps: Mapping[Role, Map], relief: float | None
 ) -> ElementTree.Element:
-    """Return the document: a graph of images, the surface that they feed, and the material."""
+    """Return the XML document: a graph of images, the surface that uses them, and the material."""
     root = ElementTree.Element("materialx", version=VERSION, colorspace=SPACES["linear"])
     graph = ElementTree.SubElement(root, "nodegraph", name=f"NG_{name}")
     surface = ElementTree.Element("standard_surface", name=f"SR_{name}", type="surfaceshader")
@@ -163,7 +163,7 @@ def compose(
         outputs.append(ElementTree.Element("output", name=f"{key}_out", type=type_, nodename=source))
         taken.attrib |= {"nodegraph": graph.attrib["name"], "output": f"{key}_out"}
 
-    # Colours: opacity is a map, or the fourth channel of the colours.
+    # The opacity is a map, or the alpha channel of the colours.
     opacity = image(Role.OPACITY, "opacity_image", "float") if Role.OPACITY in files else None
     feed("base", "float", None, "1.0")
     if Role.COLOUR not in files:
@@ -178,7 +178,7 @@ def compose(
             opacity = node("extract", "opacity_channel", "float", **{"in": (">color4", both), "index": index})
     if opacity is not None:
         feed("opacity", "color3", node("convert", "opacity", "color3", **{"in": (">float", opacity)}))
-    # Roughness and metallic are maps, channels of a packed map, or constants.
+    # Roughness and metallic are maps of their own, channels of a packed map, or constants.
     packed = image(Role.ORM, "orm_image", "vector3") if Role.ORM in files else None
     for role, key, channel, usual in (
         (Role.ROUGHNESS, "specular_roughness", 1, ROUGH),
@@ -198,12 +198,12 @@ def compose(
         if kind == "color4":
             light = node("convert", "emission", "color3", **{"in": (">color4", light)})
         feed("emission_color", "color3", light)
-    # Normals were converted to y up before.
+    # Normals already have y up here.
     normal = next((role for role in (Role.NORMAL, Role.NORMAL_DX) if role in files), None)
     if normal is not None:
         bent = image(normal, "normal_image", "vector3")
         feed("normal", "vector3", node("normalmap", "normal", "vector3", **{"in": (">vector3", bent)}))
-    # The material refers to the surface, and to the displacement if heights are shown.
+    # The material refers to the surface, and to the displacement if there are heights.
     root.append(surface)
     material = ElementTree.Element("surfacematerial", name=name if name[:1].isalpha() else f"M_{name}", type="material")
     reference = {"name": "surfaceshader", "type": "surfaceshader", "nodename": f"SR_{name}"}
@@ -218,7 +218,7 @@ def compose(
         reference = {"name": "displacementshader", "type": "displacementshader", "nodename": f"DP_{name}"}
         ElementTree.SubElement(material, "input", reference)
     root.append(material)
-    # A graph lists its outputs last. An empty graph is not allowed.
+    # MaterialX requires the outputs at the end of a graph, and does not allow empty graphs.
     graph.extend(outputs)
     if not len(graph):
         root.remove(graph)

@@ -1,4 +1,4 @@
-"""Shapes that show materials: a plane and a sphere, with normals, tangents and texture coordinates."""
+"""Meshes on which materials are shown: a plane and a sphere, with normals, tangents and texture coordinates."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from texrs._typing import Array, Floats
 __all__ = ["Mesh", "make_plane", "make_sphere"]
 
 RINGS = 64
-"""Rings of a sphere, from pole to pole. There are twice as many segments around."""
+"""Number of rings of the sphere from pole to pole. There are twice as many segments around it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A surface of triangles, counter-clockwise as seen from outside, with y up and z out of the image.
+    """Triangle mesh with y up and z towards the viewer. Triangles are counter-clockwise as seen from outside.
 
     Attributes
     ----------
     positions, normals : (N, 3) float32 array
-        Corners, and their outward directions.
+        Vertices, and unit normals that point outwards.
     tangents : (N, 4) float32 array, optional
-        Direction of the image's columns, and 1 if its rows are opposite to the product of normal and tangent; -1 if
-        the image is mirrored.
+        Unit tangent along the rows of the image, in the direction of increasing columns, and a sign w: 1, or -1 if the
+        image is mirrored.
     places : (N, 2) float32 array, optional
-        Texture coordinates: columns and rows, one image from one integer to the next.
+        Texture coordinates (column, row), where 1 is the width or the height of one image.
     faces : (M, 3) uint16 or uint32 array
-        Three corners each.
+        Indices of the three vertices of each triangle.
     more : dict of str to array
-        Further attributes of corners, by the names of glTF.
+        Further vertex attributes by their glTF names.
     material : int
-        Number of the material.
+        Index of the material.
 
     """
 
@@ -48,7 +48,7 @@ class Mesh:
 
 
 def make_plane(shape: Sequence[int], repeat: int) -> Mesh:
-    """Return a plane that faces the viewer and repeats an image along each side, with the image's aspect ratio."""
+    """Return a plane that faces the viewer, repeats an image along each side and keeps its aspect ratio."""
     rows, columns = shape
     half = np.array([columns, rows], np.float64) / max(rows, columns)
     signs = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1)], np.float64)
@@ -63,18 +63,18 @@ def make_plane(shape: Sequence[int], repeat: int) -> Mesh:
 
 
 def make_sphere(shape: Sequence[int], repeat: int) -> Mesh:
-    """Return a sphere that repeats an image from pole to pole, and around so that its aspect ratio is kept."""
+    """Return a sphere that repeats an image from pole to pole, and around it so that the aspect ratio is about kept."""
     rows, columns = shape
     around = max(1, round(2 * repeat * rows / columns))
     down, right = np.meshgrid(np.linspace(0, 1, RINGS + 1), np.linspace(0, 1, 2 * RINGS + 1), indexing="ij")
     theta, phi = np.pi * down, 2 * np.pi * (right - 0.5)
     out = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)], axis=-1)
-    # The two sides of the seam are at one place.
+    # Round, so that the vertices on both sides of the seam have equal positions.
     out = np.round(out, 12)
     tangent = np.stack([np.cos(phi), np.zeros_like(phi), -np.sin(phi), np.ones_like(phi)], axis=-1)
     first = np.arange(RINGS * (2 * RINGS + 1)).reshape(RINGS, -1)[:, :-1]
     below = first + 2 * RINGS + 1
-    # One of each two triangles at the poles has no area.
+    # At the poles, one of each two triangles has no area and is omitted.
     upper = np.stack([first, below, first + 1], axis=-1)[1:]
     lower = np.stack([first + 1, below, below + 1], axis=-1)[:-1]
     faces = np.concatenate([upper.reshape(-1, 3), lower.reshape(-1, 3)])

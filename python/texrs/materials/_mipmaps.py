@@ -1,7 +1,7 @@
-"""Mipmaps: copies of maps, each half as large, with the same meaning.
+"""Compute mipmaps: copies of a map, each with half the size of the one before.
 
-Colours are averaged as light, weighted by their opacity. Normals are averaged and normalised. Labels and masks keep
-existing values.
+Colours are averaged as linear light, weighted by opacity. Normals are averaged and normalised. Labels and masks are
+not averaged: one of their values is chosen.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ONE, HALF, LEAST = np.float32(1), np.float32(0.5), np.float32(1e-6)
 
 
 def halve(each: Map, axes: int) -> Iterator[Map]:
-    """Yield a map in half, a quarter, ... of its size, rounded down, until each side is 1."""
+    """Yield a map at half, a quarter, ... of its size (rounded down), down to a side of 1."""
     parts = split_channels(each, axes)
     if len(parts) > 1:
         for levels in zip(*(halve(part, axes) for part in parts), strict=True):
@@ -36,7 +36,7 @@ def halve(each: Map, axes: int) -> Iterator[Map]:
         return
     pixels = each.pixels if each.pixels.ndim > axes else each.pixels[..., np.newaxis]
     dtype, clear = pixels.dtype, each.role.coloured and pixels.shape[-1] in (2, 4)
-    # Floats that are never negative are shares, as integers are.
+    # Floats without negative values are encoded like integers, from 0 to 1.
     shares = dtype.kind in "bu" or (dtype.kind == "f" and bool(pixels.min() >= 0))
     values = take_vectors(pixels, shares, each.role.bare) if each.role.normal else take_light(pixels, each, clear)
     while max(shape) > 1:
@@ -54,7 +54,7 @@ def halve(each: Map, axes: int) -> Iterator[Map]:
 
 
 def pick(pixels: Array, shape: tuple[int, ...]) -> Array:
-    """Return the values in the middle of the area of each sample."""
+    """Return the values at the centres of the areas that the new samples cover."""
     for axis, wanted in enumerate(shape):
         at = (2 * np.arange(wanted) + 1) * pixels.shape[axis] // (2 * wanted)
         pixels = np.take(pixels, at, axis=axis)
@@ -62,7 +62,7 @@ def pick(pixels: Array, shape: tuple[int, ...]) -> Array:
 
 
 def take_vectors(pixels: Array, shares: bool, bare: bool) -> Array:
-    """Return normals within [-1, 1]; integers and shares mean 2 v - 1. If they are ``bare``, z is added."""
+    """Return normals with components in [-1, 1]. If ``bare``, z is missing and is computed from x and y."""
     values = to_unit(pixels) if pixels.dtype.kind != "f" else pixels.astype(np.float32)
     vectors = values * np.float32(2) - ONE if shares or pixels.dtype.kind != "f" else values
     if not bare:
@@ -72,7 +72,7 @@ def take_vectors(pixels: Array, shares: bool, bare: bool) -> Array:
 
 
 def take_light(pixels: Array, each: Map, clear: bool) -> Array:
-    """Return values that can be averaged: light, multiplied by opacity if there is any."""
+    """Return values that can be averaged: linear light, multiplied by opacity if ``clear``."""
     light: Array = pixels if pixels.dtype == np.float64 and each.space == "linear" else to_light(pixels, each.space)
     if not clear:
         return light
@@ -81,7 +81,7 @@ def take_light(pixels: Array, each: Map, clear: bool) -> Array:
 
 
 def show_light(values: Array, each: Map, clear: bool) -> Array:
-    """Return averaged light in the encoding of its map."""
+    """Return averaged light, encoded as in the original map."""
     light: Array = values[..., :-1] if clear else values
     share = values[..., -1:] if clear else None
     light = light if share is None else light / np.maximum(share, LEAST)

@@ -1,4 +1,4 @@
-"""Properties of normals from their values: whether z is stored, and whether y is up or down."""
+"""Find out from the values of normals whether z is stored, and whether y is up or down."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from texrs.source_map._vectors import stores_z
 __all__ = ["settle_normals"]
 
 CUT = 512
-"""Pixels along each side of the examined part."""
+"""Side in pixels of the central part that is examined."""
 ENOUGH, STRONG = 0.1, 0.3
-"""Minimum correlations of evidence that decides, and of evidence that contradicts a stated role.
+"""Minimum correlations at which values decide the direction of y, and at which they contradict a stated role.
 
-On photographs and scans the slopes of the right direction correlate by 0.11 to 0.55, and the wrong one by as much
-below 0.
+On photographs and scans, slopes with the right direction of y correlate by 0.11 to 0.55, and slopes with the wrong
+direction by the negative value.
 """
 STEEP = 0.2
-"""Minimum z for the computation of slopes."""
+"""Minimum z that is used to compute slopes."""
 OTHER = {Role.NORMAL: Role.NORMAL_DX, Role.NORMAL_XY: Role.NORMAL_DX_XY}
 OTHER |= {down: up for up, down in OTHER.items()}
 
 
 def settle_normals(maps: Mapping[str, Map], names: Collection[str], said: Collection[str]) -> dict[str, Map]:
-    """Return the normals of images among some maps, with the role that matches their values, and report it.
+    """Return the normal maps with the role that matches their values, and report it.
 
     Parameters
     ----------
     maps : mapping of str to Map
         All maps of the material.
     names : collection of str
-        Maps whose role is not settled.
+        Names of the maps whose role must be checked.
     said : collection of str
-        Maps whose role the caller states.
+        Names of the maps whose role the caller states.
     """
     settled: dict[str, Map] = {}
     for name in names:
@@ -76,7 +76,7 @@ def settle_normals(maps: Mapping[str, Map], names: Collection[str], said: Collec
 
 
 def _find_bare(title: str, each: Map, maps: Mapping[str, Map], *, said: bool) -> Role:
-    """Return the role of normals whose z is not stored."""
+    """Return the role of normals that are stored without z."""
     beside = title.endswith("_n") and any(title[:-2] == (other.file or name) for name, other in maps.items())
     if beside and each.channels == 4 and not said:
         return Role.LABPBR_NORMAL
@@ -84,10 +84,10 @@ def _find_bare(title: str, each: Map, maps: Mapping[str, Map], *, said: bool) ->
 
 
 def measure_y(each: Map, maps: Mapping[str, Map]) -> tuple[bool, float, str]:
-    """Return whether y is down, the correlation that shows it, and its source.
+    """Return True if y is down, the correlation that supports this, and its source, such as "the heights".
 
-    Heights show it if normals lean along both axes as heights grow. Otherwise the normals alone show it: slopes of a
-    surface change along y as much as the slopes of y change along x.
+    If there are heights, their slopes are compared with those of the normals along both axes. Otherwise only the
+    normals are used: for a surface, the x slope changes along y as much as the y slope changes along x.
     """
     rows, columns = (slice(max(0, (n - CUT) // 2), max(0, (n - CUT) // 2) + CUT) for n in each.pixels.shape[:2])
     signed = list_signed({"": replace(each, pixels=each.pixels[..., : 2 if each.role.bare else 3])})[""]
@@ -95,7 +95,7 @@ def measure_y(each: Map, maps: Mapping[str, Map]) -> tuple[bool, float, str]:
     if min(vectors.shape[:2]) < 3:
         return each.role.down, 0.0, ""
     lean = -vectors[..., :2] / np.maximum(vectors[..., 2:], STEEP)
-    # Rows go down, so the slope along them is the slope of y down.
+    # Row indices increase downwards, so the slope along the rows has y down.
     right, along = lean[..., 0], -lean[..., 1]
     heights = _find_heights(each, maps)
     if heights is not None:
@@ -110,12 +110,12 @@ def measure_y(each: Map, maps: Mapping[str, Map]) -> tuple[bool, float, str]:
 
 
 def _as_up(role: Role) -> Role:
-    """Return the role with y up, so that vectors are read as they are stored."""
+    """Return the role for y up, which reads vectors without changing their sign."""
     return Role.NORMAL_XY if role.bare else Role.NORMAL
 
 
 def _find_heights(each: Map, maps: Mapping[str, Map]) -> Array | None:
-    """Return the heights of a material: those of a map, or of the normals' own channel."""
+    """Return the heights of a material: its height map, or the height channel of the normal map."""
     heights = find_map(maps, Role.HEIGHT)
     if heights is not None:
         return heights.pixels if heights.pixels.ndim == 2 else heights.pixels[..., 0]
@@ -125,7 +125,7 @@ def _find_heights(each: Map, maps: Mapping[str, Map]) -> Array | None:
 
 
 def _correlate(one: NDArray[Any], other: NDArray[Any]) -> float:
-    """Return the correlation of two arrays, 0 if one is constant."""
+    """Return the correlation of two arrays, or 0 if one of them is constant."""
     with np.errstate(all="ignore"):
         one, other = one - one.mean(), other - other.mean()
         both = np.sqrt((one * one).sum() * (other * other).sum())

@@ -1,4 +1,4 @@
-"""Packed maps: several quantities in the channels of one map, separated and combined."""
+"""Split packed maps, whose channels are different quantities, and combine quantities to packed maps."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ __all__ = ["flip_y", "join", "list_quantities", "make_plain", "pack_maps", "unpa
 
 PACKED = "orm"
 SHORT = {"occlusion": "ao"}
-"""Names of unpacked maps that differ from the name of their quantity."""
+"""Names of unpacked maps that differ from the name of the quantity."""
 ROLES = {role.value: role for role in Role}
 USUAL = {"occlusion": 1.0, "roughness": ROUGH, "smoothness": 1 - ROUGH, "metallic": METAL, "emissiveness": 1.0}
-"""Values of missing quantities. Others are 0."""
+"""Values for quantities without a map, 0 to 1. Other quantities are 0."""
 METALS = 230
-"""Minimum reflectance of metal in labPBR, of 255. A metal of 255 has the colour of its albedo."""
+"""Minimum code of metals in the reflectance of labPBR, 0 to 255. At 255, the metal has the colour of its albedo."""
 
 
 def unpack_maps(maps: Mapping[str, Map]) -> dict[str, Map]:
-    """Return one map for each quantity of packed maps, and all other maps. A quantity with its own map keeps it."""
+    """Split packed maps into one map per quantity. Quantities that already have a map of their own are skipped."""
     kept: dict[str, Map] = {}
     for name, each in maps.items():
         if not each.role.packed:
@@ -54,7 +54,7 @@ def unpack_maps(maps: Mapping[str, Map]) -> dict[str, Map]:
 def lay_out(each: Map) -> tuple[str, ...]:
     """Return the quantity in each channel of a map."""
     count = each.pixels.shape[-1]
-    # Metallic and smoothness may also be stored as grey and alpha.
+    # Metallic and smoothness can also be stored as grey and alpha.
     return (
         each.role.quantities[-2:]
         if each.role is Role.METALLIC_SMOOTHNESS and count == 2
@@ -63,14 +63,14 @@ def lay_out(each: Map) -> tuple[str, ...]:
 
 
 def rename(each: Map, end: str) -> str:
-    """Return the name of a map's file with another word for the map."""
+    """Return the file name of a map with another word for the map."""
     return f"{cut_name(each.file)}_{end}".lstrip("_") if each.file else ""
 
 
 def make_plain(maps: Mapping[str, Map]) -> dict[str, Map]:
-    """Return maps for any renderer: one quantity each, normals with z, roughness instead of smoothness.
+    """Return maps for any renderer: one quantity per map, normals with z, and roughness instead of smoothness.
 
-    Occlusion, roughness and metallic may stay packed as red, green and blue.
+    Occlusion, roughness and metallic can remain packed as red, green and blue.
     """
     plain = {name: each for name, each in maps.items() if each.role is Role.ORM}
     whole = bool(plain)
@@ -90,7 +90,7 @@ def make_plain(maps: Mapping[str, Map]) -> dict[str, Map]:
 
 
 def add_z(each: Map) -> Map:
-    """Return normals of x and y as x, y and z, in their dtype and encoding."""
+    """Return normals of x and y with z added, in the same dtype and encoding."""
     pixels = np.ascontiguousarray(each.pixels[..., :2])
     signed = list_signed({"": replace(each, pixels=pixels)})[""]
     z = decode_normals(pixels, each.role, signed=signed)[..., 2:]
@@ -103,7 +103,7 @@ def add_z(each: Map) -> Map:
 
 
 def invert(pixels: Array) -> Array:
-    """Return 1 - v of shares."""
+    """Return 1 - v for values v from 0 to 1, or the same for integers."""
     if pixels.dtype == np.bool_:
         return ~pixels
     if pixels.dtype.kind == "f":
@@ -113,7 +113,7 @@ def invert(pixels: Array) -> Array:
 
 
 def flip_y(each: Map) -> Map:
-    """Return normals with z and the opposite y."""
+    """Return normals (x, y, z) with inverted y."""
     pixels = each.pixels.copy()
     signed = pixels.dtype.kind == "i" or list_signed({"": each})[""]
     pixels[..., 1] = -pixels[..., 1] if signed else invert(pixels[..., 1])
@@ -121,9 +121,9 @@ def flip_y(each: Map) -> Map:
 
 
 def pack_maps(maps: Mapping[str, Map], axes: int) -> dict[str, Map]:
-    """Return maps with occlusion, roughness and metallic as one map, in the largest depth.
+    """Combine occlusion, roughness and metallic in one map, with the largest bit depth of them.
 
-    Maps that are already packed, or have none of the three, stay unchanged.
+    If there is already such a map, or none of the three quantities, the maps are returned unchanged.
     """
     if find_map(maps, Role.ORM) is not None or PACKED in maps:
         return dict(maps)
@@ -145,7 +145,7 @@ def pack_maps(maps: Mapping[str, Map], axes: int) -> dict[str, Map]:
 
 
 def list_quantities(maps: Mapping[str, Map], axes: int) -> dict[str, tuple[str, Map]]:
-    """Return the quantities of packed maps, each with the name of its map and the map without a channel axis."""
+    """Return each quantity that can be packed: the name of its map, and the map without a channel axis."""
     found: dict[str, tuple[str, Map]] = {}
     for name, each in maps.items():
         word = each.role.value if each.role is not Role.OTHER else name
@@ -160,7 +160,7 @@ def list_quantities(maps: Mapping[str, Map], axes: int) -> dict[str, tuple[str, 
 
 
 def join(found: Mapping[str, Map], role: Role, shape: tuple[int, ...], file: str) -> Map:
-    """Return a packed map of quantities, in the largest depth. A quantity without a map has its usual value."""
+    """Return a packed map of some quantities, with their largest bit depth. Missing quantities get a constant value."""
     layout = role.layout
     several = [found[word].pixels.dtype for word in layout if word in found]
     dtype = choose_dtype(several)
@@ -180,7 +180,7 @@ def join(found: Mapping[str, Map], role: Role, shape: tuple[int, ...], file: str
 
 
 def choose_dtype(dtypes: list[np.dtype[np.generic]]) -> np.dtype[np.generic]:
-    """Return the dtype that holds maps of several dtypes."""
+    """Return a dtype that can store the values of maps of several dtypes."""
     if len(set(dtypes)) == 1 and dtypes[0] != np.bool_:
         return dtypes[0]
     floats = [d for d in dtypes if d.kind == "f"]

@@ -1,9 +1,9 @@
-"""Preview of a lit material: all its maps together.
+"""Render a preview of a lit material from all of its maps.
 
-Light comes from one direction and, weaker, from all directions. The view is from straight above. Diffuse light is
-Lambert's. Highlights are those of small mirrors (Cook and Torrance 1982). They are distributed as in Walter et al.
-2007 (GGX), and shadowed after Smith in Schlick's form, with Schlick's Fresnel term. Reflections of the surroundings
-use the fit of Karis 2014.
+A directional light and weaker ambient light illuminate the surface, which is seen from straight above. Diffuse light
+follows Lambert's law. Highlights follow the microfacet model of Cook and Torrance 1982, with the GGX distribution of
+Walter et al. 2007, Smith shadowing in Schlick's form and Schlick's Fresnel term. Ambient reflections use the fit of
+Karis 2014.
 """
 
 from __future__ import annotations
@@ -28,19 +28,22 @@ from texrs.materials._surface import find_opacity, list_signed, measure_slopes, 
 __all__ = ["render_preview"]
 
 AMBIENT = 0.3
-"""Light from everywhere. A flat, dull surface has its own colours at 1."""
+"""Strength of the ambient light.
+
+Together with the directional light, a flat, rough surface has strength 1 and shows its own colours.
+"""
 MIRROR = 0.04
-"""Share of light from straight above that non-metals reflect."""
+"""Fraction of light that non-metals reflect at normal incidence."""
 SHOULDER = 0.8
-"""Linear light above which highlights are rolled off."""
+"""Linear value above which highlights are compressed."""
 STRIP = 1 << 19
-"""Pixels that are shaded at a time."""
+"""Maximum number of pixels that are shaded at once."""
 
 
 def render_preview(
     maps: Mapping[str, Map], tiles: Sequence[int], light: Sequence[float], side: int
 ) -> NDArray[np.uint8]:
-    """Return the image of lit maps, with a maximum number of pixels along a side."""
+    """Return the rendered image, uint8 sRGB, whose longer side has at most ``side`` pixels."""
     down, right = (as_int(n, "tiles", 1, 64) for n in as_tuple(tiles, "tiles", 2, "two counts (down, across)"))
     given = as_tuple(light, "light", 2, "(azimuth, elevation) in degrees")
     azimuth, elevation = as_float(given[0], "light[0]", -360, 360), as_float(given[1], "light[1]", 1, 90)
@@ -73,20 +76,20 @@ def render_preview(
 
 
 def as_vector(azimuth: float, elevation: float) -> Floats:
-    """Return the direction of the light: x to the right, y up, z out of the image."""
+    """Return the unit vector towards the light: x to the right, y up, z towards the viewer."""
     a, e = radians(azimuth), radians(elevation)
     return np.array([cos(a) * cos(e), sin(a) * cos(e), sin(e)], np.float32)
 
 
 def shade(cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | None, toward: Floats) -> Floats:
-    """Return the light (..., 3) that a part of a surface reflects straight up."""
+    """Return the light (..., 3) that a part of the surface reflects straight up."""
     shape = next(iter(cut.values())).pixels.shape[:2]
     colour = take_colour(find_map(cut, Role.COLOUR), shape)
     rough, metal, open_ = take_surface(cut)
     normal = take_normals(cut, signed, slopes, shape)
     facing = np.maximum(normal[..., 2:], np.float32(1e-3))
     lit = np.maximum(dot(normal, toward), 0)
-    # The amount of light makes a flat surface 1 - AMBIENT bright.
+    # Choose the strength so that a flat surface reflects 1 - AMBIENT of its colour.
     strength = np.float32((1 - AMBIENT) / float(toward[2]))
     base = np.float32(MIRROR) * (1 - metal) + colour * metal
     dull = colour * (1 - metal)
@@ -102,7 +105,7 @@ def shade(cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | N
         lit / np.maximum(lit * (1 - shadow) + shadow, np.float32(1e-6))
     )
     fresnel = base + (1 - base) * np.float32((1 - float(half[2])) ** 5)
-    # The factor pi of the light cancels the divisor of Lambert's law.
+    # The strength of the light includes a factor pi, which cancels the divisor pi of Lambert's law.
     mirrored = np.float32(pi / 4) * lobe * hidden * fresnel / facing
     direct = strength * (lit * dull * (1 - fresnel) + mirrored)
     around = np.float32(AMBIENT) * open_ * (dull + reflect_surroundings(base, rough, facing))
@@ -114,13 +117,13 @@ def shade(cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | N
 
 
 def dot(vectors: Floats, other: Floats) -> Floats:
-    """Return dot products (..., 1) of vectors with one vector, summed in one order."""
+    """Return the dot products (..., 1) of vectors with one vector, with a fixed order of summation."""
     product: Floats = vectors[..., :1] * other[0] + vectors[..., 1:2] * other[1] + vectors[..., 2:] * other[2]
     return product
 
 
 def reflect_surroundings(base: Floats, rough: Floats, facing: Floats) -> Floats:
-    """Return the reflected share of even light (Karis 2014, after Lazarov)."""
+    """Return the fraction of uniform ambient light that is reflected (Karis 2014, after Lazarov)."""
     one, two, three, four = (
         rough * np.float32(a) + np.float32(b)
         for a, b in ((-1.0, 1.0), (-0.0275, 0.0425), (-0.572, 1.04), (0.022, -0.04))
@@ -132,7 +135,7 @@ def reflect_surroundings(base: Floats, rough: Floats, facing: Floats) -> Floats:
 
 
 def lay_checks(part: slice, rows: int, columns: int) -> Floats:
-    """Return the squares in two greys behind transparent parts, an even number along each side."""
+    """Return the grey checkerboard behind transparent parts, with an even number of squares along each side."""
     square = max(1, ceil(max(rows, columns) / 32))
     counts = [2 * max(1, round(n / (2 * square))) for n in (rows, columns)]
     down = np.arange(part.start, part.stop) * counts[0] // rows
@@ -143,7 +146,7 @@ def lay_checks(part: slice, rows: int, columns: int) -> Floats:
 
 
 def roll_off(light: Floats) -> Floats:
-    """Return light in [0, 1] with highlights that approach 1 instead of being clipped."""
+    """Compress highlights so that they approach 1 and are not clipped."""
     over = np.maximum(light - np.float32(SHOULDER), 0)
     room = np.float32(1 - SHOULDER)
     rolled: Floats = np.minimum(light, np.float32(SHOULDER)) + room * (1 - exp_single(-over / room))

@@ -1,4 +1,4 @@
-"""Roles of the maps of a material, the layout of their channels, and the names that give them.
+"""Roles of the maps of a material, the quantity in each channel, and the file names that give a role.
 
 ====================== =======================================================================================
 Role                   Words at the end of a name
@@ -28,9 +28,9 @@ Role                   Words at the end of a name
 ``other``              specular, spec, reflectance, porosity, emissiveness, detail, translucency, translucent, other
 ====================== =======================================================================================
 
-The last word of a name gives the role: ``metallic_paint_color`` is a colour map. Words end at ``_``, ``-``, ``.``,
-spaces and capitals. Numbers, sizes (``2k``, ``4096``), versions (``v2``) and words such as ``map``, ``png`` or
-``tileable`` do not count.
+The last word of a name gives the role: ``metallic_paint_color`` is a colour map. Words are separated by ``_``, ``-``,
+``.``, spaces and capital letters. Numbers, sizes (``2k``, ``4096``), versions (``v2``) and words such as ``map``,
+``png`` or ``tileable`` are ignored.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ __all__ = ["Role", "as_role", "guess_role"]
 
 
 class Role(Enum):
-    """Role of a map, which determines its look-up, blending, rotation and encoding.
+    """Role of a map. It determines how the map is resampled, blended, rotated and encoded.
 
     Parameters
     ----------
@@ -87,45 +87,45 @@ class Role(Enum):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Quantity in each channel as single maps have it, such as ("normal", "normal", "occlusion", "height")."""
+        """Quantity in each channel, such as ("normal", "normal", "occlusion", "height")."""
         return tuple("normal" if word in ("x", "y", "-y", "z") else word for word in self.layout) or (self.value,)
 
     @property
     def coloured(self) -> bool:
-        """Whether its values are visible colours, so that 8 and 16 bit are encoded as sRGB."""
+        """True if the values are visible colours, which are encoded as sRGB in 8 and 16 bits."""
         return self in (Role.COLOUR, Role.EMISSION)
 
     @property
     def layout(self) -> tuple[str, ...]:
-        """Quantity in each channel, such as ("occlusion", "roughness", "metallic").
+        """Meaning of each channel, such as ("occlusion", "roughness", "metallic") or ("x", "y").
 
-        Empty if all channels are one quantity.
+        It is empty if all channels belong to one quantity.
         """
         return LAYOUTS.get(self, ())
 
     @property
     def normal(self) -> bool:
-        """Whether its first channels are normals of the surface."""
+        """True if the first channels are surface normals."""
         return "x" in self.layout
 
     @property
     def down(self) -> bool:
-        """Whether its normals have y down, as in DirectX."""
+        """True if the y axis of the normals points down, as in DirectX."""
         return "-y" in self.layout
 
     @property
     def bare(self) -> bool:
-        """Whether its normals are stored without z."""
+        """True if the normals are stored without z."""
         return self.normal and "z" not in self.layout
 
     @property
     def packed(self) -> bool:
-        """Whether its channels are different quantities."""
+        """True if the channels are different quantities."""
         return bool(self.layout) and (self is Role.LABPBR_NORMAL or not self.normal)
 
     @property
     def labelled(self) -> bool:
-        """Whether its values have no meaning between them."""
+        """True if values between two of its values have no meaning, so that they must not be mixed."""
         return self in (Role.MASK, Role.LABELS)
 
 
@@ -141,9 +141,9 @@ LAYOUTS: dict[Role, tuple[str, ...]] = {
     Role.LABPBR_NORMAL: ("x", "-y", "occlusion", "height"),
     Role.LABPBR_SPECULAR: ("smoothness", "reflectance", "porosity", "emissiveness"),
 }
-"""Quantity in each channel of a map; "" is a channel without a meaning."""
+"""Quantity in each channel of a map. "" is a channel without a meaning."""
 CODED = ("reflectance", "porosity", "emissiveness")
-"""Quantities of labPBR whose values are codes above a certain number, which must not be mixed."""
+"""Quantities of labPBR that are codes above a certain value, and therefore must not be mixed."""
 WORDS: dict[Role, str] = {
     Role.COLOUR: "albedo alb basecolor basecolour basemap color colour col diffuse diff bc image photo "
     "albedotransparency albedoopacity",
@@ -173,12 +173,12 @@ ROLES = {word: role for role, words in WORDS.items() for word in words.split()}
 NEUTRAL = re.compile(
     r"v?\d+(k|px|bit)?|k|v|map|tex|texture|png|jpe?g|tiff?|exr|tga|webp|bmp|srgb|raw|linear|lin|tiled|tileable|seamless|final|copy"
 )
-"""Words that may follow the word of the role."""
+"""Words that are ignored after the word for the role."""
 AMERICAN = {"color": "colour", "normal-gl": "normal"}
 
 
 def split_name(name: str) -> list[tuple[int, str]]:
-    """Return the words of a name in lower case, each with its position. A run of capitals is a word.
+    """Split a name into lower-case words with their positions. A run of capital letters is one word.
 
     Examples
     --------
@@ -196,7 +196,7 @@ def split_name(name: str) -> list[tuple[int, str]]:
 
 
 def find_role(name: str) -> tuple[Role, int, int] | None:
-    """Return the role in a name, and where its words begin and end, or None."""
+    """Return the role that a name gives, and where its words begin and end; None if it gives none."""
     words = split_name(name)
     while words and NEUTRAL.fullmatch(words[-1][1]) and not _match(words):
         words.pop()
@@ -208,31 +208,31 @@ def find_role(name: str) -> tuple[Role, int, int] | None:
 
 
 def states_y(name: str) -> bool:
-    """Return whether the name of a normal map states that y is up or down."""
+    """Return True if the name of a normal map states the direction of y, such as GL or DX."""
     found = find_role(name)
     words = split_name(name)
     if found is None:
-        # This is T_Rock_N of Unreal.
+        # In Unreal, a name such as T_Rock_N means y down.
         return name.startswith("T_") and words[-1][1] == "n"
     return re.search("gl|dx|directx", name[found[1] : found[2]].lower().replace("_", "")) is not None
 
 
 def _match(words: list[tuple[int, str]]) -> int:
-    """Return the number of words at the end that belong to a role."""
+    """Return how many words at the end of a name give a role, 0 to 3."""
     counts = range(min(3, len(words)), 0, -1)
     return next((c for c in counts if "".join(word for _, word in words[-c:]) in ROLES), 0)
 
 
 def guess_role(name: str) -> Role | None:
-    """Return the role in a name, or None.
+    """Return the role that a name gives, or None.
 
-    The longest sequence of last words with a role counts: ``ambient_occlusion`` is one role, ``metallic_paint_color``
-    is a colour map.
+    The longest sequence of last words that is a role is used: ``ambient_occlusion`` is one role, and
+    ``metallic_paint_color`` is a colour map.
 
     Parameters
     ----------
     name : str
-        Name of a map or of its file, without the suffix.
+        Name of a map, or of its file without the suffix.
 
     Returns
     -------
@@ -241,7 +241,7 @@ def guess_role(name: str) -> Role | None:
     Raises
     ------
     TypeError
-        If the name is not a text.
+        ``name`` is not a str.
 
     Examples
     --------
@@ -256,12 +256,12 @@ def guess_role(name: str) -> Role | None:
 
 
 def as_role(value: object, name: str) -> Role:
-    """Return the role with a name. A role is returned unchanged.
+    """Return the role with the given name. A `Role` is returned unchanged.
 
     Raises
     ------
     InvalidInput
-        If the role is not known.
+        The role is unknown.
 
     """
     if isinstance(value, Role):

@@ -1,4 +1,4 @@
-"""A single file that is a map of a material by its name and its values, such as ``rock_normal.png``."""
+"""Read a single image file as a map, such as normals or labels, if both its name and its values show that it is one."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from texrs.materials._roles import Role, guess_role
 __all__ = ["SingleMap", "read_single"]
 
 UNIT, SPARE = 0.1, 8
-"""Maximum difference of the usual length of normals from 1, and minimum number of pixels for each value of labels."""
+"""Maximum deviation of the median length of normals from 1, and minimum number of pixels per different label."""
 
 
 class SingleMap(Material):
-    """A material of one map that was read from one file. Results are written as an image."""
+    """Material of one map that was read from an image file. Results are written as an image."""
 
 
 def read_single(path: str) -> SingleMap | None:
-    """Return the only map of a material. None if the name or the values of a file are those of an image.
+    """Read a file of normals, vectors, labels or a mask as a material; None if it is an ordinary image.
 
-    Colours and heights are looked up and corrected like any image. Normals and vectors turn with the surface. Labels
-    keep their values.
+    Ordinary images, including colours and heights, are resampled and blended. Normals and vectors are rotated with the
+    surface. Labels keep their values.
     """
     role = guess_role(Path(path).stem)
     if role is None or not (role.normal or role.labelled or role is Role.VECTOR):
@@ -35,7 +35,7 @@ def read_single(path: str) -> SingleMap | None:
         try:
             read = Material.read([path])
         except (FileError, InvalidInput):
-            # The reader of images reports the error.
+            # The image reader reports the error later.
             return None
     each = next(iter(read.values()))
     if not _agrees(each.pixels, each.role):
@@ -46,12 +46,12 @@ def read_single(path: str) -> SingleMap | None:
     for line in notices.assumed:
         assume(line)
     assume(f"{path}: read as {each.role.value}, because its name and its values say so")
-    # All maps of a role have one name, so that one file can be filled from another.
+    # Use the same name for all files, so that one file can be filled from another.
     return SingleMap({"map": each})
 
 
 def _agrees(pixels: Array, role: Role) -> bool:
-    """Return whether values match a role."""
+    """Return True if the values of a map are plausible for its role."""
     kind, flat = pixels.dtype.kind, pixels.reshape(-1, pixels.shape[2] if pixels.ndim == 3 else 1)
     if role.labelled:
         return kind in "bui" and len(np.unique(flat, axis=0)) * SPARE <= len(flat)
@@ -62,7 +62,7 @@ def _agrees(pixels: Array, role: Role) -> bool:
     shares = flat / np.iinfo(pixels.dtype).max if kind == "u" else flat if flat.min() >= 0 else (flat + 1) / 2
     vectors = 2 * shares.astype(np.float64) - 1
     if role.bare:
-        # Engines that store x and y fill the third channel with one value.
+        # Engines that store only x and y fill the third channel with a constant.
         return bool(np.ptp(flat[:, 2]) == 0 and (np.hypot(*vectors[:, :2].T) <= 1 + UNIT).mean() >= 0.99)
     lengths = np.linalg.norm(vectors, axis=1)
     return bool(abs(np.median(lengths) - 1) <= UNIT and np.median(vectors[:, 2]) > 0)

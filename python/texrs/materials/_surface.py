@@ -1,4 +1,4 @@
-"""Surface properties for lighting: colours, roughness, metallic, occlusion, normals and opacity, from any maps."""
+"""Surface properties for lighting, from any maps: colours, roughness, metallic, occlusion, normals and opacity."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ __all__ = [
 ]
 
 GREY = 0.5
-"""Linear light that a surface without colours reflects."""
+"""Linear reflectance of surfaces without colours."""
 ROUGH, METAL = 0.6, 0.0
-"""Values of surfaces without such maps."""
+"""Roughness and metallic of surfaces without these maps."""
 STEEPNESS = 0.4
-"""Root mean square slope for the display of heights, because their unit is unknown."""
+"""Root mean square slope to which heights are scaled for display, because their unit is unknown."""
 
 
 def list_signed(maps: Mapping[str, Map]) -> dict[str, bool]:
-    """Return the maps that are floats with negative values: normals as vectors, not as shares."""
+    """Return for each map True if it contains negative floats: its normals are then not scaled to 0 to 1."""
     return {name: each.pixels.dtype.kind == "f" and bool(each.pixels.min() < 0) for name, each in maps.items()}
 
 
 def take_colour(each: Map | None, shape: tuple[int, ...]) -> Floats:
-    """Return linear colours (..., 3), without transparency; grey if there are none."""
+    """Return linear colours (..., 3) without alpha, or grey if there is no colour map."""
     if each is None:
         return np.full((*shape, 3), GREY, np.float32)
     pixels = each.pixels[..., np.newaxis] if each.pixels.ndim == 2 else each.pixels
@@ -46,7 +46,7 @@ def take_colour(each: Map | None, shape: tuple[int, ...]) -> Floats:
 
 
 def take_surface(cut: Mapping[str, Map]) -> tuple[Floats, Floats, Floats]:
-    """Return roughness, metallic and occlusion, each (..., 1) in [0, 1], or one number for all."""
+    """Return roughness, metallic and occlusion, each (..., 1) in [0, 1], or (1, 1, 1) if constant."""
     packed = find_map(cut, Role.ORM)
     found = []
     for role, channel, usual in ((Role.ROUGHNESS, 1, ROUGH), (Role.METALLIC, 2, METAL), (Role.OCCLUSION, 0, 1.0)):
@@ -65,7 +65,7 @@ def take_surface(cut: Mapping[str, Map]) -> tuple[Floats, Floats, Floats]:
 def take_normals(
     cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | None, shape: tuple[int, ...]
 ) -> Floats:
-    """Return normals of unit length, y up: from the normal map, else from the heights, else straight up."""
+    """Return unit normals with y up: from the normal map, else from the slopes, else straight up."""
     name = next((n for role in (Role.NORMAL, Role.NORMAL_DX) for n, m in cut.items() if m.role is role), None)
     if name is not None:
         return decode_normals(cut[name].pixels, cut[name].role, signed=signed[name])
@@ -77,7 +77,7 @@ def take_normals(
 
 
 def measure_slopes(maps: Mapping[str, Map], wrap: tuple[bool, bool]) -> Floats | None:
-    """Return the slopes of heights to the right and upwards, if they determine the surface."""
+    """Return the scaled slopes of the heights to the right and upwards; None if there are normals or no heights."""
     height = find_map(maps, Role.HEIGHT)
     if height is None or find_map(maps, Role.NORMAL, Role.NORMAL_DX) is not None:
         return None
@@ -87,14 +87,14 @@ def measure_slopes(maps: Mapping[str, Map], wrap: tuple[bool, bool]) -> Floats |
 
 
 def slope(height: Map, wrap: tuple[bool, bool]) -> Floats:
-    """Return the slopes of heights from pixel to pixel, to the right and upwards. Integers are shares of their range."""
+    """Return the slopes of heights per pixel, to the right and upwards. Integers are scaled to 0 to 1."""
     pixels = height.pixels if height.pixels.ndim == 2 else height.pixels[..., 0]
     values = to_unit(pixels) if pixels.dtype.kind in "bui" else pixels.astype(np.float32)
     return np.stack([differ(values, 1, wrap[1]), -differ(values, 0, wrap[0])], axis=-1)
 
 
 def differ(values: Floats, axis: int, wrap: bool) -> Floats:
-    """Return central differences along an axis, one-sided at borders that are not periodic."""
+    """Return central differences along an axis. At the borders of an axis that is not periodic, they are one-sided."""
     if values.shape[axis] == 1:
         return np.zeros_like(values)
     found: Floats = (np.roll(values, -1, axis) - np.roll(values, 1, axis)) * np.float32(0.5)
@@ -105,7 +105,7 @@ def differ(values: Floats, axis: int, wrap: bool) -> Floats:
 
 
 def find_opacity(cut: Mapping[str, Map]) -> Floats | None:
-    """Return the opacity of a surface, (..., 1): from its map, else from the alpha of its colours."""
+    """Return the opacity (..., 1) from its map, or else from the alpha of the colours; None if there is none."""
     each = find_map(cut, Role.OPACITY)
     if each is not None:
         return to_share(each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis])[..., :1]
@@ -116,7 +116,7 @@ def find_opacity(cut: Mapping[str, Map]) -> Floats | None:
 
 
 def measure_relief(maps: Mapping[str, Map]) -> float | None:
-    """Return the height of a value of 1, in widths of the image: as the normals show, else the usual one."""
+    """Return the displacement for a height of 1, in widths of the image; None without heights."""
     height = find_map(maps, Role.HEIGHT)
     if height is None:
         return None
@@ -130,7 +130,7 @@ def measure_relief(maps: Mapping[str, Map]) -> float | None:
     if name is not None:
         normal = take_normals({name: maps[name]}, list_signed({name: maps[name]}), None, grown.shape[:2])
         seen = -normal[..., :2] / np.maximum(normal[..., 2:], np.float32(0.1))
-        # Find the heights that fit the normals best.
+        # Fit the scale of the heights to the normals by least squares.
         fitting = float((seen * grown).sum(dtype=np.float64)) / square
         steep = fitting if fitting > 0 else steep
     relief: float = steep / columns
