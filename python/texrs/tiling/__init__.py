@@ -1,31 +1,35 @@
-"""Make images tileable: opposite edges meet along the least visible cuts.
+"""Make images tileable: join opposite edges along the least visible seams.
 
 J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.5. There the
 halves of the image are swapped, and its former edges overlap in the middle, where a minimum cut joins them.
 
 Departures, with their reasons:
 
-- An axis along which the image tiles already does not change.
+- An axis along which the image is tileable already is not changed.
 
-- The halves are not swapped. The cut is at the border, and pixels far from it stay in place.
+- The halves are not swapped, because the seam is cut at the border. Pixels far from it stay in place.
 
-- The cut of the second axis closes on itself. An open cut ends at two heights and opens the wrap of the first axis again.
+- The seam of the second axis ends at the position where it starts. Otherwise its ends would differ, and the result
+  would no longer be tileable along the first axis.
 
-- The overlap is searched, up to 7/16 of the side, and not fixed at 50 pixels. It determines the period of the result.
-  The courses of a wall meet only for some periods, and large stones can be separated only where they end.
+- The overlap is searched for, up to 7/16 of the side, instead of being fixed at 50 pixels. It determines the period of
+  the result. The courses of a wall continue across the border only for some periods, and a seam between large stones
+  exists only for some overlaps.
 
-- The overlapping parts must be similar. The cost of a cut does not show this if the cut runs through plain background.
+- The overlapping parts must be similar. The cost of a seam does not measure this if the seam runs through plain
+  background.
 
-- If two cuts cost little more than one, other parts of the image cover the former edges. The result keeps the size.
+- If two seams cost little more than one, the lines near the former edges are covered by other parts of the image. The
+  result then keeps the size of the image.
 
-- A cut costs more the deeper inside elements it runs.
+- The cost of a seam rises with its depth inside elements.
 
 - Uneven light is evened out first if there is evidence of it.
 
-- A border or seam that stays visible is measured, and other joints are tried.
+- The border and the seams of the result are measured. If they are visible, other overlaps are tried.
 
-- A result larger than the image is a periodic quilt of it. A lattice is stretched a little so that it closes, as in
-  `texrs.design`.
+- A result larger than the image is a periodic quilt of patches. A lattice is first stretched slightly so that a whole
+  number of periods fits, as in `texrs.design`.
 """
 
 from __future__ import annotations
@@ -62,22 +66,32 @@ from texrs.tiling._whole_elements import SMALLEST, WholeElements, find_whole_ele
 __all__ = ["Tiling", "check_tiling", "tile"]
 
 SHARE, LEAST = 8, 25
-"""Least overlap that is chosen: the side divided by the first number, at most the second number in pixels."""
+"""Minimum overlap that the search tries: the side divided by 8, at most 25 pixels."""
 LARGER = "texrs.CornerTiles creates an unbounded design in parts"
-"""Advice for results that are too large."""
+"""Remedy in errors about results that are too large."""
 MOST = 7
-"""Maximum overlap, in sixteenths of the side."""
+"""Maximum overlap that the search tries, in 1/16 of the side."""
 REGULAR, DEAR = 1.0, 0.5
-"""Cost that a cut next to a cover may have, relative to the cut of an overlap. The first value is for elements on a lattice,
-the second value if a cover is unlikely to fit. It is unlikely for large elements, and for a side that is not a multiple of
-their period."""
+"""Maximum cost of a seam next to a cover, relative to the seam of an overlap.
+
+The first value is for elements on a lattice. The second value is for covers that are unlikely to fit, because elements
+are large or the side is not a multiple of their period.
+"""
 PERIODIC = 3.0
-"""Price of an overlap of the whole side, relative to the price of a cut, among multiples of a period."""
+"""Weight of the lost length in the price of a joint, if the period of the elements determines the size.
+
+An overlap of the whole side would add this multiple of the cost of its seam.
+"""
 REFUSED = ((0, 1), (1, 0), (1, 1))
-"""Number of joints of the rows and of the columns that each further attempt leaves out. Attempts are made only if a
-border or seam is visible, and the result is the attempt whose boldest figure is least."""
+"""Groups of best joints that each further attempt skips, along (rows, columns).
+
+Attempts are made only if a border or seam is visible. The least visible attempt is used.
+"""
 ELEMENT = 0.22
-"""Elements larger than this share of a side are seldom whole between two cuts."""
+"""Minimum side of large elements, as a share of the side of the image.
+
+A joint with two seams cuts most elements of this size.
+"""
 
 
 def tile(
@@ -90,9 +104,9 @@ def tile(
     flatten_lighting: bool | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Make an image tileable: copies of the result side by side have no edge between them.
+    """Make an image tileable: copies of the result side by side have no visible edge between them.
 
-    An axis along which the image tiles already does not change. Pixels far from the border stay in place.
+    An axis along which the image is tileable already is not changed. Pixels far from the border stay in place.
 
     Parameters
     ----------
@@ -123,38 +137,38 @@ def tile(
     Returns
     -------
     Synthesis
-        The image, in the dtype and with the channels of the input. An axis that does not wrap keeps its length, or its
-        middle part of the requested length.
+        The image, in the dtype and with the channels of the input. An axis that does not wrap keeps its length, or is
+        cropped to the middle part of the requested length.
 
         Stages:
 
-        - ``shifted``: The image with its halves exchanged, not cut yet.
-        - ``source_regions``: The part of the image that each pixel is from.
-        - ``before_blending``: The result before colours are corrected.
+        - ``shifted``: The image with its halves exchanged, before seams are cut.
+        - ``source_regions``: A grey level for each part of the image that pixels were copied from.
+        - ``before_blending``: The result before its colours are corrected.
 
         Report:
 
         - ``method``: "tile", or "quilt" if the result is larger than the image.
         - ``size``: (rows, columns).
-        - ``wrap``: Whether the result repeats along (rows, columns).
-        - ``screening``: Weight of the values in the colour correction.
+        - ``wrap``: (rows, columns): whether the result repeats along each axis.
+        - ``screening``: Weight of the original values in the colour correction.
         - ``flatten_lighting``: Whether uneven light was evened out.
-        - ``already``: Axes along which the image tiles already.
-        - ``resized``: For each axis, the reason for another size.
-        - ``overlap``: For each axis, the overlap in pixels; 0 if the ends are covered.
-        - ``joints``: For each axis: ``overlap``, ``cover``, number of joints that were tried, ``cost`` and cost of a pair of
-          pixels.
-        - ``in_place``: Share of the pixels from the same place of the image.
-        - ``in_step``: Whether elements are on a strict lattice, so that a size must be a multiple of its period.
-        - ``unchanged``: Share of the pixels that equal the pixel of the image at the same place.
-        - ``tiling``: For each axis that wraps, what `texrs.check_tiling` finds in the result with its source map: ``tiles``,
+        - ``already``: Axes along which the image is tileable already.
+        - ``resized``: For each axis with another length than the image, the reason.
+        - ``overlap``: For each axis, the overlap of the ends in pixels; 0 if the ends are covered by other parts.
+        - ``joints``: For each axis: ``overlap``, ``cover`` (distance of the covering lines), ``joints_tried``,
+          ``cost`` (of all seams) and ``mean_seam_cost`` (per pair of pixels).
+        - ``in_place``: Share of the pixels that are copied from the same position in the image.
+        - ``in_step``: Whether the elements are on a strict lattice. The size must then be a multiple of its period.
+        - ``unchanged``: Share of the pixels that equal the pixel of the image at the same position.
+        - ``tiling``: For each axis that wraps, the result of `texrs.check_tiling` with the source map: ``tiles``,
           ``seam``, ``place`` and ``step``.
-        - ``warnings``: Borders and seams that stay visible, one sentence each.
+        - ``warnings``: One sentence for each border or seam that is still visible.
 
     Raises
     ------
     InvalidInput
-        A volume, a side that is too short, a size or an overlap outside its limits, or a size together with an overlap.
+        The image is a volume, a side is too short, the size or the overlap is out of range, or both are given.
 
     References
     ----------
@@ -185,10 +199,10 @@ def tile(
     check_work("tile", [pixels], wanted, "image" if size is None else "size", way=LARGER)
     evened = None if flatten_lighting is None else as_bool(flatten_lighting, "flatten_lighting")
     with collect() as notices:
-        # An axis that tiles already stays as it is, unless it gets another size.
+        # An axis that is tileable already is not changed, unless the size is given.
         free = [cyclic[a] and overlap is None and wanted == (rows, columns) for a in range(2)]
         already = [] if evened else find_tiled(given, free)
-        # Uneven light shows as a step at the border, so it is evened out if nothing forbids it.
+        # Uneven light causes a step at the border, so even it out by default if the evidence is clear.
         if evened is None:
             evened = len(already) < sum(cyclic) and not _keeps_colours(image, weight) and is_uneven(given)
         if evened:
@@ -210,12 +224,12 @@ def tile(
             progress=listen(progress),
         )
         made = join()
-        # If the border is visible, try other joints, and keep the least visible one.
+        # If a border or seam is visible, try other joints, and keep the least visible result.
         for refused in REFUSED:
             if find_boldest(made) <= SEEN or not made.report["joints"] or made.report["in_step"]:
                 break
             other = join(refused=refused)
-            # A joint that loses more of the image is not better.
+            # Do not accept a joint that makes the result smaller.
             if find_boldest(other) < find_boldest(made) and other.source_map.label.size >= made.source_map.label.size:
                 made = other
     report = {**made.report, "unchanged": measure_unchanged(made.image, pixels), "warnings": list_visible(made)}
@@ -238,9 +252,9 @@ def _join_edges(
     refused: Sequence[int] = (0, 0),
     progress: Progress | None,
 ) -> Synthesis:
-    """Return an image whose edges are joined along the axes that wrap and do not tile ``already``.
+    """Return a result whose edges are joined, except along the axes ``already`` that are tileable already.
 
-    ``flatten_lighting``: whether the light of the image was evened out. ``refused``: see `find_joint`.
+    ``flatten_lighting``: whether the light of the image was evened out before. ``refused``: see `find_joint`.
     """
     exemplar, watch = as_exemplar(image, "image"), progress or (lambda stage, share: None)
     shape = (exemplar.shape[0], exemplar.shape[1])
@@ -249,7 +263,7 @@ def _join_edges(
     found: dict[int, Joined] = {}
     reasons: dict[str, str] = {}
     elements = None if len(already) == sum(wrap) else find_whole_elements(exemplar.guidance)
-    # A larger result is quilted. Otherwise the ends of the image are joined.
+    # A larger result is a quilt of patches. Otherwise join the ends of the image.
     if larger:
         source = extend(exemplar.guidance, size, wrap, watch)
     else:
@@ -257,7 +271,7 @@ def _join_edges(
     weight = screening if found or larger else 0.0
     source = source.with_finish(wrap, screening=weight or None, flatten_lighting=flatten_lighting)
     composite = source.render(exemplar.image)
-    # The light of the image is even already.
+    # Apply the finish without evening out the light, which has been done before.
     finish = None if source.finish is None else replace(source.finish, flatten_lighting=False)
     result = apply(source, exemplar.image, finish=finish, progress=progress) if weight else composite
     watch("done", 1.0)
@@ -266,7 +280,7 @@ def _join_edges(
         "source_regions": (source.label * 85 % 256).astype(np.uint8),
         "before_blending": composite,
     }
-    # Check the finished image: the report measures the visibility of its borders and seams.
+    # Measure the finished image, because the colour correction changes the visibility of borders and seams.
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
         "size": list(source.shape),
@@ -287,13 +301,13 @@ def _join_edges(
 
 
 def find_boldest(made: Synthesis) -> float:
-    """Return the boldness of the boldest border or seam of a result."""
+    """Return the largest visibility of a border or seam of a result, where 1 is as bold as the boldest lines elsewhere."""
     figures: list[float] = [each[k] or 0.0 for each in made.report["tiling"].values() for k in ("seam", "step")]
     return max(figures, default=0.0)
 
 
 def list_visible(made: Synthesis) -> list[str]:
-    """Return a sentence about each border and each seam that is visible."""
+    """Return one sentence for each visible border or seam of a result."""
     return [
         f"{axis}: {where} is visible, {each[name]:.1f} times as bold as the boldest lines elsewhere"
         for axis, each in made.report["tiling"].items()
@@ -303,10 +317,10 @@ def list_visible(made: Synthesis) -> list[str]:
 
 
 def measure_unchanged(image: Array, given: Array) -> float:
-    """Return the share of the pixels of a result that equal those of the input at the same place."""
+    """Return the share of pixels of a result that equal the pixel of the input at the same position."""
     rows, columns = (min(n, m) for n, m in zip(image.shape[:2], given.shape[:2], strict=True))
     shown, before = (each[:rows, :columns].reshape(rows, columns, -1) for each in (image, given))
-    # Over few channels, `all` takes ten times as long.
+    # Compare channel by channel, because `numpy.all` over a few channels takes 10x as long.
     same = np.ones((rows, columns), bool)
     for channel in range(shown.shape[-1]):
         same &= shown[..., channel] == before[..., channel]
@@ -314,21 +328,21 @@ def measure_unchanged(image: Array, given: Array) -> float:
 
 
 def _keeps_colours(image: Array | Exemplar | Material, screening: float) -> bool:
-    """Return whether a result has only the colours of the image. Its light is then never evened out."""
+    """Return whether a result must use only the colours of the image, so that its light must not be evened out."""
     if isinstance(image, Material):
         return has_few_colours(np.asarray(image.base))
     return find_palette({"image": image, "screening": screening}, ("image",), {}) is not None
 
 
 def _measure_kept_places(source: SourceMap) -> float:
-    """Return the share of the pixels that come from the same place of the image."""
+    """Return the share of pixels that are copied from the same position in the image."""
     rows, columns = (np.arange(n, dtype=np.float32) for n in source.shape)
     there = (source.coordinates[..., 0] == rows[:, np.newaxis]) & (source.coordinates[..., 1] == columns)
     return float(there.mean())
 
 
 def _as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tuple[int, int]:
-    """Return the requested size of the result, or the size of the image."""
+    """Check the requested size of the result. By default, return the size of the image."""
     for axis, side in enumerate(shape):
         if wrap[axis] and side < 2:
             raise InvalidInput(f"image: must have at least 2 {AXES[axis]} to wrap them, got {side}")
@@ -348,7 +362,7 @@ def _as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tup
 def _as_choices(
     overlap: object, free: bool, shape: tuple[int, int], size: tuple[int, int], wrap: Sequence[bool]
 ) -> list[Choice]:
-    """Return the joints of each axis that may be chosen; ``free``: whether the size depends on the joint."""
+    """Return the allowed overlaps of each axis. If ``free``, the joint may also change the size of the result."""
     if overlap is None:
         return [_choose(n, m, free) for n, m in zip(shape, size, strict=True)]
     if not free:
@@ -369,9 +383,9 @@ def _as_choices(
 
 def _choose(side: int, wanted: int, free: bool) -> Choice:
     if free:
-        # A larger overlap leaves only one possible place for the border, which may be a bold one.
+        # A larger overlap would leave a single possible border line, which could cross bold features.
         return Choice(max(1, min(LEAST, side // SHARE)), max(1, side * MOST // 16), side)
-    # Two halves are the largest parts that can overlap.
+    # The overlapping parts can be at most half of the image each.
     overlap = min(side - wanted, wanted)
     return Choice(max(1, overlap), overlap, wanted)
 
@@ -386,21 +400,22 @@ def _join_ends(
     refused: Sequence[int],
     watch: Progress,
 ) -> tuple[SourceMap, dict[int, Joined], dict[str, str]]:
-    """Return the source map of a result that is not larger, the joints of its axes, and the reasons for other lengths.
+    """Return the source map of a result of at most the image's size, the joint of each axis, and why lengths changed.
 
-    ``already``: axes along which the image tiles. ``refused``: see `find_joint`.
+    ``already``: axes along which the image is tileable. ``refused``: see `find_joint`.
     """
     shape = (colours.shape[0], colours.shape[1])
-    # Take the middle of an image that is more than twice as long as the result.
+    # If the image is more than twice as long as the result, use only its middle, because two parts can overlap at most
+    # fully.
     kept = [min(n, 2 * m) if cyclic else m for n, m, cyclic in zip(shape, wanted, wrap, strict=True)]
     corner = [(n - m) // 2 for n, m in zip(shape, kept, strict=True)]
     part = tuple(slice(low, low + n) for low, n in zip(corner, kept, strict=True))
-    # Index of the pixel of the image that each pixel is copied from. The label is its piece.
+    # Flat index of the image pixel that each result pixel is copied from. Its label is the number of its piece.
     place = np.arange(shape[0] * shape[1]).reshape(shape)[part]
     label: NDArray[np.uint32] = np.zeros(place.shape, np.uint32)
     found: dict[int, Joined] = {}
     reasons: dict[str, str] = {}
-    # Columns before rows, as in the paper.
+    # Join columns before rows, as in the paper.
     for axis in (1, 0):
         if not wrap[axis] or axis in already or elements is None:
             continue
@@ -410,7 +425,7 @@ def _join_ends(
         if elements.side > ELEMENT * place.shape[axis]:
             choice = replace(choice, covered=DEAR)
         elif elements.is_out_of_step(axis, place.shape[axis]):
-            # Any multiple of the period fits, so prefer the largest one.
+            # If the length may be any multiple of the period, prefer the largest one.
             choice = replace(choice, covered=DEAR, loss=PERIODIC)
         elif elements.regular:
             choice = replace(choice, covered=REGULAR)
@@ -434,7 +449,7 @@ def _join_ends(
 
 
 def _give_reason(joined: Joined, elements: WholeElements, axis: int, side: int) -> str:
-    """Return why an axis became shorter."""
+    """Return the reason why an axis became shorter, as report text."""
     length, period = joined.joint.period, elements.find_period(axis)
     if times := elements.count_periods(axis, length):
         return f"{side} -> {length} pixels: {times} whole periods of about {period:.1f}"
@@ -446,7 +461,7 @@ def _give_reason(joined: Joined, elements: WholeElements, axis: int, side: int) 
 
 
 def _describe(joined: Joined) -> dict[str, object]:
-    """Return the report about one axis."""
+    """Return the report entry of the joint of one axis."""
     joint, edges = joined.joint, sum(cut.edges for cut in joined.cuts)
     cost = sum(cut.value for cut in joined.cuts)
     return {

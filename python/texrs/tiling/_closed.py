@@ -1,4 +1,4 @@
-"""Cuts between two overlapping images, along seams that may have to close on themselves."""
+"""Cut overlapping strips of an image, along seams that can be required to end where they start."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from texrs._typing import Bools, Floats
 from texrs.kernels.seam import Cut, Strip, cut_strips
 
 MORE = 8
-"""A seam that has to close is cut in a longer strip: longer at each end by the side divided by this."""
+"""Divisor of the side. A strip for a closed seam is extended by this part of the side at each end."""
 FLAT = 0.05
-"""Value that the kernel adds to a gradient before it divides a cost by it."""
+"""Value that the kernel adds to a gradient before it divides a cost by it, in units of the guide."""
 
 
 def cut_overlaps(strips: Sequence[Strip], *, closed: bool) -> list[Cut]:
-    """Cut strips whose first line shows A, and their last one B.
+    """Cut strips so that the first line is from A and the last line from B.
 
-    The search for the least closed seam takes ten times as long as the search for an open one. An open seam is therefore cut
-    in a strip that continues around its ends. It closes at a place that it passes twice. Without such a place, the least
-    closed seam is searched.
+    If ``closed``, each seam ends where it starts. The search for the cheapest closed seam takes 10x as long as for an
+    open seam. An open seam is therefore cut in a strip that continues around its ends. If it passes the same position
+    twice, one round of it is used. Otherwise the cheapest closed seam is searched for.
     """
     several = [strip for strip in strips if np.shape(strip.a)[0] > 1]
     made = iter(_cut_closed(several) if closed else cut_strips(several))
@@ -29,7 +29,7 @@ def cut_overlaps(strips: Sequence[Strip], *, closed: bool) -> list[Cut]:
 
 
 def _cut_line(strip: Strip) -> Cut:
-    """Return the only possible cut of a single line."""
+    """Return the cut of a strip with one line, which is entirely from A."""
     a, b = np.asarray(strip.a), np.asarray(strip.b)
     return Cut(np.zeros(a.shape[:2], bool), float(np.abs(a - b).sum(dtype=np.float64)), a.shape[1])
 
@@ -43,7 +43,7 @@ def _cut_closed(strips: Sequence[Strip]) -> list[Cut]:
 
 
 def _continue(strip: Strip) -> Strip:
-    """Continue a strip around both of its ends."""
+    """Extend a strip periodically at both ends."""
     side = np.shape(strip.a)[1]
     around = np.arange(-(side // MORE), side + side // MORE) % side
     a, b, penalty = (np.asarray(each)[:, around] for each in (strip.a, strip.b, strip.penalty))
@@ -51,7 +51,10 @@ def _continue(strip: Strip) -> Strip:
 
 
 def _close(mask: Bools, side: int) -> Bools | None:
-    """Return one round of a seam, from a place that it passes twice. Without such a place, return None."""
+    """Return one round of a seam, from a position that it passes twice.
+
+    None if the seam does not pass a position twice.
+    """
     more = (mask.shape[1] - side) // 2
     same = np.flatnonzero((mask[:, :-side] == mask[:, side:]).all(axis=0))
     if not len(same):
@@ -61,7 +64,7 @@ def _close(mask: Bools, side: int) -> Bools | None:
 
 
 def measure_cut(strip: Strip, mask: Bools) -> Cut:
-    """Return a cut whose seam closes, with its cost."""
+    """Return a closed cut with its cost."""
     a, b, penalty = (np.asarray(each, np.float32) for each in (strip.a, strip.b, strip.penalty))
     apart = np.abs(a - b).sum(axis=-1)
     value, edges = 0.0, 0

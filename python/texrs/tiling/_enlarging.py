@@ -15,11 +15,14 @@ from texrs.source_map import SourceMap
 from texrs.tiling._whole_elements import find_whole_elements
 
 PATCH, OVERLAP, DEEP = 0.6, 0.25, 6.0
-"""Side of a patch and overlap of two patches, as shares of the shorter side, and additional cost of a seam inside elements."""
+"""Side of a patch and overlap of two patches, as shares of the shorter side of the image.
+
+The last value is the additional cost of a seam at full depth inside an element, as a multiple of the usual cost.
+"""
 
 
 def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: Progress) -> SourceMap:
-    """Return the source map of a periodic quilt of an image."""
+    """Return the source map of a periodic quilt of image patches, of any size."""
     shape = (colours.shape[0], colours.shape[1])
     elements = find_whole_elements(colours)
     picture = Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * elements.depth, elements.regular)
@@ -35,7 +38,9 @@ def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: 
 
 
 def close_lattice(picture: Picture, size: tuple[int, int], wrap: Sequence[bool]) -> Picture:
-    """Return an image stretched so that its lattice closes on the torus, or unchanged if that would stretch it too much.
+    """Stretch an image so that whole periods of its lattice fit the result.
+
+    Leave it unchanged if the stretch is too large.
 
     The lattice is searched at the full size, because a fine lattice is not visible in a small copy.
     """

@@ -1,8 +1,9 @@
-"""Where the ends of an axis are joined: every joint is tried in a small copy, and the best are refined.
+"""Find the best joint of the two ends of an axis: try all joints in a small copy, and refine the best ones.
 
-Two ends of an image that agree also agree in a small copy. A cut at 1/8 of the side takes 1/100 of the time. The search
-therefore cuts every overlap (up to half the side) and every cover in a small copy. It refines the cheapest joints level by
-level. It tries a few neighbouring joints at each level, and keeps the best by the seam cost of the previous level.
+If two ends of an image fit, they also fit in a small copy. Cutting at 1/8 of the side takes 1/100 of the time. The
+search therefore cuts every overlap (up to half the side) and every cover in a small copy. It refines the cheapest
+joints level by level. It tries a few similar joints at each level, and keeps the best one according to the cost near
+the seam of the previous level.
 """
 
 from __future__ import annotations
@@ -17,42 +18,48 @@ from texrs.kernels.seam import Cut, Strip, cut_strips
 from texrs.tiling._closed import cut_overlaps
 
 COARSEST = 96
-"""Least length of the shorter side of the coarsest level. It is less than twice this."""
+"""Minimum length, in pixels, of the shorter side of the coarsest level. The actual length is less than twice this."""
 DEEP = 8.0
-"""Additional cost of a pair of pixels deep inside an element, as a multiple of the usual cost."""
+"""Additional cost of a seam at full depth inside an element, as a multiple of the usual cost."""
 FOLLOWED = 3
 """Number of joints that are refined from the coarsest level to the next. Only the best one is refined further."""
 APART = 2
-"""Least difference of these joints, in pixels of the coarsest level."""
+"""Minimum difference between these joints in overlap or cover, in pixels of the coarsest level."""
 LOSS = 1.5
-"""Price of an overlap of the whole side, relative to the price of a cut, because an overlap makes the result smaller."""
+"""Weight of the lost length in the price of a joint.
+
+An overlap of the whole side would add this multiple of the cost of its seam.
+"""
 COVERED = 1.6
-"""Cost that a cut next to a cover may have, relative to the cut of an overlap. A cover needs two cuts, but keeps the
-size."""
+"""Maximum cost of a seam next to a cover, relative to the seam of an overlap.
+
+A cover needs two seams, but keeps the size.
+"""
 BAND = 4
-"""Length of the strip of each cut of a cover: the side divided by this."""
+"""Divisor of the period that gives the width of the strip for each seam of a cover."""
 MANY = 4
-"""Number of joints above which all lines of a level are copied once, because each joint would copy its lines."""
+"""Number of joints above which the lines of a level are copied once, so that the kernel does not copy them for each joint.
+"""
 NEAR = 6
-"""Lines on either side of a seam that are searched at the next level, to measure the cost of a joint."""
+"""Number of lines on either side of a seam that are searched at the next level to measure the cost of a joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Level:
-    """An image at one size."""
+    """An image at one resolution."""
 
     colours: Floats
-    """(H, W, C)"""
+    """Colours, (H, W, C)."""
     depth: Floats
-    """(H, W): how deep inside an element each pixel is, 0 to 1."""
+    """Depth of each pixel inside an element, (H, W), 0 to 1."""
 
     def halve(self) -> Level:
-        """Return the level of half the size, without an odd last line."""
+        """Return the level at half the size. An odd last line is dropped."""
         return Level(halve(self.colours), halve(self.depth))
 
 
 def make_levels(colours: Floats, depth: Floats) -> list[Level]:
-    """Return an image at all sizes, the coarsest first."""
+    """Return an image at all resolutions, the coarsest first."""
     levels = [Level(colours, depth)]
     while min(levels[0].depth.shape) >= 2 * COARSEST:
         levels.insert(0, levels[0].halve())
@@ -61,10 +68,11 @@ def make_levels(colours: Floats, depth: Floats) -> list[Level]:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """How the two ends of an axis meet.
+    """How the two ends of an axis are joined.
 
-    With one cut, the ``width`` lines after the period overlap the first lines. With a ``cover``, there are two cuts: the
-    lines around the ends are replaced by the lines ``cover`` before them. The period is then any length.
+    Without a ``cover``, the ``width`` lines after the period overlap the first lines, and one seam is cut. With a
+    ``cover``, the lines around the ends are replaced by the lines that are ``cover`` lines before them, and two seams
+    are cut. The period can then be any length.
     """
 
     period: int
@@ -72,14 +80,14 @@ class Joint:
     cover: int = 0
 
     def list_overlaps(self) -> list[tuple[int, int]]:
-        """Return the first lines of the two overlapping parts of each cut."""
+        """Return the first lines of the two overlapping strips of each seam."""
         if not self.cover:
             return [(self.period, 0)]
         back = self.period - self.cover
         return [(self.period - self.width, back - self.width), (back, 0)]
 
     def list_finer(self, choice: Choice, side: int) -> list[Joint]:
-        """Return the joints near this one at a level of twice the size."""
+        """Return the joints similar to this one at the next level, which is twice as large."""
         if self.cover:
             width = max(1, choice.period // BAND)
             low, high = max(width, 2 * self.cover - 1), min(choice.period - width, 2 * self.cover + 2)
@@ -91,20 +99,20 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Joints of an axis that may be chosen."""
+    """Range of the joints that may be chosen for an axis."""
 
     low: int
-    """Least overlap of one cut. None is possible if ``high`` is less."""
+    """Minimum overlap in lines. Overlaps are not allowed if ``high`` is less."""
     high: int
     period: int = 0
-    """Length of a result with a cover; 0: no cover."""
+    """Length of a result with a cover, in lines. 0 if covers are not allowed."""
     covered: float = COVERED
-    """Cost that a cut next to a cover may have, relative to the cut of an overlap."""
+    """Maximum cost of a seam next to a cover, relative to the seam of an overlap."""
     loss: float = LOSS
-    """Price of an overlap of the whole side, relative to the price of a cut."""
+    """Weight of the lost length in the price of a joint."""
 
     def coarsen(self, times: int, side: int) -> Choice:
-        """Return the choice at a level of ``side``, halved a number of ``times``."""
+        """Return the range at a level whose axis has ``side`` lines, after halving the image ``times`` times."""
         if not times:
             return self
         low = max(1, (self.low >> times) - 1)
@@ -112,7 +120,7 @@ class Choice:
         return replace(self, low=low, high=high, period=min(self.period >> times, side))
 
     def list_joints(self, side: int) -> list[Joint]:
-        """Return all joints. Joints that keep the length come first."""
+        """Return all allowed joints. Covers, which keep the length, come first."""
         width, period = max(1, self.period // BAND), self.period
         covers = [Joint(period, width, cover) for cover in range(width, period - width + 1)] if period else []
         return covers + [Joint(side - width, width) for width in range(self.low, self.high + 1)]
@@ -120,19 +128,19 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joined:
-    """A joint and its cuts."""
+    """A joint and the seams that were cut for it."""
 
     joint: Joint
     cuts: tuple[Cut, ...]
     factor: float = 1.0
-    """Factor of the price of the joint."""
+    """Factor of the price, for lost length and for differences of the overlapping parts."""
     tried: int = 1
     dearer: float = 1.0
-    """Cost of the best joint that keeps the length, relative to this joint, at the coarsest level."""
+    """Cost of the best joint with a cover, relative to this joint, at the coarsest level."""
 
     @property
     def price(self) -> float:
-        """Mean cost of a cut, times a factor: above 1 if the joint shortens the axis, or if its parts differ."""
+        """Mean cost of the seams times `factor`. Joints are ranked by it."""
         return self.factor * sum(cut.value for cut in self.cuts) / len(self.cuts)
 
 
@@ -145,22 +153,22 @@ def find_joint(
     progress: Callable[[float], object],
     refused: int = 0,
 ) -> Joined:
-    """Return the joint of an axis that is least visible and shortens the axis least.
+    """Return the joint of an axis that is least visible and loses the least length.
 
     Parameters
     ----------
     levels : sequence of Level
-        The image at all sizes, the coarsest first.
+        The image at all resolutions, the coarsest first.
     axis : {0, 1}
         The axis that becomes periodic.
     choice : Choice
-        The possible joints at the full size.
+        Range of the possible joints at full resolution.
     closed : bool
-        Whether the other axis is periodic already, so that cuts must close on themselves.
+        If True, the other axis is periodic already, so that seams must end where they start.
     progress : callable
-        Called with the finished share.
+        Function called with the finished share of the work, 0 to 1.
     refused : int
-        Number of earlier calls whose joint was not used. The best joints of those calls are left out.
+        Number of earlier calls whose joint was rejected. The best joints of those calls are skipped.
 
     """
     last = len(levels) - 1
@@ -171,7 +179,8 @@ def find_joint(
     cuts = cut_joints(levels[0], axis, all_joints)
     misfits = np.array([measure_misfit(levels[0], axis, joint) for joint in all_joints])
     usual = float(np.median(misfits)) or 1.0
-    # A seam through plain background is cheap even if courses or a lattice do not continue across it.
+    # Multiply by the misfit: a seam through plain background is cheap even if courses or a lattice do not continue
+    # across it.
     costs = misfits / usual * [sum(each.value for each in cut) / len(cut) for cut in cuts]
     whole = min((cost for joint, cost in zip(all_joints, costs, strict=True) if joint.cover), default=0.0)
     found = []
@@ -182,7 +191,7 @@ def find_joint(
     best = _spread(found, followed * (refused + 1))
     best = best[followed * refused :] or best[:followed]
     if closed:
-        # Closed seams take longer. Cut them only for the best joints, because they cost little more.
+        # Cut closed seams only for the best joints: they take longer to compute, and cost little more than open ones.
         again = cut_joints(levels[0], axis, [each.joint for each in best], closed=True)
         best = [replace(each, cuts=cut) for each, cut in zip(best, again, strict=True)]
     for k in range(1, last + 1):
@@ -193,7 +202,7 @@ def find_joint(
 
 
 def _spread(found: Sequence[Joined], count: int) -> list[Joined]:
-    """Return the cheapest joints that are apart."""
+    """Return the ``count`` cheapest joints that differ enough from each other."""
     taken: list[Joined] = []
     for each in sorted(found, key=lambda each: each.price):
         place = each.joint.cover or -each.joint.width
@@ -205,7 +214,7 @@ def _spread(found: Sequence[Joined], count: int) -> list[Joined]:
 
 
 def _refine(found: Joined, level: Level, axis: int, choice: Choice, *, closed: bool) -> Joined:
-    """Return the joint at the next level whose seams near those of this level cost least, with new cuts."""
+    """Return the joint at the next level that costs least near the seams of this level, with new seams."""
     near = found.joint.list_finer(choice, level.depth.shape[axis])
     costs = judge_seams(level, axis, near, found.cuts)
     joint = near[int(np.argmin(costs))]
@@ -214,17 +223,17 @@ def _refine(found: Joined, level: Level, axis: int, choice: Choice, *, closed: b
 
 
 def cut_joints(level: Level, axis: int, joints: Sequence[Joint], *, closed: bool = False) -> list[tuple[Cut, ...]]:
-    """Cut each joint."""
+    """Return the cut of each seam of each joint."""
     lines = Level(np.moveaxis(level.colours, axis, 0), np.moveaxis(level.depth, axis, 0))
     if len(joints) > MANY:
-        # The kernel would copy the lines of each joint.
+        # Make the lines contiguous once, because the kernel would copy them for each joint.
         lines = Level(np.ascontiguousarray(lines.colours), np.ascontiguousarray(lines.depth))
     made = iter(cut_overlaps([s for joint in joints for s in _lay_over(lines, joint)], closed=closed))
     return [tuple(next(made) for _ in joint.list_overlaps()) for joint in joints]
 
 
 def _lay_over(lines: Level, joint: Joint) -> list[Strip]:
-    """Return the strips to cut, with their lines first."""
+    """Return the pair of overlapping strips for each seam of a joint."""
     strips = []
     for both in joint.list_overlaps():
         (a, deep), (b, other) = (
@@ -235,14 +244,14 @@ def _lay_over(lines: Level, joint: Joint) -> list[Strip]:
 
 
 def measure_misfit(level: Level, axis: int, joint: Joint) -> float:
-    """Return the mean difference of the overlapping parts."""
+    """Return the mean absolute colour difference of the overlapping strips."""
     colours = np.moveaxis(level.colours, axis, 0)
     pairs = [[colours[first : first + joint.width] for first in both] for both in joint.list_overlaps()]
     return float(np.mean([np.abs(a - b).mean() for a, b in pairs]))
 
 
 def judge_seams(level: Level, axis: int, joints: Sequence[Joint], cuts: Sequence[Cut]) -> list[float]:
-    """Return the cost of each joint if its seams run near those of the previous level."""
+    """Return the cost of each joint if its seams run near the seams of the previous level."""
     colours, depth = np.moveaxis(level.colours, axis, 0), np.moveaxis(level.depth, axis, 0)
     along = np.arange(colours.shape[1])
     strips = []

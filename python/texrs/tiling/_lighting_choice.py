@@ -1,4 +1,4 @@
-"""Whether the light of an image is evened out by default before the image is made tileable."""
+"""Decide by default whether to even out the light of an image before it is made tileable."""
 
 from __future__ import annotations
 
@@ -14,23 +14,25 @@ from texrs.io import _origins
 from texrs.materials import Material, Role
 
 UNEVEN, SMALL = 1.6, 128
-"""Least ratio of the brightest lit part to the darkest, and least side in pixels. Content that differs by chance looks
-the same in smaller images. The ratio was chosen on 119 crops of textures in even light, which are all recognised.
-6 of 134 other crops are not."""
+"""Minimum ratio of the brightest to the darkest light, and minimum side in pixels.
+
+Random variation of content looks like uneven light in smaller images. The ratio was chosen on 253 crops. All 119
+crops of evenly lit textures are recognised, and 128 of 134 unevenly lit crops.
+"""
 SHORT = 0.05
-"""Normals are vectors whose length differs from 1 by at most this, on the average."""
+"""Maximum mean deviation of the length of vectors from 1 for a normal map."""
 STEP = 4
-"""Step in pixels, along each axis, of the pixels that show whether an image contains normals."""
+"""Distance in pixels, along each axis, of the pixels that are tested for normals."""
 
 
 def name_image(image: Exemplar | Material) -> str:
-    """Return the file that an image was read from, if it is known, or the name of the argument."""
+    """Return the name of the file that an image was read from, or the name of the argument if the file is unknown."""
     origin = None if isinstance(image, Material) else _origins.find(image.image)
     return "image" if origin is None else origin[0]
 
 
 def is_uneven(image: Exemplar | Material) -> bool:
-    """Return whether an image, or colours of a material, are lit unevenly according to the evidence, and report it."""
+    """Return whether an image, or the colours of a material, are clearly lit unevenly. Report the decision."""
     if isinstance(image, Exemplar):
         return _is_lit_unevenly(image.image, name_image(image))
     return any(
@@ -41,7 +43,7 @@ def is_uneven(image: Exemplar | Material) -> bool:
 def _is_lit_unevenly(image: Array, name: str, space: Space | None = None) -> bool:
     pixels = as_image(image)
     colours = pixels.dtype == np.uint8 or (pixels.shape[-1] >= 3 and pixels.dtype.kind in "uf")
-    # Grey levels of more than 8 bits are often heights. Normals do not depend on light.
+    # Skip grey levels of more than 8 bits, which are often heights, and normals, which do not depend on light.
     if (
         not colours
         or min(pixels.shape[:2]) < SMALL

@@ -1,4 +1,4 @@
-"""The line that each pixel comes from when the ends of an axis are joined."""
+"""Compute the source line of each pixel when the two ends of an axis are joined."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from texrs.tiling._joints import Joined
 
 PICTURE, END, COVER = PIECES = range(3)
-"""Pieces of an axis: pixels in place, pixels from beyond the last line, and pixels from elsewhere."""
+"""Labels of pieces: pixels that stay in place, pixels from beyond the period, and pixels that cover the ends."""
 
 
 def lay_out(length: int, found: Joined) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
-    """Return the line and the piece that each pixel comes from, (period, length) each.
+    """Return the source line and the piece of each pixel, (period, length) each.
 
-    ``length`` is the length of the other axis. Lines far from the ends stay in place.
+    ``length`` is the length of the other axis. Pixels far from the ends stay in place.
     """
     joint = found.joint
     line = np.repeat(np.arange(joint.period)[:, np.newaxis], length, axis=1)

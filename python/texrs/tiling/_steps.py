@@ -1,4 +1,4 @@
-"""Steps across the seams inside an image: where neighbouring pixels come from places that are not neighbours."""
+"""Measure how visible the seams inside an image are: steps where neighbouring pixels come from different places."""
 
 from __future__ import annotations
 
@@ -12,41 +12,42 @@ from texrs.source_map import SourceMap
 from texrs.tiling._joints import halve
 
 SCALES = 5
-"""Number of levels that are compared: blocks of 1, 2, 4, 8 and 16 pixels. A visible step is bold at most of them. A cut
-along the outline of an element is bold at the first level only."""
+"""Number of levels that are compared: blocks of 1, 2, 4, 8 and 16 pixels. A visible step is bold at most levels.
+
+A seam along the outline of an element is bold only at the first level.
+"""
 FEWEST_SCALES, SHORTEST = 3, 8
-"""Least number of levels for a figure, and least side of a level in blocks."""
+"""Minimum number of measurable levels for a result, and minimum side of a level in blocks."""
 SHIFTS = 32
-"""Number of places where a seam is compared: its own place, and others without a seam."""
+"""Number of positions where the steps of a seam are measured: its own position, and shifted ones without a seam."""
 USUAL = 95
-"""Percentile of the other places that gives the figure 1."""
+"""Percentile of the steps at other positions that gives the boldness 1."""
 LONG = 0.25
-"""Least length of a seam, as a share of the side that it crosses. Shorter seams are not measured."""
+"""Minimum length of a measured seam, as a share of the side of the image along the seam."""
 MOST = 2048
-"""Maximum number of pairs of blocks of all seams at a level. If there are more, only every
-second, third or further pair is compared."""
+"""Maximum number of block pairs of all seams at a level. If there are more, only every n-th pair is compared."""
 TINY = 0.002
-"""Step that is not visible, in units of the guide. It is added to the steps at other places."""
+"""Step that is not visible, in units of the guide. It is added to the steps at other positions."""
 LEAST = 0.05
-"""Least figure of a level. Without it, a level without a step would decide the mean of all levels."""
+"""Minimum boldness at a level. Without it, a level without a step would dominate the mean of all levels."""
 DIGITS = 4
-"""Decimal places of a figure. The last bits of a mean depend on the processor."""
+"""Decimal places of the boldness. The last bits of a mean depend on the processor."""
 
 
 def measure_steps(guide: Floats, source: SourceMap, wrap: Sequence[bool]) -> tuple[float | None, float | None]:
-    """Return how bold the steps across seams are: between rows and between columns.
+    """Return the boldness of the steps across seams: between rows, and between columns.
 
-    The mean difference of both sides of a seam is compared with the same mean at other places of the image. The value 1
-    means as bold as the boldest of 95 % of these places. None: no seam is a quarter of a side long, or few pixels.
+    The mean difference across a seam is compared with the mean for the same seam shifted to other positions. The value
+    1 is the 95th percentile of the other positions. None if no seam is long enough or too few pixels can be compared.
 
     Parameters
     ----------
     guide : (H, W, C) float32
-        The image.
+        The image, as channels that guide decisions.
     source : SourceMap
-        Source map of the image, with seams where it is not continuous.
+        Source map of the image. Seams are the places where it is not continuous.
     wrap : (rows, columns)
-        Axes along which the border is a seam too, if the source map is not continuous there.
+        Axes along which the image wraps, so that its border can be a seam as well.
 
     """
     seams = [find_seams(source, axis, wrap[axis]) for axis in range(2)]
@@ -68,9 +69,9 @@ def measure_steps(guide: Floats, source: SourceMap, wrap: Sequence[bool]) -> tup
 
 
 def find_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the pixels before each long seam along an axis (N, 2), and the number of the seam (N,).
+    """Return the pixels before each long seam along an axis, (N, 2), and the number of their seam, (N,).
 
-    All pairs of pixels from the same two patches belong to one seam.
+    All pairs of pixels from the same two patches belong to the same seam.
     """
     torn = ~source.is_coherent(axis, wrap=wrap)
     if not wrap:
@@ -85,7 +86,7 @@ def find_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[NDArray[np.int
 
 
 def _compare_places(guide: Floats, axis: int, at: NDArray[np.intp], seam: NDArray[np.intp], scale: int) -> float:
-    """Return the boldest step of the seams, as a multiple of the step that the same seams have at other places."""
+    """Return the boldness of the most visible seam, relative to the same seams shifted to other positions."""
     rows, columns = guide.shape[:2]
     blocks = np.minimum(at >> scale, (rows - 1, columns - 1))
     chosen = np.unique((blocks[:, 0] * columns + blocks[:, 1]) * (seam.max() + 1) + seam)
@@ -93,13 +94,13 @@ def _compare_places(guide: Floats, axis: int, at: NDArray[np.intp], seam: NDArra
     order = np.argsort(seam, kind="stable")
     row, column = np.divmod(place[order], columns)
     starts = np.flatnonzero(np.diff(seam[order], prepend=-1))
-    # Multiples of powers of the plastic number fill the square evenly.
+    # Multiples of powers of the plastic number are evenly distributed shifts.
     shifts = np.arange(SHIFTS)[:, np.newaxis]
     row, column = (
         row + (shifts * 0.7548776662 % 1 * rows).astype(int),
         column + (shifts * 0.5698402910 % 1 * columns).astype(int),
     )
-    # A block that contains the seam is between the two blocks that are compared.
+    # On coarser levels, the seam is inside a block, so compare the blocks on both sides of that block.
     first, last = (0, 1) if scale == 0 else (-1, 1)
     flat = guide.reshape(rows * columns, -1)
     before, after = (
