@@ -3,8 +3,9 @@
 Y. Liu, J. Wang, S. Xue, X. Tong, S. B. Kang and B. Guo, "Texture splicing", Computer Graphics Forum 28(7), 2009. The
 paper's texton is called element here. The steps, in the paper's order, and the module of each step:
 
-1. Bring B's layout to the spacing and the orientation of A's, and match the points one to one (section 4.1, Eq. 4:
-   `matching`). A is extended beyond its borders (`extension`), and the targets are adjusted to the elements (`adjustment`).
+1. Scale and rotate B's layout to the spacing and the orientation of A's, and match the points one to one (section 4.1,
+   Eq. 4: `matching`). A is extended beyond its borders (`texture_extension`), and the targets are adjusted to the
+   elements (`adjustment`).
 
 2. Deform A so that its elements move to their targets and rigid pixels keep their shape (section 4.2: `deformation`).
    Displacements are interpolated between disjoint elements (`interpolation`). For connected figures they minimise the
@@ -14,23 +15,24 @@ paper's texton is called element here. The steps, in the paper's order, and the 
 
 4. Fill the holes, and refine pixels that are not rigid by texture synthesis (section 4.3: `draft`, `refine`).
 
-Elements are analysed before (section 3: `texrs.elements`). An edit of a texture's own layout replaces the first step
-(Figure 9: `edit`). If another size is requested, the texture is brought to that size before its edit (`resizing`).
+The elements are found before these steps (section 3: `texrs.elements`). An edit of a texture's own layout replaces the
+first step (Figure 9: `edit`). If another size is requested, the texture is brought to that size before its edit
+(`resizing`).
 
 Departures from the paper, with their reasons:
 
 - Both point sets continue beyond their images. They are reflected at lines where the layout continues regularly.
-  Otherwise a third of the output is empty, and elements at its border are missing.
+  Without this, a third of the output would be empty, and elements would be missing at its border.
 
-- There are more elements than targets; elements without a target are erased. The printed algorithm needs point sets of
-  equal size. Erased elements shrink and the background around them closes, because a fifth of the output would be a
-  hole otherwise.
+- There are more elements than targets, because the printed algorithm needs point sets of equal size. Elements without
+  a target are erased. They shrink and the background around them closes, because a fifth of the output would be a hole
+  otherwise.
 
-- Connected figures take the offset of the layout where their elements move least. Displacements of neighbours differ
-  by at most a share of an element, because courses are torn otherwise if the layout has none.
+- For connected figures, the layout is shifted so that their elements move least. Displacements of neighbours differ by
+  at most a share of an element. Otherwise courses are torn if the layout does not have any.
 
-- Layouts grow until disjoint elements have room, and elements that still collide are pushed apart. The spacing alone
-  makes elements touch and form chains.
+- Layouts are enlarged until disjoint elements have room, and elements that still collide are pushed apart. If only the
+  spacing is matched, elements touch and form chains.
 
 - Distances are squared in Eq. 4, because the best matching then has no crossings.
 
@@ -39,34 +41,35 @@ Departures from the paper, with their reasons:
   composed of its knots and the lines between them (`nets`). The departures below for connected figures apply if there
   are too few knots, or with ``use_cells=False`` and ``use_nets=False``.
 
-- Disjoint elements move whole, by whole pixels, which is the limit of Eq. 5 for large weights. The soft energy
-  stretches components with two pins by dozens of pixels. Displacements of the background are harmonic, so no part of
-  it moves further than its elements. They are smooth enough to be solved at every other pixel.
+- Disjoint elements move without deformation, by whole pixels, which is the limit of Eq. 5 for large weights. The soft
+  energy of the paper stretches components with two pins by dozens of pixels. Displacements of the background are
+  harmonic, so no part of it moves further than its elements. They are smooth enough to be solved at every other pixel.
 
-- Eq. 5 sums over rigid pixels only. Other pixels have no equation and the system is singular, or only the pins of a
-  brick wall move. Here other pixels count with weight 0.01. Table 1 lets long joints slide freely; a weak spring ties
-  them to their neighbours.
+- Eq. 5 sums over rigid pixels only. Other pixels then have no equation and the system is singular, or only the pins of
+  a brick wall move. Here other pixels count with weight 0.01. Table 1 lets long joints slide freely. Here a weak
+  spring ties them to their neighbours.
 
-- Reflected elements are turned back, and elements that the border cuts are left out. With a strength of 0 or nearly 0
-  they stay in place.
+- Elements of reflected copies are not mirrored, and elements that the border cuts are left out. With a strength near
+  0, cut elements stay in place.
 
-- The background between separate elements is neither warped nor refined in a splice, because refinement averages it.
-  It is completed where the elements were, and grown by patches if more is needed. Each element is cut into it together
+- The background between separate elements of a splice is neither warped nor refined, because refinement blurs it. It
+  is completed where the elements were, and grown by patches if more is needed. Each element is cut into it together
   with the surroundings that all elements share, such as a shadow. Colours are corrected along the cuts (`ground`).
 
-- If the light varies across an image of separate elements, it is removed before they move. Afterwards it is restored
-  as far as it falls on elements (`light`). Otherwise each element keeps the light of its old place.
+- If the light varies across an image of separate elements, it is removed before the elements move. Afterwards the
+  light of the new place is applied to each element (`shading`). Otherwise each element keeps the light of its old
+  place.
 
-- Edits of separate elements put them into their new places on the texture's own background, which is completed where
-  an element was (`rearrangement`). Pixels that do not move keep their bytes. If an element that the border cuts would
-  move inwards, a whole element takes its place. The departures below for separate elements apply to textures that show
-  too little of their background.
+- Edits of separate elements put them into their new places on the texture's own background, which is completed at
+  their old places (`rearrangement`). Pixels that do not move keep their values. If an element that the border cuts
+  would move inwards, a complete element replaces it. The departures below for separate elements apply to textures
+  whose visible background is too small.
 
-- Wide holes are filled with patches that are as rough as the background. Random pixels give noise there, and of all
-  patches the smoothest fit best and look blurred.
+- Wide holes are filled with patches that are as rough as the background. The paper's random pixels look like noise
+  there, and the patches with the best fit are the smoothest and look blurred.
 
-- Refinement keeps rigid pixels, and therefore all elements that the warp copied whole. Other pixels are only replaced
-  by background pixels.
+- Refinement does not change rigid pixels, so elements that the warp copied stay as they are. Other pixels are only
+  replaced by background pixels.
 
 - Previews, and edits that list moved points, use triangles between elements, so that a moved element changes only its
   surroundings.
@@ -118,7 +121,10 @@ Method: TypeAlias = Literal["paper", "preview"] | None
 NO_NET = "elements must have six knots or more, at least 8 pixels apart; take a larger image, or another box"
 NO_CELLS = "no reliable cells were found; give texrs.elements.analyse a box around one, or a mask of the joints"
 SCREENING = 0.01
-"""Default weight of the values when colours are corrected. It evens out light that changes slowly."""
+"""Default weight of the original values in the colour correction.
+
+It evens out light that changes slowly.
+"""
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
@@ -148,7 +154,7 @@ def splice(
     elements : ElementAnalysis, or (H, W) or (H, W, C) array
         Texture whose elements are used. An image is first analysed by `texrs.elements.analyse`.
     layout : ElementAnalysis, or array
-        Texture whose layout the elements take, or a drawn layout (`texrs.layouts`).
+        Texture or drawn layout (`texrs.layouts`) whose arrangement the elements take.
     size : int or (rows, columns), optional
         Size of the result, in pixels. Default: the size of the image of ``elements``.
     seed : int
@@ -158,18 +164,18 @@ def splice(
         triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
         with departures from the paper.
     strength : float
-        Distance that elements move, as a share from 0 (their own layout) to 1 (the other layout). Separate elements at
-        the texture's own size give the texture itself with 0. Default: 1.
+        Fraction of the way that elements move, from 0 (their own layout) to 1 (the other layout). With 0, separate
+        elements stay in place, so the result at the texture's own size equals the texture. Default: 1.
     layout_scale : float, optional
-        Scale of the layout, 0.01 to 100. If it is 1, a pixel of the layout is a pixel of the result, and the centres
-        of both coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense are
-        pushed apart. Default: the scale that fits the spacing or the size of the elements.
+        Scale of the layout, 0.01 to 100. With 1, a pixel of the layout is a pixel of the result, and the centres of
+        both images coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense
+        are pushed apart. Default: fits the layout to the spacing or the size of the elements.
     align : bool, optional
         If True, the layout is rotated so that lines of its points agree with lines of the elements. Cells and nets
         ignore this. Default: True without ``layout_scale``.
     snap_rows : bool
-        If True, targets near one row are moved to this row. Use it for curved walls, whose long joints then become
-        straight. Default: False.
+        If True, targets that are nearly in a row are moved onto one line. Use it for curved walls, whose long joints
+        then become straight. Default: False.
     use_cells : bool, optional
         If True, a connected texture is composed of its cells. If False, its figure is bent. Default: True if cells are
         found.
@@ -180,13 +186,13 @@ def splice(
     allow_rotation : bool, optional
         If True, cells may be rotated. Default: True, unless light or letters show which side of the texture is up.
     refine : bool
-        If True, pixels of elements that are not rigid, or stretched pixels of cells, are refined. Nets, and
-        backgrounds between separate elements, do not need it. Default: True.
+        If True, deformed pixels between rigid elements, or stretched pixels of cells, are refined. Nets, and
+        backgrounds between separate elements, are never refined. Default: True.
     screening : float, optional
-        Weight of the original values when colours are corrected where elements and background meet, 0 to 1e6, see
-        `texrs.blend`. It applies to separate elements on their background. Other results are not corrected. If one
-        side of the texture is lit, so is the result, and elements do not keep the light of their old places. None or
-        0: colours are not corrected, and the image is the texture at the coordinates of the source map. Default: 0.01.
+        Weight of the original values when colours are corrected at the borders between elements and background, 0 to
+        1e6, see `texrs.blend`. It only affects separate elements on their background. A texture that is lit from one
+        side gives a result that is lit in the same way. None or 0: colours are not corrected, and the image is the
+        texture at the coordinates of the source map. Default: 0.01.
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
         the work stops. True shows a progress bar. Default: none.
@@ -194,65 +200,64 @@ def splice(
     Returns
     -------
     Synthesis
-        The ``image``, the ``source_map``, the ``stages`` and the ``report``. The source map contains whole pixels of
-        ``elements``. Its label is the target of a rigid pixel, counted from 1 as in the report, or 0. Stages are drawn
-        on access. The report's "matches" contain each element's requested position, its position in the result and the
-        share of its displacement that was reached. If ``report["method"]`` is "cells", coordinates are fractional and
-        each pixel has a target. If it is "nets", each pixel has the target of its knot.
+        The ``image``, the ``source_map``, the ``stages`` and the ``report``. Coordinates of the source map are whole
+        pixels of ``elements``. Its label is the number of a rigid pixel's target, counted from 1 in the order of the
+        report's "matches", and 0 for other pixels. Stages are drawn on access. If ``report["method"]`` is "cells",
+        coordinates are fractional and each pixel has a target. If it is "nets", each pixel has the target of its knot.
 
         Stages:
 
-        - ``source points``: Elements of the first texture.
-        - ``target points``: Elements of the layout.
-        - ``mask``: Mask of these elements.
+        - ``source points``: Centres of the elements in the first texture.
+        - ``target points``: Centres of the elements in the layout.
+        - ``mask``: The first texture with its background dimmed.
         - ``matching``: Line from each element to its target.
         - ``warped mesh``: Mesh that moves the elements.
-        - ``before refinement``: Elements in their new places.
-        - ``filled``: The result with a filled background.
+        - ``before refinement``: The deformed texture, with its holes.
+        - ``filled``: The deformed texture with its holes filled.
         - ``source cells``: Cells of the first texture, for method "cells".
         - ``source net``: Knots and lines of the first texture, for method "nets".
-        - ``target layout``: Elements of the layout, for both methods.
-        - ``target cells``: Outlines of the target cells.
-        - ``target net``: Knots and lines of the target.
-        - ``assignment``: Cells in the colour of their source.
-        - ``cuts``: Borders between the pieces.
-        - ``before_blending``: The result.
+        - ``target layout``: Elements of the layout, for methods "cells" and "nets".
+        - ``target cells``: Outlines of the target cells, for method "cells".
+        - ``target net``: Knots and lines of the target, for method "nets".
+        - ``assignment``: Target cells in the colour of their source cell, for method "cells".
+        - ``cuts``: Borders between the cells or knots, for methods "cells" and "nets".
+        - ``before_blending``: The resulting image.
 
         Report:
 
         - ``method``: "default", "paper", "cells" or "nets".
         - ``seed``: The seed.
         - ``size``: (rows, columns).
-        - ``layout``: Kind of the own layout: "disjoint", "jointed" or "connected".
-        - ``scale``: Factor that the other layout was scaled by.
-        - ``angle``: Angle that this layout was turned by, in degrees.
-        - ``gain``: Part of the scale that makes room for the elements.
+        - ``layout``: Kind of the layout of ``elements``: "disjoint", "jointed" or "connected".
+        - ``scale``: Scale factor of the other layout.
+        - ``angle``: Rotation of the other layout, in degrees.
+        - ``gain``: Factor within ``scale`` that gives the elements room; 1 if they fit without it.
         - ``targets``: Number of targets.
-        - ``candidates``: Number of elements to choose from, with those beyond the borders.
+        - ``candidates``: Number of elements that may be used, including copies beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.
         - ``displacement_reached``: Share of the requested displacements that was reached, 0 to 1.
-        - ``screening``: Weight of the values in the colour correction.
+        - ``screening``: Weight of the original values in the colour correction.
         - ``holes``: Share of the pixels that were filled.
         - ``triangles``: Number of triangles of the mesh.
-        - ``flipped``: Share of triangles that are turned over.
-        - ``flipped_rigid``: Share of triangles inside of elements that are turned over.
-        - ``system``: Size of the grid that the equations were solved on.
+        - ``flipped``: Share of triangles that the deformation turned over.
+        - ``flipped_rigid``: Share of triangles that are in elements and were turned over.
+        - ``system``: Rows and columns of the grid of solved pixels.
         - ``strength``: The strength, for methods "cells" and "nets".
-        - ``allow_rotation``: Whether cells could turn, for method "cells".
-        - ``continued``: How the layout was continued beyond its image.
+        - ``allow_rotation``: True if cells could rotate, for method "cells".
+        - ``continued``: How the layout was continued beyond its image, for methods "cells" and "nets".
         - ``cells``: For method "cells": ``count``, number of ``usable`` cells, ``size`` in pixels, ``polarity`` and
           ``confidence``.
         - ``knots``: For method "nets": ``count``, ``spacing`` in pixels and number of ``lines``.
         - ``grown``: Share of the pixels that no knot covers, for method "nets".
-        - ``present``: Share of the targets whose element is visible.
-        - ``matches``: One entry per target. ``target`` is its place, and ``found`` is the place of its element.
-          ``displacement_reached`` is the share of the way that was reached. ``element`` is the number of the element and
-          ``point`` its place in the example. Cells also have a ``turn`` and a ``scale``.
+        - ``present``: Share of the targets whose element is visible, for methods "cells" and "nets".
+        - ``matches``: One entry per target. ``target`` is the requested place, and ``found`` is the element's place in
+          the result. ``displacement_reached`` is the reached share of the displacement. ``element`` is the number of
+          the element and ``point`` its place in the example. Cells also have a ``turn`` and a ``scale``.
 
     Raises
     ------
     InvalidInput
-        The textures or options cannot be spliced; the message gives the reason.
+        The textures or options cannot be spliced. The message gives the reason.
 
     References
     ----------
@@ -300,7 +305,7 @@ def splice(
         raise InvalidInput(
             f"use_nets: {'elements must be a net, got separate elements' if mine.layout == Layout.DISJOINT else NO_NET}"
         )
-    # Compose connected textures of cells or knots, if there are any.
+    # Compose a connected texture of its cells, if it has any.
     found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
     if wanted and found is None:
         raise InvalidInput(
@@ -367,7 +372,7 @@ def self_splice(
     screening: float | None = SCREENING,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Edit the layout of a texture's own elements (Figure 9).
+    """Rearrange the elements of one texture by editing their layout (Figure 9).
 
     Parameters
     ----------
@@ -376,32 +381,33 @@ def self_splice(
     edit : str, mapping, or sequence of mappings, optional
         Steps of the edit in order: scale, shift, rows, randomise, regularise, move, remove or points. Python accepts
         plain JSON types. ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` scales the layout, not the elements.
-        ``{"op": "shift", "by": [4, 0]}`` moves all elements. ``{"op": "rows", "by": 6}`` moves every other row to the
-        right, and the rows between to the left. ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` adds Gaussian
-        displacements. Their amount is in spacings, and the least distance is a share of the usual least distance.
-        ``{"op": "regularise", "amount": 1}`` moves elements to the best lattice. ``{"op": "move", "element": 3, "by":
-        [0, 8]}`` moves one element; ``"to"`` gives its new place instead. ``{"op": "remove", "element": 3}`` removes
-        one element. ``{"op": "points", "points": [[row, column], ...]}`` lists new places. A name without options is a
-        step with its defaults. The report's "edit" repeats the edit. Default: the layout is not changed.
+        ``{"op": "shift", "by": [4, 0]}`` moves all elements by rows and columns, in pixels. ``{"op": "rows", "by":
+        6}`` moves every other row to the right and the other rows to the left. ``{"op": "randomise", "amount": 0.25,
+        "least": 0.7}`` adds Gaussian displacements with a standard deviation of 0.25 spacings. The minimum distance of
+        elements is then 0.7 of the usual minimum. ``{"op": "regularise", "amount": 1}`` moves elements onto the
+        lattice that fits best. ``{"op": "move", "element": 3, "by": [0, 8]}`` moves one element; ``"to"`` gives its
+        new place instead. ``{"op": "remove", "element": 3}`` removes one element. ``{"op": "points", "points": [[row,
+        column], ...]}`` lists new places. A name without options is a step with its defaults. The report's "edit"
+        lists the steps. Default: the layout is not changed.
     size : int or (rows, columns), optional
-        Size of the result, in pixels, at least 16 a side. The texture's own layout continues in a larger result before
-        the steps, as in a splice with itself. A smaller result is the middle of the texture. Steps then number the
-        elements as the report's "elements" lists them, with their places before the steps. Default: the size of the
-        image of ``elements``.
+        Size of the result, in pixels, at least 16 along each axis. The texture is resized before the steps. A larger
+        result continues the texture's own layout, as in a splice with itself. A smaller result is the middle of the
+        texture. The steps use the element numbers of the report's "elements", which lists their places before the
+        steps. Default: the size of the image of ``elements``.
     seed : int
-        Seed of random steps, of elements that enter over a border, of patches that fill holes, and of the noise of the
-        refinement. Default: 0.
+        Seed of all random choices, 0 to 2^64 - 1: random steps, elements that enter over a border, patches in holes,
+        and the noise of the refinement. Default: 0.
     method : {None, "paper", "preview"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
         triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
         with departures from the paper.
     refine : bool
-        If True, deformed pixels are refined: pixels of connected figures, and of separate elements that show too
-        little of their background. Default: True.
+        If True, deformed pixels are refined. Only connected figures, and separate elements whose visible background is
+        too small, are deformed. Default: True.
     screening : float, optional
-        Weight of the original values when changed colours are corrected where elements and background meet, 0 to 1e6,
-        as in `splice`. It applies to separate elements on their background. Other results keep their values. None or
-        0: colours are not corrected. Default: 0.01.
+        Weight of the original values when changed colours are corrected at the borders between elements and
+        background, 0 to 1e6, as in `splice`. It only affects separate elements on their background. None or 0: colours
+        are not corrected. Default: 0.01.
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
         the work stops. True shows a progress bar. Default: none.
@@ -409,56 +415,57 @@ def self_splice(
     Returns
     -------
     Synthesis
-        The ``image``, the ``source_map``, the ``stages`` and the ``report``. The source map contains whole pixels of
-        ``elements``. Its label is the target of a rigid pixel, counted from 1 as in the report, or 0. Without a
-        movement the image equals the texture. If elements are separate, all pixels that do not move are equal.
+        The ``image``, the ``source_map``, the ``stages`` and the ``report``. Coordinates of the source map are whole
+        pixels of ``elements``. Its label is the number of a rigid pixel's target, counted from 1 in the order of the
+        report's "matches", and 0 for other pixels. If nothing moves, the image equals the texture. If elements are
+        separate, pixels that do not move keep their values.
 
         Stages:
 
-        - ``resized``: The texture in the new size, if a size was given.
-        - ``source points``: Elements of the first texture.
-        - ``target points``: Elements of the layout.
-        - ``mask``: Mask of these elements.
+        - ``resized``: The texture in the new size, if ``size`` is given.
+        - ``source points``: Centres of the elements in the texture.
+        - ``target points``: Centres of the elements in the layout.
+        - ``mask``: The texture with its background dimmed.
         - ``matching``: Line from each element to its target.
         - ``warped mesh``: Mesh that moves the elements.
-        - ``before refinement``: Elements in their new places.
-        - ``filled``: The result with a filled background.
-        - ``before_blending``: The result.
+        - ``before refinement``: The texture with elements in their new places, with its holes.
+        - ``filled``: The same with its holes filled.
+        - ``before_blending``: The resulting image.
 
         Report:
 
         - ``method``: "default" or "paper".
         - ``seed``: The seed.
         - ``size``: (rows, columns).
-        - ``layout``: Kind of the own layout: "disjoint", "jointed" or "connected".
-        - ``scale``: Factor that the other layout was scaled by.
-        - ``angle``: Angle that this layout was turned by, in degrees.
-        - ``gain``: Part of the scale that makes room for the elements.
+        - ``layout``: Kind of the layout of ``elements``: "disjoint", "jointed" or "connected".
+        - ``scale``: Scale factor of the layout.
+        - ``angle``: Rotation of the layout, in degrees.
+        - ``gain``: Factor within ``scale`` that gives the elements room; 1 if they fit without it.
         - ``targets``: Number of targets.
-        - ``candidates``: Number of elements to choose from, with those beyond the borders.
+        - ``candidates``: Number of elements that may be used, including copies beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.
         - ``displacement_reached``: Share of the requested displacements that was reached, 0 to 1.
-        - ``screening``: Weight of the values in the colour correction.
+        - ``screening``: Weight of the original values in the colour correction.
         - ``holes``: Share of the pixels that were filled.
         - ``triangles``: Number of triangles of the mesh.
-        - ``flipped``: Share of triangles that are turned over.
-        - ``flipped_rigid``: Share of triangles inside of elements that are turned over.
-        - ``system``: Size of the grid that the equations were solved on.
-        - ``matches``: One entry per target. ``target`` is its place, and ``found`` is the place of its element.
-          ``displacement_reached`` is the share of the way that was reached. ``element`` is the number of the element and
-          ``point`` its place in the example. Cells also have a ``turn`` and a ``scale``.
+        - ``flipped``: Share of triangles that the deformation turned over.
+        - ``flipped_rigid``: Share of triangles that are in elements and were turned over.
+        - ``system``: Rows and columns of the grid of solved pixels.
+        - ``matches``: One entry per target. ``target`` is the requested place, and ``found`` is the element's place in
+          the result. ``displacement_reached`` is the reached share of the displacement. ``element`` is the number of
+          the element and ``point`` its place in the example.
         - ``changed``: Share of the pixels that changed.
         - ``edit``: The steps, each with all its options.
-        - ``elements``: Places of the elements before the edit, if a size was given.
+        - ``elements``: Places of the elements before the edit, if ``size`` is given.
 
     Raises
     ------
     InvalidInput
-        A step is unknown, lacks an option, or names an element that does not exist. Elements of a connected figure
-        cannot be removed, because it has no background that could close the gap. The size is not a size, or the result
-        shows fewer than three elements, which are too few for a layout.
+        A step is unknown, lacks an option, or names an element that does not exist. A step removes an element of a
+        connected figure, which has no background that could close the gap. The size is invalid, or the resized texture
+        has fewer than three elements.
     LimitExceeded
-        The size is too large.
+        The requested size is too large.
 
     Examples
     --------
@@ -481,7 +488,7 @@ def self_splice(
     watch = progress or (lambda stage, share: None)
     mine = as_elements(elements, "elements", watch)
     check_work("self_splice", [mine.image], asked or mine.mask.shape, "elements" if asked is None else "size")
-    # Bring the texture to another size first, and edit the result.
+    # Bring the texture to another size first, and edit that texture.
     if asked is not None and asked != mine.mask.shape:
         rest: dict[str, Any] = {
             "seed": number,
@@ -533,7 +540,7 @@ def _synthesize(
     screening: float = 0.0,
     listed: bool = False,
 ) -> Synthesis:
-    """Deform the texture, draw it backwards, fill and refine it (sections 4.2 and 4.3), for splices and edits."""
+    """Deform the texture, draw it into the output, fill its holes and refine it (sections 4.2 and 4.3)."""
     warp = warp_backwards(a, match, size, method=method, listed=listed, progress=watch)
     draft, label = draft_pixels(a, match, warp, whole=method is None)
     scene = survey(a) if b and method is None and a.layout == Layout.DISJOINT else None

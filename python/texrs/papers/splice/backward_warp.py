@@ -1,7 +1,7 @@
-"""Backward warp of `texrs.papers.splice` (Figure 6): find the extended texture's pixel for each output pixel.
+"""Find the source pixel of each output pixel of a deformed texture in `texrs.papers.splice` (Figure 6).
 
-The dense mesh of the deformed texture is drawn. For previews, and for edits that list moved points, triangles between
-the elements are drawn instead.
+The texture is deformed as a mesh with one vertex per pixel, which is drawn into the output. For previews, and for
+edits that list moved points, triangles between the elements are drawn instead.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class BackwardWarp:
     place : (h, w, 2) intp
         Row and column of the source pixel in the extension.
     known : (h, w) bool
-        Output pixels that have a source.
+        True for output pixels that have a source.
     target : (H, W, 2) float64
         Position in the output of each pixel of the extension.
     triangles, flipped, flipped_rigid : int
@@ -51,7 +51,7 @@ class BackwardWarp:
 def warp_backwards(
     a: ElementAnalysis, match: Match, size: tuple[int, int], *, method: str | None, listed: bool, progress: Progress
 ) -> BackwardWarp:
-    """Deform the texture and draw it into an output of the given size.
+    """Deform the texture and find the source pixel of each output pixel.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def warp_backwards(
     method : {None, "paper", "preview"}
         Algorithm, as for `texrs.splice`.
     listed : bool
-        If True, the match is an edit that only lists moved points. Each moved element then changes only its
-        surroundings.
+        If True, the match is an edit that only lists moved points. Each moved element then changes only the pixels
+        around it.
     progress : callable
         Function called as ``progress(stage, share)``.
 
@@ -85,7 +85,7 @@ def warp_backwards(
 def _draw_mesh(
     deformation: Deformation, size: tuple[int, int], progress: Callable[[float], object] | None
 ) -> BackwardWarp:
-    """Draw the rows and columns of the dense mesh that enter the output."""
+    """Draw the rows and columns of the dense mesh that are visible in the output."""
     target, rigid = deformation.target, deformation.rigid
     seen = np.ones(rigid.shape, bool)
     for axis in range(2):
@@ -110,7 +110,7 @@ def _draw_preview(match: Match, size: tuple[int, int]) -> BackwardWarp:
 
 
 def _draw_elements(match: Match, size: tuple[int, int]) -> BackwardWarp:
-    """Draw the background as triangles between the elements, and whole elements above it."""
+    """Draw the background as triangles between the elements, and undeformed elements above it."""
     extension = match.extension
     shape, origin = np.array(extension.mask.shape), np.array(extension.origin)
     shift = find_rigid_shifts(match)
@@ -135,6 +135,6 @@ def _draw_elements(match: Match, size: tuple[int, int]) -> BackwardWarp:
 
 
 def _find_nearest_pixels(coordinates: Floats, shape: tuple[int, ...]) -> NDArray[np.intp]:
-    """Return the nearest pixels inside the texture."""
+    """Round coordinates to the nearest pixels of the texture."""
     places = np.floor(coordinates + np.float32(0.5)).astype(np.intp)
     return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)

@@ -1,4 +1,4 @@
-"""Edit a texture's own layout for `texrs.self_splice` (Figure 9 of the paper), by lists of steps in plain JSON types."""
+"""Edit a texture's own layout for `texrs.self_splice` (Figure 9 of the paper) by steps in plain JSON types."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class EditedLayout:
     points : (n, 2) float64
         New place of each point.
     kept : (n) bool
-        False for points that are removed.
+        False for points that the edit removes.
     listed : bool
-        True if the edit is a list of moved points, and nothing else.
+        True if the edit only moves or lists points.
 
     """
 
@@ -43,7 +43,7 @@ class EditedLayout:
 
 
 def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
-    """Convert an edit to a list of steps; random steps get their seed, so that the list can be repeated."""
+    """Convert an edit to a list of steps, with a seed in each random step so that the list can be repeated."""
     steps: Any = [edit] if isinstance(edit, str | Mapping) else edit
     if not isinstance(steps, Sequence):
         raise InvalidInput(f"edit: must be a name, a step or a list of steps, got {type(edit).__name__}")
@@ -66,18 +66,18 @@ def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
 
 
 def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable: int | None = None) -> EditedLayout:
-    """Apply the steps to a layout.
+    """Apply the steps of an edit to the points of a layout.
 
     Parameters
     ----------
     points : (n, 2) array
         Elements of the image, followed by their copies beyond its borders.
     originals : int
-        Number of elements in the image. Copies follow rules of places, and stay in place if a step names elements.
+        Number of elements in the image. Steps that name elements do not move copies; other steps do.
     steps : sequence
         Steps as returned by `as_steps`.
     nameable : int, optional
-        Number of elements that a step may name. Default: all in the image.
+        Number of elements that a step may name. Default: all elements in the image.
 
     """
     at, kept = points.copy(), np.ones(len(points), bool)
@@ -114,7 +114,7 @@ def _shift_layout(step: Step, at: Points, originals: int, kept: NDArray[np.bool_
 
 
 def _shift_rows(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Move every other row one way, and the rows between the other way."""
+    """Move every other row in one direction, and the rows between in the other."""
     by = as_float(step.get("by", 0.0), "edit: by of rows", -1e4, 1e4)
     order = np.argsort(at[:, 0], kind="stable")
     gap = 0.5 * float(np.median(nearest_distances(at[:originals], 1)))
@@ -126,7 +126,7 @@ def _shift_rows(step: Step, at: Points, originals: int, kept: NDArray[np.bool_])
 
 
 def _randomise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Displace points by Gaussian noise in spacings, and keep a share of the usual least distance."""
+    """Displace points by Gaussian noise, but keep a minimum distance between them."""
     amount = as_float(step.get("amount", 0.25), "edit: amount of randomise", 0, 10)
     least = as_float(step.get("least", 0.7), "edit: least of randomise", 0, 1)
     noise = np.random.default_rng(step["seed"])
@@ -145,14 +145,14 @@ def _randomise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) 
 
 
 def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Move points to the lattice that fits them best, each to a place of its own."""
+    """Move each point towards its own place on the lattice that fits all points best."""
     amount = as_float(step.get("amount", 1.0), "edit: amount of regularise", 0, 1)
     origin, basis = fit_lattice(at[:originals])
     span = np.linalg.inv(basis)
     index = np.rint((at - origin) @ span)
     low, high = index.min(axis=0).astype(int) - 1, index.max(axis=0).astype(int) + 1
     sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
-    # Round the lattice: it has many ties, and the last bits of its fit depend on the processor.
+    # Round the lattice, because it has many ties and the last bits of its fit depend on the processor.
     places = np.round(sites.reshape(-1, 2) @ basis + origin, 6)
     of, _ = match_points(places, at)
     return at + amount * (places[of] - at)
@@ -172,7 +172,7 @@ def _remove_element(step: Step, at: Points, originals: int, kept: NDArray[np.boo
 
 
 def _take_points(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
-    """Use a list of points: in order if there is one per element, else by the least cost."""
+    """Replace the points by a list: in order if there is one place per element, else matched at the least cost."""
     listed = try_array(step.get("points"), np.float64)
     if listed.ndim != 2 or listed.shape[1] != 2 or not np.isfinite(listed).all():
         raise InvalidInput("edit: points must be a list of finite [row, column]")
@@ -198,4 +198,4 @@ STEPS: dict[str, tuple[Callable[[Step, Points, int, NDArray[np.bool_]], Points],
     "remove": (_remove_element, ("element",)),
     "points": (_take_points, ("points",)),
 }
-"""Steps by name: the function that changes a layout, and the options of the step."""
+"""Steps by name: the function that applies the step to a layout, and the names of its options."""

@@ -1,6 +1,6 @@
 """Energy of a connected figure's deformation in `texrs.papers.splice`: section 4.2, Eq. 5, Table 1 and Figure 5.
 
-The displacements have the least energy, separately for each axis.
+The displacements minimise a quadratic energy, which is solved separately for each axis.
 """
 
 from __future__ import annotations
@@ -25,13 +25,19 @@ Points = NDArray[np.float64]
 GOAL, RIGID = 1e4, 1e2
 """Weights lambda_G and lambda_R (section 4.2)."""
 LOOSE = 1e-2
-"""Weight of the equations of pixels that are not rigid. Without it they would have no equation and would not move."""
+"""Weight of the equations of pixels that are not rigid. Without these equations such pixels would not move."""
 TIE = 1e-5
-"""Weight of equal displacements of neighbours. It keeps long joints without pins from sliding freely."""
+"""Weight of the springs between neighbours, which pull their displacements together.
+
+They keep long joints without pins from sliding.
+"""
 STEPS = ((0, 0), (0, 1), (0, 2), (1, -1), (1, 0), (1, 1), (2, 0))
 """Row and column steps from a pixel to the pixels that share an equation with it."""
 MOST = 1 << 19
-"""Maximum number of solved pixels of a connected figure. Above it, only pixels two, four, ... apart are solved."""
+"""Maximum number of solved pixels of a connected figure. For larger images, only every second, fourth, ...
+
+pixel is solved.
+"""
 
 
 def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool) -> NDArray[np.float64]:
@@ -42,12 +48,12 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     rigid : (H, W) bool
         The mask M of Table 1: the foreground, or the background if elements are jointed.
     pins : (n, 2) int
-        Pinned pixels (C_A).
+        Rows and columns of the pinned pixels (C_A).
     shift : (n, 2) float64
         Displacement of each pin, in pixels.
     upright : bool
-        If True, use Table 1's last row, lambda_P = 0 and epsilon = 1. Upright and level parts are then decoupled, so
-        that joints neither lean nor change their width. If False, lambda_P = 1 and epsilon = 1e-3.
+        If True, use Table 1's last row, lambda_P = 0 and epsilon = 1. Vertical and horizontal parts are then
+        decoupled, so that joints neither lean nor change their width. If False, lambda_P = 1 and epsilon = 1e-3.
 
     Returns
     -------
@@ -63,7 +69,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     at = pins[:, 0] * shape[1] + pins[:, 1]
     out = np.empty((*shape, 2))
     keys = [content_hash("energy", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
-    # Without the decoupling both axes have one matrix, so they are solved together.
+    # Without this decoupling both axes have the same matrix, so they are solved together.
     factors = factorise(
         {keys[axis]: partial(make_energy_triangle, rigid, at, axis, upright=upright) for axis in (0, 1)}
     )
@@ -75,7 +81,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
 
 
 def choose_coarseness(shape: Sequence[int]) -> int:
-    """Return the distance in pixels between solved pixels of a connected figure."""
+    """Return the distance between solved pixels of a connected figure, in pixels; 1 solves every pixel."""
     step = 1
     while math.prod(-(-n // step) for n in shape) > MOST:
         step *= 2
@@ -83,13 +89,13 @@ def choose_coarseness(shape: Sequence[int]) -> int:
 
 
 def _downsample_mask(rigid: Bools, step: int) -> Bools:
-    """Return the cells of ``coarse`` pixels with a rigid pixel, so that thin joints stay whole."""
+    """Return True for blocks of ``step`` pixels with a rigid pixel, so that thin joints stay connected."""
     wide = np.pad(rigid, [(0, -n % step) for n in rigid.shape])
     return np.asarray(wide.reshape(wide.shape[0] // step, step, -1, step).any(axis=(1, 3)))
 
 
 def _upsample(coarse: NDArray[np.float64], shape: Sequence[int], step: int) -> NDArray[np.float64]:
-    """Return the displacement of every pixel from the displacements at the centres of cells."""
+    """Interpolate the displacement of every pixel from the displacements at the centres of blocks."""
     for axis, count in enumerate(shape):
         at = np.clip((np.arange(count) - (step - 1) / 2) / step, 0, coarse.shape[axis] - 1)
         low = np.minimum(at.astype(np.intp), max(coarse.shape[axis] - 2, 0))
@@ -110,12 +116,12 @@ def make_energy_matrix(rigid: Bools, pins: NDArray[np.intp], axis: int, *, uprig
 def make_energy_triangle(
     rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE
 ) -> Any:
-    """Return the lower triangle of that matrix, because `texrs.kernels.sparse` does not read the rest."""
+    """Return the lower triangle of the matrix of Eq. 5, because `texrs.kernels.sparse` does not read the rest."""
     coupling, small = (0.0, 1.0) if upright else (1.0, 1e-3)
     u = weigh_neighbours(rigid, axis, coupling, small)
     u /= u.sum(axis=0)
     root = np.sqrt(RIGID * np.where(rigid, 1.0, loose))
-    # Coefficients of each pixel's equation: for the pixels above, below, left and right, and for itself.
+    # Each pixel's equation has coefficients for the pixel itself and the pixels above, below, left and right.
     terms = {step: -(root * b) for step, b in zip(((-1, 0), (1, 0), (0, -1), (0, 1)), u, strict=True)}
     terms[0, 0] = root
     goal = np.asarray(np.bincount(pins, minlength=rigid.size) * GOAL, np.float64).reshape(rigid.shape)
@@ -133,7 +139,7 @@ def make_energy_triangle(
 
 
 def _add_shifted(band: Points, product: Points, step: tuple[int, int]) -> None:
-    """Add contributions of equations to the pixels that are a step away from their own."""
+    """Add products of coefficients to the pixel that is one step away from the equation's own pixel."""
     to, of = (
         tuple(slice(max(0, sign * s), n - max(0, -sign * s)) for s, n in zip(step, band.shape, strict=True))
         for sign in (1, -1)
@@ -142,7 +148,7 @@ def _add_shifted(band: Points, product: Points, step: tuple[int, int]) -> None:
 
 
 def tie_neighbours(shape: tuple[int, ...], goal: Points) -> dict[tuple[int, int], Points]:
-    """Return lambda_G P, with the weak ties between all neighbours, by the offset between pixels."""
+    """Return the bands of lambda_G P plus the weak springs between neighbours, by the offset between pixels."""
     diagonal = goal.copy()
     for axis in range(2):
         d = np.moveaxis(diagonal, axis, 0)
@@ -155,7 +161,8 @@ def tie_neighbours(shape: tuple[int, ...], goal: Points) -> dict[tuple[int, int]
 def weigh_neighbours(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:
     """Return u_pq of each pixel p and its neighbours q above, below, left and right; 0 outside the image.
 
-    Table 1 and Figure 5 describe the displacement along columns. For rows, the axes change places.
+    Table 1 and Figure 5 describe the displacement along columns. For the displacement along rows, the axes are
+    exchanged.
     """
     m = rigid if axis == 1 else rigid.T
     h, w = m.shape

@@ -1,6 +1,6 @@
-"""Factors of the matrices that `texrs.papers.splice` solves with, cached for the next splice.
+"""Cache of the matrix factors that `texrs.papers.splice` solves with, so that the next splice can reuse them.
 
-The matrix of a deformation depends on the rigid pixels and the pinned points, not on the displacements.
+The matrix of a deformation depends on the rigid pixels and the pinned points, but not on the displacements.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _FACTORS: Cache[bytes, Cholesky] = Cache(KEPT, lambda factor: min(factor.nbytes,
 
 
 def factorise(matrices: Mapping[bytes, Callable[[], Any]]) -> dict[bytes, Cholesky]:
-    """Return the factors of matrices from the cache; missing factors are computed in parallel."""
+    """Return the factors of matrices from the cache, and compute missing factors in parallel."""
     found = {key: factor for key in matrices if (factor := _FACTORS.get(key)) is not None}
     lacking = [key for key in matrices if key not in found]
     made = Cholesky.several([matrices[key]() for key in lacking]) if lacking else []
@@ -43,10 +43,10 @@ def make_triangle(
     shape : (int, int)
         Shape of the image, whose pixels are the unknowns, row by row.
     steps : sequence of (int, int)
-        Offsets (rows down, columns to the right); the first one is (0, 0). They are sorted by the order of the pixels.
+        Offsets (rows down, columns to the right) in the order of the pixels; the first one is (0, 0).
     bands : sequence of (H, W) float64
-        Matrix entry for each pixel and the pixel at the offset. Entries outside the image are not read. Zeros are
-        stored only on the diagonal.
+        Matrix entry for each pixel and the pixel at the offset, one array for each offset. Entries outside the image
+        are not read. Zeros are stored only on the diagonal.
 
     """
     from scipy.sparse import csc_array
@@ -60,7 +60,7 @@ def make_triangle(
     there = flat != 0
     there[:, 0] = True
     starts = np.zeros(size + 1, np.int32)
-    # Count band by band, because NumPy is slow along so short an axis.
+    # Count band by band, because NumPy is slow along a short axis.
     count = np.zeros(size, np.uint8)
     for band in there.T:
         count += band

@@ -1,6 +1,7 @@
 """Split the foreground of a disjoint texture into its elements.
 
-A pixel belongs to the element of its component. If a component has several elements, it belongs to the nearest one.
+A pixel belongs to the element of its connected component. If a component has several elements, the pixel belongs to
+the nearest one.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ __all__ = ["Foreground", "split_foreground"]
 Points = NDArray[np.float64]
 
 FRINGE = 2
-"""Width in pixels of the border that moves with an element: its antialiased outline and shadow."""
+"""Width of the border that moves with an element, in pixels: its antialiased outline and shadow."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,15 +32,16 @@ class Foreground:
     Attributes
     ----------
     points : (n, 2) float64
-        Centres of the elements. Centres of foreground without an element come after those of the analysed texture.
+        Centres of the elements. Components without an element of the analysed texture are appended as further
+        elements.
     region : (H, W) int32
-        The element of each foreground pixel, counted from 1; 0 elsewhere.
+        The element of each foreground pixel and its fringe, counted from 1, and 0 for other pixels.
     core : (H, W) int32
-        The same without the fringe.
+        The same without the fringe of 2 pixels.
     cut : (n, 2, 2) bool
-        True if the border cuts an element at the first or the last end of an axis.
+        True if the image border cuts an element, at the start and the end of each axis.
     present : (n) bool
-        True if an element has any foreground.
+        True if an element has at least one foreground pixel.
 
     """
 
@@ -51,7 +53,7 @@ class Foreground:
 
     @property
     def whole(self) -> Bools:
-        """True for each element that the border does not cut."""
+        """True for each element with pixels that the image border does not cut."""
         whole: Bools = self.present & ~self.cut.any(axis=(1, 2))
         return whole
 
@@ -77,7 +79,7 @@ def split_foreground(entry: ElementAnalysis) -> Foreground:
 
 
 def _open_gaps(region: Labels) -> Labels:
-    """Open a gap of one pixel between touching regions."""
+    """Set pixels to 0 between touching regions, so that a gap of one pixel separates them."""
     gap = np.zeros(region.shape, bool)
     for axis in range(2):
         a, b = (np.moveaxis(x, axis, 0) for x in (region, gap))

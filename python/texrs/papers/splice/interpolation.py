@@ -1,7 +1,7 @@
 """Interpolate displacements of the background between disjoint elements by harmonic functions.
 
-This is the limit of Eq. 5 for large lambda_G and lambda_R and epsilon = 0, where each element moves by its own pin
-only. The displacement of the background is harmonic, so no pixel moves further than the elements around it. It is
+This is the limit of Eq. 5 for large lambda_G and lambda_R and epsilon = 0, where each element moves only with its own
+pin. The displacement of the background is harmonic, so no pixel moves further than the elements around it. It is
 smooth enough to be solved at every other pixel. The pixels between are interpolated and smoothed.
 """
 
@@ -19,20 +19,20 @@ from texrs.papers.splice.factors import factorise, make_triangle
 __all__ = ["STEP", "interpolate"]
 
 STEP = 2
-"""Distance between solved pixels: those whose row and column are multiples of this."""
+"""Distance between solved pixels along each axis, in pixels."""
 ROUNDS = 2
-"""Number of smoothing rounds for the background between solved pixels."""
+"""Number of smoothing rounds for the pixels between solved pixels."""
 
 
 def interpolate(constrained: Bools, displacement: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return a smooth displacement field from the displacements of some pixels.
+    """Interpolate the displacements of elements over the background.
 
     Parameters
     ----------
     constrained : (H, W) bool
-        True for pixels with a given displacement (elements), False for background.
+        True for pixels with a given displacement (elements), False for the background.
     displacement : (2, H, W) float32
-        Displacement along rows and columns, in pixels.
+        Given displacements along rows and columns, in pixels.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def interpolate(constrained: Bools, displacement: NDArray[np.float32]) -> NDArra
 
     """
     out = np.empty((*constrained.shape, 2))
-    # Reuse one buffer, because allocating memory takes longer than the computation in it.
+    # Reuse one buffer, because allocating memory takes longer than the computation.
     wide = np.empty((constrained.shape[0] + 2, constrained.shape[1] + 2), np.float32)
     for axis, coarse in enumerate(_solve_laplace(constrained[::STEP, ::STEP], displacement[:, ::STEP, ::STEP])):
         field = _upsample(coarse, constrained.shape)
@@ -61,7 +61,7 @@ def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDA
     key = content_hash("interpolate", np.packbits(free), shape)
     solver = factorise({key: lambda: _make_laplacian(free)})[key]
     flow = np.zeros((2, *shape))
-    # Sum the given displacements of neighbouring element pixels; background pixels contribute nothing yet.
+    # Sum the given displacements of neighbouring element pixels; the background has displacement 0 until it is solved.
     flow[:, :-1] += out[:, 1:]
     flow[:, 1:] += out[:, :-1]
     flow[:, :, :-1] += out[:, :, 1:]
@@ -71,7 +71,7 @@ def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDA
 
 
 def _upsample(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Interpolate the pixels between those that are known at every other one."""
+    """Interpolate a field that is known at every second row and column."""
     out = coarse.astype(np.float32)
     for axis in range(2):
         sides = (shape[0], shape[1] if axis else out.shape[1])
@@ -87,7 +87,7 @@ def _upsample(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np
 
 
 def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
-    """Set each pixel to the mean of its four neighbours; ``wide`` continues the field beyond the border."""
+    """Set each pixel to the mean of its four neighbours. ``wide`` is a buffer with a border of one pixel."""
     wide[1:-1, 1:-1] = field
     wide[0, 1:-1], wide[-1, 1:-1] = field[0], field[-1]
     wide[1:-1, 0], wide[1:-1, -1] = field[:, 0], field[:, -1]
@@ -98,7 +98,7 @@ def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
 
 
 def _make_laplacian(free: Bools) -> Any:
-    """Return the lower triangle of the Laplace equation at free pixels; given pixels have the identity."""
+    """Return the lower triangle of the Laplace equation for free pixels; other pixels have the identity."""
     degree = np.zeros(free.shape)
     bands = []
     for axis in range(2):

@@ -3,11 +3,11 @@
 - Eq. 5 sums over rigid pixels only. Other pixels have no equation, and the system is singular. Here they have an
   equation of little weight.
 
-- N_A and N_B differ. The number of matched points is the smaller one.
+- N_A and N_B differ. The number of matched points is the smaller of the two.
 
-No image is extended beyond its borders, so pixels that the layouts do not cover stay holes. Distances in Eq. 4 are
-plain. All three layouts minimise Eq. 5, where two pins in one component stretch it. Holes take any pixel that is not
-rigid, and the refinement may change all pixels.
+Images are not extended beyond their borders, so pixels that the layouts do not cover stay holes. Distances in Eq. 4
+are not squared. All three kinds of layout minimise Eq. 5, so two pins in one component stretch it. Holes are filled
+with any pixel that is not rigid, and the refinement may change all pixels.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ NEIGHBOURS = 5
 
 
 def match_literally(a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int], *, align: bool) -> Match:
-    """Match as in section 4.1: scale mean nearest distances to 1, align centroids, and turn by pairs of lines."""
+    """Match as in section 4.1: scale mean nearest distances to 1, align centroids, and rotate by pairs of lines."""
     from scipy.optimize import linear_sum_assignment
 
     extension = extend(a, size, 0, whole=False, exact=True)
@@ -51,7 +51,7 @@ def match_literally(a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int
         mean = float(cost[rows, columns].mean())
         if best is None or mean < best.cost:
             best = Match(wanted[rows], extension, columns, scale, angle, 1.0, mean)
-    assert best is not None  # the first turn is always tried
+    assert best is not None  # The first rotation is always tried.
     return best
 
 
@@ -63,7 +63,7 @@ def _measure_mean_distance(points: Points) -> float:
 
 
 def fill_literally(draft: Draft, seed: int) -> Draft:
-    """Fill as in section 4.3: holes take random pixels that are not rigid; afterwards all pixels may change."""
+    """Fill as in section 4.3: holes get random pixels that are not rigid; afterwards all pixels may change."""
     places, holes = draft.places.copy(), ~draft.known
     ground = np.argwhere(draft.kinds == 0)
     places[holes] = ground[np.random.default_rng(seed).integers(len(ground), size=np.count_nonzero(holes))]
@@ -73,7 +73,7 @@ def fill_literally(draft: Draft, seed: int) -> Draft:
         places=places,
         known=np.ones_like(holes),
         fixed=np.zeros_like(holes),
-        # All pixels want kind 0, because the kind only selects pixels to jitter.
+        # Give all samples kind 1, so that any of them can replace any pixel. Pixels that request 1 are not jittered.
         wanted=np.where(rigid == 1, 1, 255).astype(np.uint8),
         kinds=np.zeros_like(draft.kinds) + np.uint8(1),
     )

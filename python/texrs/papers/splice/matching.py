@@ -1,7 +1,7 @@
-"""Find which element moves where in `texrs.papers.splice`: section 4.1.
+"""Decide which element moves to which target in `texrs.papers.splice` (section 4.1).
 
-The layout of B is scaled to the spacing of A and turned so that lines of points agree. It is extended to cover the
-output, and matched with elements of A.
+The layout of B is scaled to the spacing of A and rotated so that lines of points agree. It is extended to cover the
+output, and its points are matched with elements of A.
 """
 
 from __future__ import annotations
@@ -39,25 +39,25 @@ __all__ = [
 Points = NDArray[np.float64]
 
 BEYOND = 0.6
-"""Distance beyond the output up to which targets are used, in spacings."""
+"""Width of the margin around the output with targets, in spacings."""
 MARGIN = 1.4
-"""Least extension of the texture beyond the output, in its spacings."""
+"""Minimum width of the texture's extension beyond the output, in spacings."""
 WIDEST = 8.0
-"""Largest extension that provides elements, in spacings."""
+"""Width of the extension beyond which no more elements are added, in spacings."""
 SPARE = 1.2
-"""Wanted number of elements per target."""
+"""Requested number of elements per target."""
 TURN = 0.75
-"""Largest cost of a turn, relative to a smaller turn, to be preferred.
+"""Maximum cost of a preferred rotation, relative to the best rotation by a smaller angle.
 
-Lattices have several turns of nearly equal cost.
+The factor is below 1 because several rotations of a lattice have nearly equal costs.
 """
 OFFSETS, NEARER = 6, 0.9
-"""Number of offsets of a connected figure's layout along each axis, and largest relative cost of one to be preferred.
+"""Number of tried offsets of a connected figure's layout along each axis. Maximum relative cost of a preferred offset.
 """
 ALONE = 0.5
-"""Least distance of an empty place from all elements, in spacings, before an element is moved there."""
+"""Minimum distance of an empty place from all elements, in spacings, for an element to be moved to it."""
 CLEARANCE = 1.08
-"""Least distance of elements, in their diameters."""
+"""Minimum distance between the centres of elements, as a multiple of their diameter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,17 +67,17 @@ class Match:
     Attributes
     ----------
     targets : (n, 2) float64
-        Targets of the elements, in the output and around it.
+        Targets of the elements, in output coordinates, inside the output and around it.
     extension : Extension
         The texture, extended beyond its borders.
     assigned : (n) int
         Index of the extension's point for each target.
     scale, angle, gain : float
-        Scale and turn (degrees) of B's layout, and the part of the scale that gives elements room.
+        Scale factor and rotation (degrees) of B's layout, and the factor within ``scale`` that gives elements room.
     cost : float
         Mean squared distance of elements from their targets, in squared pixels.
     wanted : (n, 2) float64, optional
-        Targets before they were adjusted to the elements. Default: the targets.
+        Targets before their adjustment to the elements. Default: the targets.
 
     """
 
@@ -92,16 +92,16 @@ class Match:
 
     @property
     def starts(self) -> Points:
-        """Return the origin of each matched element, in the output."""
+        """Original position of each matched element, in output coordinates."""
         return self.extension.points[self.assigned]
 
     @property
     def shift(self) -> Points:
-        """Return the displacement of each matched element, in pixels."""
+        """Displacement of each matched element, in pixels."""
         return self.targets - self.starts
 
     def report(self) -> dict[str, Any]:
-        """Return the decisions, in JSON types."""
+        """Return the entries of the report: scale, angle, gain, counts and cost, in JSON types."""
         return {
             "scale": round(self.scale, 6),
             "angle": round(self.angle, 6),
@@ -113,7 +113,7 @@ class Match:
 
 
 def list_element_points(entry: ElementAnalysis) -> Points:
-    """Return the elements that may be moved. They include foreground without an element if the texture is disjoint."""
+    """Return the centres of elements that may be moved. Disjoint textures also have foreground without an element."""
     disjoint = entry.layout == Layout.DISJOINT
     return split_foreground(entry).points if disjoint else entry.points
 
@@ -121,16 +121,17 @@ def list_element_points(entry: ElementAnalysis) -> Points:
 def match_layouts(
     a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int], *, align: bool, scale: float | None = None
 ) -> Match:
-    """Match the elements of A with B's layout, scaled to the spacing of A or by ``scale``, with equal centres.
+    """Match the elements of A with B's layout, which is scaled to the spacing of A or by ``scale``.
 
-    Separate elements that keep their own layout in a larger output are sown.
+    Separate elements that keep their own layout in a larger output are sown instead, so that their arrangement
+    continues.
     """
     unit = spacing(a.points)
     if a.layout == Layout.DISJOINT and scale in (None, 1) and is_own(a, b):
         sown = sow(a, size, math.ceil(BEYOND * unit))
         if sown is not None:
             return Match(sown.points, sown, np.arange(len(sown.points)), 1.0, 0.0, 1.0, 0.0)
-    # Find the scale of the layout, and whether elements need more room.
+    # Find the scale of the layout, and enlarge it if elements need more room.
     layout = lay_out(b, beyond=True)
     gain, disjoint, centre = 1.0, a.layout == Layout.DISJOINT, layout.points.mean(axis=0)
     if scale is not None:
@@ -148,7 +149,7 @@ def match_layouts(
     ]
     if not all(len(wanted) for wanted in asked):
         raise InvalidInput("layout: must have a point inside the output")
-    # Extend A until it has enough elements for every turn, and take the cheapest turn.
+    # Extend A until it has enough elements for every rotation, and use the cheapest rotation.
     most = max(len(wanted) for wanted in asked)
     extension = _extend_until(a, size, unit, SPARE * most)
     if len(extension.points) < most:
@@ -161,7 +162,7 @@ def match_layouts(
         assigned, cost = match_points(extension.points, wanted)
         if best is None or cost < TURN * best.cost:
             best = Match(wanted, extension, assigned, factor * gain, angle, gain, cost)
-    assert best is not None  # a turn of 0 is always among them
+    assert best is not None  # A rotation of 0 is always among them.
     if disjoint or scale is not None:
         return best
     # Try offsets of the layout, because a connected figure bends less if its elements move less.
@@ -175,15 +176,15 @@ def match_layouts(
 
 
 def is_own(a: ElementAnalysis, b: ElementAnalysis) -> bool:
-    """Return whether a layout is the texture's own. Its elements then keep the room that they have."""
+    """Return True if a layout is the texture's own, whose elements fit without being pushed apart."""
     return np.array_equal(a.points, b.points) and np.array_equal(a.mask, b.mask)
 
 
 def interpolate_layouts(a: ElementAnalysis, match: Match, strength: float) -> Match:
-    """Let elements go only a share of their way: 0 keeps the texture's own layout, 1 takes the other one."""
+    """Move the targets of elements a share of the way: 0 keeps the texture's own layout, 1 uses the other one."""
     targets, assigned = match.starts + strength * match.shift, match.assigned
     if a.layout == Layout.DISJOINT:
-        # Elements without a target stay while there is room. Otherwise they would be erased although the layout hardly
+        # Keep elements without a target if there is room. Otherwise they would be erased although the layout hardly
         # changes.
         points = match.extension.points
         rest = np.setdiff1d(np.arange(len(points)), assigned)
@@ -195,17 +196,17 @@ def interpolate_layouts(a: ElementAnalysis, match: Match, strength: float) -> Ma
 
 
 def keep_cut(a: ElementAnalysis, match: Match, strength: float) -> Match:
-    """Let elements that the border cuts stay if they have room: all with strength 0, none with strength 1.
+    """Keep elements that the border cuts in place if they have room: all with strength 0, none with strength 1.
 
-    They cannot move elsewhere, and without them the texture's own layout would have an empty margin.
+    They cannot move because they are incomplete, and without them the texture's own layout would have an empty margin.
     """
     parts, extension = split_foreground(a), match.extension
     if not strength:
-        # Copies beyond the border would extend into the image.
+        # Remove copies beyond the border, because they would extend into the image.
         own = ((match.targets >= 0) & (match.targets <= np.array(a.mask.shape) - 1)).all(axis=1)
         kept = None if match.wanted is None else match.wanted[own]
         match = replace(match, targets=match.targets[own], assigned=match.assigned[own], wanted=kept)
-    # Sort the cut elements by their room, and keep a share of them.
+    # Keep a share of the cut elements, and prefer those with the most room.
     cut = np.flatnonzero(parts.present & ~parts.whole)
     if not len(cut):
         return match
@@ -234,26 +235,27 @@ def keep_cut(a: ElementAnalysis, match: Match, strength: float) -> Match:
 
 
 def find_turns(a: ElementAnalysis, b: ElementAnalysis) -> list[float]:
-    """Return the turns, in degrees, that align a direction of B's points with one of A's; the first turn is 0."""
+    """Return rotations, in degrees, that align a direction of B's points with one of A's; the first one is 0."""
     mine, theirs = (t.directions or find_directions(t) for t in (a, b))
-    # Lines have no sense of direction, so angles are within a quarter turn.
+    # A line has no forward end, so rotations are from -90 to 90 degrees.
     turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
     return [0.0, *sorted(turns - {0.0}, key=lambda t: (abs(t), t))]
 
 
 @remember(64)
 def find_directions(entry: ElementAnalysis) -> tuple[float, ...]:
-    """Return the directions of lines of points in a texture."""
+    """Return the directions along which the points of a texture form lines."""
     return directions(entry.points)
 
 
 def _measure_gain(a: ElementAnalysis, distances: Points) -> float:
-    """Return the scale that gives disjoint elements room in a layout with these nearest ``distances``."""
+    """Return the factor, at least 1, that gives disjoint elements room in a layout with these nearest ``distances``."""
     parts = split_foreground(a)
     area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
     if not len(area):
         return 1.0
-    # Use quartiles instead of extremes. The few elements that still collide are pushed apart, and the rest stay dense.
+    # Use quartiles instead of extremes, so that the layout stays dense. The few elements that still collide are pushed
+    # apart.
     diameter = 2 * math.sqrt(float(np.percentile(area, 75)) / math.pi)
     return max(1.0, CLEARANCE * diameter / max(float(np.percentile(distances, 25)), 1e-9))
 
@@ -270,10 +272,10 @@ def _place_targets(
     lattice: bool = False,
     shape: tuple[int, ...] | None = None,
 ) -> Points:
-    """Scale and turn a layout about a centre, move it to the middle of an output, and cover the output and a margin.
+    """Scale and rotate a layout, centre it on an output, and return its points in the output and a margin.
 
-    With the ``shape`` of its image, the layout continues in its own arrangement; with ``lattice``, on its lattice.
-    Otherwise it is reflected, like the elements of its image and like a connected figure.
+    Beyond its image, the layout continues in its own arrangement if the ``shape`` of the image is given. If
+    ``lattice`` is True, it continues on its lattice. Otherwise it is reflected, as the pixels of its image are.
     """
     turn = math.radians(angle)
     matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
@@ -285,7 +287,7 @@ def _place_targets(
     if shape is None:
         found = (layout.cover if lattice else layout.within)(first, last)[0]
     else:
-        # The box has the same size for all angles.
+        # Use a box of the same size for all angles.
         reach = float(np.hypot(*(high - low))) / 2 / scale + float(np.abs(np.asarray(offset)).max()) / scale
         around = np.floor(centre - reach), np.ceil(centre + reach)
         found, _ = continue_points(layout, shape, first, last, around=around)
@@ -294,9 +296,9 @@ def _place_targets(
 
 
 def _find_offsets(points: Points, wanted: Points, unit: float) -> Points:
-    """Return the best offsets of a layout, within half a spacing, by the distance of its points to elements.
+    """Return the three offsets of a layout, within half a spacing, that bring its points closest to elements.
 
-    A connected figure is bent less if its elements move less, and the position of the output in the layout is free.
+    A connected figure is bent less if its elements move less, and any position of the output in the layout is allowed.
     """
     from scipy.spatial import cKDTree
 
@@ -308,7 +310,7 @@ def _find_offsets(points: Points, wanted: Points, unit: float) -> Points:
 
 
 def _extend_until(a: ElementAnalysis, size: tuple[int, int], unit: float, needed: float) -> Extension:
-    """Extend a texture until it has enough elements, up to a limit."""
+    """Extend a texture until it has enough elements, or the extension is 8 spacings wide."""
     margin = MARGIN
     while count_elements(a, size, math.ceil(margin * unit)) < needed and margin < WIDEST:
         margin *= 1.4
@@ -320,7 +322,7 @@ def _extend_until(a: ElementAnalysis, size: tuple[int, int], unit: float, needed
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edit:
-    """A texture's own edited layout, on the texture extended beyond its borders.
+    """The edited layout of a texture that is extended beyond its borders.
 
     Attributes
     ----------
@@ -331,17 +333,18 @@ class Edit:
     kept : (n) bool
         False for elements that are removed.
     inwards : (n) bool
-        True for elements that the border cuts and whose straight edges would enter the image.
+        True for elements that the border cuts and that move inwards, so that their straight edges would be visible.
     together : bool
         True if the image is moved as a whole.
     listed : bool
         True if the edit only lists moved points.
     ruled : bool
-        True if the edit moves elements by a rule, which ignores their sizes.
+        True if the edit scales, shifts rows, randomises or regularises, because these steps ignore the sizes of
+        elements.
     cyclic : (bool, bool)
         Axes along which the edited layout is periodic.
     shrink : float
-        Scale factor of a shrinking layout; 1 without shrinking.
+        Scale factor of the layout if it shrinks; 1 if it does not.
 
     """
 
@@ -357,9 +360,10 @@ class Edit:
 
 
 def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = False) -> Edit:
-    """Edit a texture's own layout, far enough beyond its borders for all elements that may enter.
+    """Edit a texture's own layout, including all elements that may enter the image.
 
-    With ``labels`` only the layout is extended, not the image, also at elements that the border cuts.
+    If ``labels`` is True, all points of the layout are continued beyond the image, including elements that the border
+    cuts.
     """
     if a.layout != Layout.DISJOINT and any(step["op"] == "remove" for step in steps):
         raise InvalidInput(f"edit: remove must be used with separate elements, got {a.layout.value} ones")
@@ -372,7 +376,7 @@ def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = Fal
         raise InvalidInput(
             f"edit: must move elements by at most four times the size of the image, got {far:.0f} pixels"
         )
-    # If a layout shrinks, borders enter the image, and elements are needed to fill the gap.
+    # Use a wider margin if a layout shrinks, because more elements then enter the image.
     margin = (MARGIN if shrink == 1 else 2 * MARGIN) * spacing(points) + far
     extension = extend(a, size, math.ceil(margin), whole=False, exact=shrink == 1)
     if labels:
@@ -400,7 +404,7 @@ def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = Fal
 
 
 def match_edit(a: ElementAnalysis, edit: Edit) -> Match:
-    """Match a texture with its edited layout; elements that the border cuts do not enter, unless all move equally."""
+    """Match a texture with its edited layout. Cut elements that move inwards are left out unless all move equally."""
     kept = edit.kept & (edit.together | ~edit.inwards)
     assigned = np.flatnonzero(kept)
     if not len(assigned):
@@ -415,14 +419,14 @@ def match_edit(a: ElementAnalysis, edit: Edit) -> Match:
 
 
 def _fill_sites(sites: Points, moved: Points, size: tuple[int, int], unit: float, radius: float) -> Points:
-    """Move elements that are far beyond the output to empty places in it, because borders enter if a layout shrinks.
+    """Move elements that are far outside the output to empty places in it, because a shrinking layout leaves gaps.
 
-    The empty places are those of elements that the border cuts, which cannot be shown.
+    The empty places belong to elements that the border cuts, which are left out.
     """
     away = np.maximum(-moved, moved - (np.array(size) - 1)).max(axis=1)
     spare = np.flatnonzero(away > radius)
     wanted = sites[((sites > -radius) & (sites < np.array(size) - 1 + radius)).all(axis=1)]
-    # Skip places near another element, such as a place that enters from both sides of a border.
+    # Skip places that have an element nearby, such as places that enter from both sides of a border.
     wanted = wanted[nearest_distances(wanted, 1, moved)[:, 0] > ALONE * unit] if len(wanted) else wanted
     wanted = wanted[: len(spare)]
     if not len(wanted):

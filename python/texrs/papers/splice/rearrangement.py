@@ -1,9 +1,9 @@
-"""Edit the layout of separate elements: put whole elements into their new places, without warping.
+"""Edit the layout of separate elements: move each to its new place, without deforming it.
 
-Pixels that do not move keep their bytes. The background is completed where an element left. Moved elements are cut in
-with their mattes, as in splices (`ground`). If an element that the border cuts would enter, a whole one takes its
-place. Elements from beyond the border are exchanged for others, because a mirrored row next to its original would be
-visible.
+Pixels that do not move keep their values. The background is completed at the old places of moved elements. Moved
+elements are cut in with their mattes, as in splices (`ground`). If an element that the border cuts would enter, a
+complete one replaces it. Copies of elements that enter from beyond the border are replaced by other elements. A
+mirrored row next to its original would be visible.
 """
 
 from __future__ import annotations
@@ -33,15 +33,13 @@ Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 
 SEEN = 0.1
-"""Share of background in a texture that is enough to complete all of it, because completed pixels are between original
-ones.
-"""
+"""Share of visible background in a texture that is enough to complete its background."""
 BELOW = 3
-"""Number of pixels that the background extends below elements, so that these can be cut into it."""
+"""Width of the band inside outlines with a completed background, in pixels, so that elements can be cut into it."""
 CROWDED = 0.75
-"""Least distance of entering elements from others, as a share of the sum of their radii."""
+"""Minimum distance of entering elements from others, as a share of the sum of their radii."""
 ALIKE = 5
-"""Number of elements of similar size that compete for the place of an entering one."""
+"""Number of elements of similar size that are candidates to replace an entering one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,13 +51,13 @@ class Rearrangement:
     match : Match
         Places of the elements.
     draft, filled : Draft
-        Source pixels with holes where elements left, and with these holes filled.
+        Source pixels before and after the old places of moved elements are filled.
     label : (H, W) uint32
-        The target of each pixel of an element, counted from 1; 0 elsewhere.
+        The target of each pixel of an element, counted from 1, and 0 for other pixels.
     changed : (H, W) bool
-        Pixels that change.
+        True for pixels that change, apart from a shift of the whole image.
     pasted : (H, W) bool
-        Pixels of moved elements, without their surroundings.
+        True for pixels of moved elements, without their surroundings.
     light : Light or None
         Light that was removed from the texture, or None.
     field : (H, W, c) float32 or None
@@ -87,7 +85,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     steps : sequence
         Steps of the edit, as returned by `as_steps`.
     seed : int
-        Number that selects the entering elements, and the patches that fill the background.
+        Seed of the choice of entering elements, and of the patches that fill the background.
     watch : callable
         Function called as ``watch(stage, share)``.
 
@@ -100,13 +98,14 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     match, still = choose_elements(a, parts, edit, step, seed)
     watch("match", 1.0)
     base, seen = move_picture(a, step)
-    # Keep the background and elements that do not move. Keep scraps unless their straight edges enter the image.
+    # Keep the background and elements that do not move. Keep foreground without an element unless its straight edge enters the
+    # image.
     number = np.zeros(len(parts.points) + 1, np.uint32)
     number[match.assigned[still] + 1] = np.flatnonzero(still) + 1
     stays = (number[np.maximum(scene.own, 0)] > 0) | (scene.own == 0) | mark_scraps(scene.own, step, edit.cyclic)
     known = np.asarray(seen & stays[base[..., 0], base[..., 1]], bool)
     rest = np.where(known, number[parts.region[base[..., 0], base[..., 1]]], 0).astype(np.uint32)
-    # Lay the moved elements, complete the background, and cut the elements into it.
+    # Place the moved elements, complete the background, and cut the elements into it.
     label, places = paste_elements(parts, match, np.flatnonzero(~still), rest, edit.cyclic)
     bare = fill_holes(scene, base, known, label > 0, seed, watch)
     if bare is None:
@@ -131,7 +130,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
 
 
 def move_picture(a: ElementAnalysis, step: NDArray[np.intp]) -> tuple[Places, Bools]:
-    """Return the source pixels of an image that is moved as a whole, and the pixels that have a source."""
+    """Return the source pixels of an image that is shifted as a whole, and True for pixels that have a source."""
     base = np.moveaxis(np.indices(a.mask.shape, np.int32), 0, -1) - step.astype(np.int32)
     limits = np.array(a.mask.shape, np.int32)
     base = np.where(a.wrap, base % limits, base)
@@ -140,7 +139,7 @@ def move_picture(a: ElementAnalysis, step: NDArray[np.intp]) -> tuple[Places, Bo
 
 
 def mark_scraps(own: NDArray[np.int32], step: NDArray[np.intp], cyclic: tuple[bool, bool]) -> Bools:
-    """Return the scraps of a texture that stay when it is moved: all except those at an entering border."""
+    """Return True for foreground without an element that stays when the image is shifted."""
     from scipy.ndimage import label
 
     pieces, count = label(own < 0)
@@ -153,10 +152,10 @@ def mark_scraps(own: NDArray[np.int32], step: NDArray[np.intp], cyclic: tuple[bo
 
 
 def fill_holes(scene: Scene, base: Places, known: Bools, pasted: Bools, seed: int, watch: Progress) -> Places | None:
-    """Return the source pixels of an image with its holes filled by background, or None if too little is visible.
+    """Return an image's source pixels with its holes filled by background, or None if too little is visible.
 
-    Enough is a background as large as the holes, or a fixed share of the image. Pixels deep below elements are not
-    filled.
+    The visible background is enough if it is as large as the holes, or 10 % of the image. Holes that elements will
+    cover are only filled near their outlines.
     """
     from scipy.ndimage import binary_erosion
 
@@ -179,25 +178,25 @@ def fill_holes(scene: Scene, base: Places, known: Bools, pasted: Bools, seed: in
 def choose_elements(
     a: ElementAnalysis, parts: Foreground, edit: Edit, step: NDArray[np.intp], seed: int
 ) -> tuple[Match, Bools]:
-    """Return the places of the elements, entering ones first, and which elements do not move relative to the image."""
+    """Return the elements with their places, entering ones first, and True for elements that stay in place."""
     extension, size = edit.extension, np.array(a.mask.shape)
     beyond = np.arange(len(extension.points)) >= extension.originals
     comes, wide = edit.inwards | beyond, max(a.box)
     usable = np.flatnonzero(parts.whole)
     shown = ((edit.points > -wide) & (edit.points < size - 1 + wide)).all(axis=1) & (len(usable) > 0)
-    # Skip copies that do not move into the image. On periodic axes all elements belong to the image itself.
+    # Skip copies that do not move into the image. On periodic axes no copies are needed.
     around = (np.abs(extension.points - parts.points[extension.element]) > 0.5) & edit.cyclic
     shift = np.rint(edit.points - extension.points)
     away = ((extension.points < 0) & (shift <= 0)) | ((extension.points > size - 1) & (shift >= 0))
     shown &= (shift != 0).any(axis=1) & ~(around | (away & ~np.array(edit.cyclic))).any(axis=1)
     chosen = np.flatnonzero(edit.kept & (shown | ~comes))
-    # The last elements are on top, and choose their places first.
+    # Later elements cover earlier ones, and their places are chosen first.
     chosen = chosen[np.argsort(2 * ~comes[chosen] + edit.inwards[chosen], kind="stable")]
     element, goal = extension.element[chosen].copy(), edit.points[chosen].copy()
     comes, inwards = comes[chosen], edit.inwards[chosen]
     radius = np.sqrt(np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:] / math.pi)
     usual = float(np.median(radius[usable])) if len(usable) else 0.0
-    # Replace each entering element by a random whole one of similar size.
+    # Replace each entering element by a random complete one of similar size.
     noise, boxes = np.random.default_rng(seed), measure_boxes(parts)
     for k in np.flatnonzero(comes).tolist():
         i = int(element[k])
@@ -216,7 +215,7 @@ def choose_elements(
 
 
 def measure_boxes(parts: Foreground) -> Points:
-    """Return the extent of each element from its centre, (n, 2, 2): the first and the last pixel along each axis."""
+    """Return the box of each element relative to its centre, (n, 2, 2): the first and last pixel along each axis."""
     from scipy.ndimage import find_objects
 
     boxes = np.zeros((len(parts.points), 2, 2))
@@ -228,14 +227,14 @@ def measure_boxes(parts: Foreground) -> Points:
 
 
 def align_boxes(fragment: Points, whole: Points, cut: Bools) -> Points:
-    """Return the shift that moves the inner edge of a whole element to that of an element at the border."""
+    """Return the shift that moves the inner edge of a complete element to the inner edge of a cut one."""
     first, last = cut[:, 0] & ~cut[:, 1], cut[:, 1] & ~cut[:, 0]
     aside = fragment - whole
     return np.asarray(np.where(first, aside[:, 1], np.where(last, aside[:, 0], 0.0)), np.float64)
 
 
 def find_room(goal: Points, radius: Points, comes: Bools) -> NDArray[np.intp]:
-    """Return the elements that are shown: all except entering ones without room; the last ones choose first."""
+    """Return the elements that are shown. Entering ones are left out if they have no room; later ones choose first."""
     kept = np.flatnonzero(~comes).tolist()
     for k in np.flatnonzero(comes)[::-1].tolist():
         if not (np.hypot(*(goal[kept] - goal[k]).T) < CROWDED * (radius[kept] + radius[k])).any():
@@ -246,9 +245,10 @@ def find_room(goal: Points, radius: Points, comes: Bools) -> NDArray[np.intp]:
 def paste_elements(
     parts: Foreground, match: Match, moved: NDArray[np.intp], rest: NDArray[np.uint32], cyclic: tuple[bool, bool]
 ) -> tuple[NDArray[np.uint32], Places]:
-    """Return the targets of the pixels of moved elements, counted from 1, or 0, and their source pixels.
+    """Return the target of each pixel of a moved element, counted from 1 (0 elsewhere), and its source pixel.
 
-    Moved elements cover the ``rest``, and later ones cover earlier ones. Their surroundings do not cover elements.
+    Moved elements cover the other elements (``rest``), and later ones cover earlier ones. The surroundings of an
+    element do not cover other elements.
     """
     label, size = np.zeros(rest.shape, np.uint32), np.array(rest.shape)
     places = np.zeros((*rest.shape, 2), np.int32)

@@ -24,7 +24,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["compose", "list_place", "measure_realised", "report_ways"]
 
 STAYS = 0.5
-"""Requested displacement in pixels below which an element counts as staying in place."""
+"""Requested displacement, in pixels, below which an element counts as not moved."""
 
 
 def compose(
@@ -42,7 +42,7 @@ def compose(
     screening: float = 0.0,
     light: Light | None = None,
 ) -> Synthesis:
-    """Return the result of a splice from the results of its steps."""
+    """Build the result of a splice: render its image and write its report."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     size = label.shape
     frames = _make_frames(filled.mirrored)
@@ -72,10 +72,11 @@ def compose(
 
 
 def compose_edit(a: ElementAnalysis, laid: Rearrangement, *, seed: int, screening: float) -> Synthesis:
-    """Return the result of an edit whose elements were rearranged."""
+    """Build the result of an edit whose elements were rearranged."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     source = SourceMap.from_coordinates(laid.filled.places.astype(np.float32), shape, label=laid.label)
-    # Elements keep their colours, because an element that they cover would change them.
+    # Leave pixels of moved elements out of the colour correction, because elements below them would change their
+    # colours.
     source = say_finish(source, screening if laid.changed.any() else 0.0, laid.changed & ~laid.pasted)
     image = source.render(a.image, interpolation="nearest")
     if screening and laid.changed.any():
@@ -101,17 +102,17 @@ def compose_edit(a: ElementAnalysis, laid: Rearrangement, *, seed: int, screenin
 
 
 def say_finish(source: SourceMap, screening: float, within: Bools | None = None) -> SourceMap:
-    """Return a source map with the options that hide the seams of a splice."""
+    """Return a source map with the correction that hides the seams of a splice."""
     if not screening:
         return source.with_finish((False, False), interpolation="nearest")
-    # Coordinates are whole pixels, where "linear" equals "nearest". Only "linear" permits a correction.
+    # Coordinates are whole pixels, for which "linear" equals "nearest". Only "linear" permits a correction.
     return source.with_finish((False, False), interpolation="linear", screening=screening, within=within)
 
 
 def correct_colours(
     a: ElementAnalysis, source: SourceMap, light: Light | None, field: NDArray[np.float32] | None
 ) -> Array:
-    """Return the image of a source map in its final light, with hidden seams."""
+    """Render a source map in the light of the texture, and hide its seams."""
     image = apply(source, a.image if light is None else light.even)
     if light is None or field is None:
         return image
@@ -119,7 +120,7 @@ def correct_colours(
 
 
 def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
-    """Return the Jacobians of pixels if some show the texture mirrored, else None."""
+    """Return the Jacobian of each pixel if some pixels show the texture mirrored, else None."""
     if not mirrored.any():
         return None
     frames = np.zeros((*mirrored.shape, 2), np.float32)
@@ -129,7 +130,7 @@ def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
 
 
 def _list_matches(a: ElementAnalysis, match: Match) -> tuple[list[dict[str, Any]], float]:
-    """Return each element's target and place, in JSON types, and the reached share of all displacements."""
+    """Return the report's "matches" and the reached share of all displacements."""
     points = list_element_points(a)
     wanted = match.targets if match.wanted is None else match.wanted
     parts, whole = measure_realised(match.starts, wanted, match.targets)
@@ -150,7 +151,7 @@ def _list_matches(a: ElementAnalysis, match: Match) -> tuple[list[dict[str, Any]
 def measure_realised(
     start: NDArray[np.float64], wanted: NDArray[np.float64], found: NDArray[np.float64]
 ) -> tuple[list[float | None], float]:
-    """Return the reached share of each displacement, 0 to 1, and of their sum."""
+    """Return the reached share of each displacement, 0 to 1, and the reached share of their sum."""
     asked, missed = (np.hypot(*(x - wanted).T) for x in (start, found))
     there = np.isfinite(missed)
     part = 1 - np.where(there, missed, 0) / np.maximum(asked, STAYS)
@@ -169,26 +170,26 @@ def report_ways(
     found: NDArray[np.float64],
     size: tuple[int, ...],
 ) -> tuple[dict[str, float], list[dict[str, Any]]]:
-    """Return a summary and a list of elements that were put at targets, in JSON types.
+    """Return a summary and a list of the elements at the targets, in JSON types.
 
     Parameters
     ----------
     own : (n, 2) float64
-        Elements of A around the middle of the output. Targets without a ``start`` use the nearest one.
+        Places of A's elements around the middle of the output, for targets without a ``start``.
     start : (m, 2) float64, optional
-        Origin of each target's element. Default: taken from ``own``.
+        Original place of each target's element. Default: the nearest place of ``own``.
     goal, found : (m, 2) float64
-        Requested place and place in the result; NaN if the element is not visible.
+        Requested place, and place in the result, or NaN if the element is not visible.
     size : tuple of int
-        Size of the output. Only targets inside it count in the summary.
+        Rows and columns of the output. Only targets inside it count in the summary.
 
     Returns
     -------
     summary : dict
-        "present" is the share of targets with a visible element, and "displacement_reached" the reached share of the
-        displacements.
+        "present" is the share of targets with a visible element. "displacement_reached" is the reached share of the
+        sum of displacements.
     matches : list of dict
-        One entry per target: "target", "found" and "displacement_reached".
+        One entry per target with "target", "found" and "displacement_reached".
 
     """
     from scipy.spatial import cKDTree
@@ -207,5 +208,5 @@ def report_ways(
 
 
 def list_place(place: NDArray[np.float64]) -> list[float]:
-    """Return a place in JSON types."""
+    """Return a place as a list of [row, column], rounded to 0.001 pixels."""
     return [round(float(v), 3) for v in place]

@@ -24,20 +24,20 @@ HOLE = (255, 0, 255)
 
 
 class Stages(Mapping[str, Array]):
-    """Images by name, in the order of the stages; each is drawn on its first access."""
+    """Mapping from stage names to images, which are drawn on first access."""
 
     def __init__(self, draw: Mapping[str, Callable[[], Array]]) -> None:
         self._draw = draw
         self._drawn: dict[str, Array] = {}
 
     def __getitem__(self, name: str) -> Array:
-        """Draw a stage."""
+        """Return the image of a stage."""
         if name not in self._drawn:
             self._drawn[name] = self._draw[name]()
         return self._drawn[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
+        """Iterate over the names of the stages."""
         return iter(self._draw)
 
     def __len__(self) -> int:
@@ -54,7 +54,7 @@ def draw_stages(
     filled: Draft,
     image: Array,
 ) -> Stages:
-    """Return the stages of a splice, or of an edit, which has no ``b``; without a warp the ``target`` is missing."""
+    """Return the stages of a splice, or of an edit (without ``b``, and without ``target`` if nothing was warped)."""
     extension = match.extension
     origin = np.array(extension.origin)
     shown = to_picture(a.image)
@@ -83,7 +83,7 @@ def to_picture(image: Array) -> Picture:
 
 
 def mark_points(image: Picture, points: Points, colour: tuple[int, int, int]) -> Picture:
-    """Draw a ring around each point."""
+    """Draw a ring around each point on a copy of an image."""
     out = image.copy()
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     for radius, shade in ((4, WHITE), (3, colour), (2, colour)):
@@ -100,12 +100,12 @@ def draw_outlines(image: Picture, labels: Labels, colour: tuple[int, int, int]) 
 
 
 def dim_ground(image: Picture, mask: Bools) -> Picture:
-    """Return the image with a dimmed background."""
+    """Return the image with its background darkened and tinted blue."""
     return np.where(mask[..., None], image, (image // 3 + np.array(BLUE) // 3).astype(np.uint8)).astype(np.uint8)
 
 
 def draw_lines(image: Picture, start: Points, end: Points) -> Picture:
-    """Draw a line from each element to its target."""
+    """Draw a line from each element to its target on a faded image."""
     out = (image // 2 + 100).astype(np.uint8)
     share = np.linspace(0, 1, 200)[None, :, None]
     _put(out, np.rint(start[:, None] * (1 - share) + end[:, None] * share).astype(np.intp).reshape(-1, 2), GREEN)
@@ -113,7 +113,7 @@ def draw_lines(image: Picture, start: Points, end: Points) -> Picture:
 
 
 def draw_mesh(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8) -> Picture:
-    """Draw every n-th line of the warped mesh, darker on the texture's foreground."""
+    """Draw every 8th line of the warped mesh, darker on the texture's foreground."""
     out = np.full((*size, 3), 255, np.uint8)
     for of, places in ((mask[::step], target[::step]), (mask[:, ::step], target[:, ::step])):
         for shade, where in (((170, 170, 190), ~of), ((40, 40, 60), of)):
@@ -122,7 +122,7 @@ def draw_mesh(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8)
 
 
 def show_draft(image: Picture, draft: Draft) -> Picture:
-    """Draw the warp, with its holes."""
+    """Draw the warped texture, with its holes in one colour."""
     out: Picture = image[draft.places[..., 0], draft.places[..., 1]].copy()
     out[~draft.known] = HOLE
     return out

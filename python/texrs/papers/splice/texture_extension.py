@@ -1,9 +1,9 @@
 """Extend the texture whose elements are used beyond its borders.
 
-A splice needs elements from outside the image. The new layout may be denser, and the image's own border moves into the
-output. The image repeats if it wraps, and is reflected otherwise. Disjoint elements are then turned back, so that they
-are not mirrored, and elements that the border cuts are left out. If elements keep their own layout, they are sown over
-the whole output instead. A reflection would be visible in their arrangement.
+A splice needs elements from outside the image, because the new layout can be denser and the image's own border moves
+into the output. The image repeats if it wraps, and is reflected otherwise. Disjoint elements of reflected copies are
+not mirrored, and elements that the border cuts are left out. If elements keep their own layout, they are sown over the
+whole output instead, because a reflection would be visible in their arrangement.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ __all__ = ["Extension", "count_elements", "extend", "sow"]
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 Copies = tuple[Points, NDArray[np.intp], Bools]
-"""Elements of an extended texture: their places, their numbers in the texture, and the axes along which they are
-mirrored.
-"""
+"""Elements of an extended texture: places, numbers in the texture, and True for each axis with a reflection."""
 Placed = tuple[Copies, Labels, list[int], list[tuple[NDArray[np.intp], NDArray[np.intp]]]]
-"""The copies, the element number of each pixel, the numbers of the kept elements, and the turned pixels of
-`_place_elements`.
+"""Result of `_place_elements`: the copies and their pixels.
+
+The parts are the copies, the number of each pixel's copy, and the indices of the kept copies. The last part lists the
+pixels of formerly mirrored copies with their new source pixels.
 """
 
 FREE, SOWN_FREE = 0.9, 0.75
-"""Share of an element and its surroundings that must be free at its place, and the share if elements were sown."""
+"""Minimum free share of the place of an element and its surroundings, for copies and for sown elements."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,25 +49,28 @@ class Extension:
     origin : (int, int)
         Row and column of the first pixel in the output.
     pixel : (H, W, 2) int32
-        Source pixel in the texture of each pixel.
+        Source pixel of each pixel in the texture.
     mask : (H, W) bool
-        The foreground.
+        True for the foreground.
     points : (n, 2) float64
         Elements that may be moved, in output coordinates.
     element : (n) int
         Number of the texture's element that each point is a copy of.
     instance : (H, W) int32
-        Element of each pixel in a disjoint foreground, as an index of ``points`` counted from 1; 0 elsewhere.
+        Element of each pixel in a disjoint foreground, as an index of ``points`` counted from 1, and 0 for other
+        pixels.
     stray : (H, W) bool
-        Foreground without an element: cut by the border, or left over where an element was turned back.
+        True for foreground without an element: elements that the border cuts, and remains of mirrored elements that
+        were replaced.
     mirrored : (H, W, 2) bool
-        Axes along which each pixel is mirrored.
+        True for each axis along which a pixel is mirrored.
     piece : (H, W) int32
-        Numbers as in ``instance``, followed by numbers of the stray pieces.
+        Element of each pixel as in ``instance``, or the number of its stray piece, counted after the elements.
     stray_points : (m, 2) float64
         Centre of each stray piece, in output coordinates.
     originals : int
-        Number of points in the image itself. They come first, in its order. 0 if they were not requested.
+        Number of points in the image itself, or 0 if they were not requested. They are the first points, in the order
+        of the texture.
 
     """
 
@@ -88,10 +91,10 @@ class Extension:
 def extend(
     entry: ElementAnalysis, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False
 ) -> Extension:
-    """Extend a texture beyond an output that has the same centre.
+    """Extend a texture to cover an output with the same centre, and a margin.
 
-    With ``whole=False`` all elements of the image itself are kept, also elements that the border cuts. With ``exact``
-    all its pixels are kept.
+    The ``margin`` is in pixels. If ``whole`` is False, all elements of the image itself are kept, including elements
+    that the border cuts. If ``exact`` is True, all pixels of the image are kept.
     """
     layout, low, high = _find_bounds(entry, size, margin, exact=exact)
     shape = np.array(entry.mask.shape)
@@ -124,7 +127,7 @@ def extend(
 
 @remember(4)
 def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension | None:
-    """Sow separate elements in their own arrangement beyond an output, or return None if this is not needed."""
+    """Cover an output with separate elements in their own arrangement; return None if it is not much larger."""
     layout, low, high = _find_bounds(entry, size, margin, exact=False)
     parts, shape = split_foreground(entry), entry.mask.shape
     radius = np.sqrt(np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:] / np.pi)
@@ -143,7 +146,7 @@ def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension
 
 
 def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) -> tuple[Places, Bools]:
-    """Return the source pixel of each pixel in a box, and the axes along which it is mirrored."""
+    """Return the source pixel of each pixel in a box, and True for each axis along which it is mirrored."""
     check_memory(int(np.prod(high - low)) * BEYOND)
     along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
     rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
@@ -162,7 +165,7 @@ def count_elements(entry: ElementAnalysis, size: tuple[int, int], margin: int) -
 
 @remember(2)
 def _place_copies(entry: ElementAnalysis, low: tuple[int, int], high: tuple[int, int]) -> Placed:
-    """Put every whole element at each of its places in the extended image, in a box of its own pixels."""
+    """Put a copy of each complete element at each of its places in a box of the extended image."""
     check_memory((high[0] - low[0]) * (high[1] - low[1]) * BEYOND)
     places, of, flips = _reflect_all(entry).within(np.array(low, np.float64), np.array(high, np.float64) - 1)
     return _place_elements(entry, (high[0] - low[0], high[1] - low[1]), (places - low, of, flips))
@@ -174,14 +177,14 @@ def _as_pair(place: NDArray[np.intp]) -> tuple[int, int]:
 
 @remember(64)
 def lay_out(entry: ElementAnalysis, *, beyond: bool) -> PointLayout:
-    """Return how the layout of a texture continues; ``beyond`` permits reflections outside the image."""
+    """Return the continued layout of a texture; if ``beyond`` is True, it may be reflected outside the image."""
     return PointLayout.of(entry.points, entry.mask.shape, entry.wrap, beyond=beyond)
 
 
 def _find_bounds(
     entry: ElementAnalysis, size: tuple[int, int], margin: int, *, exact: bool
 ) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
-    """Return the layout of a texture as its pixels continue, and the bounds of the extension in its coordinates."""
+    """Return the layout as the pixels continue, and the first and last corner of the extension in its coordinates."""
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Offset of the image in the output.
     disjoint = entry.layout == Layout.DISJOINT
@@ -190,9 +193,10 @@ def _find_bounds(
 
 
 def _reflect_all(entry: ElementAnalysis) -> PointLayout:
-    """Return the layout of a texture that is reflected at its very ends, or wraps.
+    """Return the layout of a texture that is reflected exactly at the image's ends, or wraps.
 
-    Elements that the border cuts are left out or requested here, so no pixel limits the reflection.
+    Lines of reflection inside the image are not needed here, because elements that the border cuts are either left out
+    or explicitly requested.
     """
     shape = entry.mask.shape
     points = split_foreground(entry).points if entry.layout == Layout.DISJOINT else entry.points
@@ -211,16 +215,16 @@ def _stamp(
     originals: int = 0,
     inside: Bools | None = None,
 ) -> Extension:
-    """Return an extended texture with its elements at their places, not mirrored.
+    """Build an extended texture, without mirrored elements.
 
-    Pixels of the image itself, ``inside``, stay unless an element covers them.
+    Pixels of the image itself (``inside``) do not change, except if an element covers them.
     """
     from scipy.ndimage import label
 
     (places, of, _), instance, kept, turns = placed
     parts = split_foreground(entry)
     known = parts.region[pixel[..., 0], pixel[..., 1]] > 0
-    # Erase mirrored elements, to make room for the turned ones.
+    # Erase mirrored elements, to make room for their unmirrored copies.
     turned = mirrored.any(axis=-1) & known
     for at, pixels in turns:
         pixel.reshape(-1, 2)[at] = pixels
@@ -231,7 +235,7 @@ def _stamp(
     if not kept:
         raise InvalidInput("elements: must have whole elements, but the border cuts every one")
     chosen = np.array(kept)
-    # Number the stray pieces after the elements, and find their centres.
+    # Number the stray pieces after the elements, and compute their centres.
     pieces, count = label(stray)
     where = np.nonzero(pieces)
     area = np.bincount(pieces[where], minlength=count + 1)[1:]
@@ -260,12 +264,12 @@ def _place_elements(
     *,
     least: float = FREE,
 ) -> Placed:
-    """Return the number of each pixel's element.
+    """Assign pixels to the copies of elements that have room.
 
-    Originals are always placed, others outside ``inside`` if they have room.
+    The first ``originals`` copies are always placed. Other copies are placed outside ``inside`` if they have room.
 
-    The pixels of turned elements, and their source pixels, come last. The places of kept elements are rounded, so that
-    their centres are whole pixels away from those in the texture.
+    The last result lists the pixels of mirrored copies, and their unmirrored source pixels. Places of kept copies are
+    changed so that their displacements from the texture are whole pixels.
     """
     places, of, flips = copies
     parts = split_foreground(entry)
@@ -300,7 +304,7 @@ def _place_elements(
 
 @remember(4)
 def _list_shapes(entry: ElementAnalysis) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], NDArray[np.intp]]:
-    """Return each element's pixels, their offsets from its centre, and the first and last offset, (2, n, 2)."""
+    """Return each element's pixels, their offsets from its centre, and the minimum and maximum offset, (2, n, 2)."""
     parts, shape = split_foreground(entry), np.array(entry.mask.shape)
     centres, count = _round_half_up(parts.points), len(parts.points)
     at = np.flatnonzero(parts.region)
@@ -319,5 +323,5 @@ def _list_shapes(entry: ElementAnalysis) -> tuple[list[NDArray[np.intp]], list[N
 
 
 def _round_half_up(place: Points) -> NDArray[np.intp]:
-    """Return the nearest pixel, and the higher one of two, so that whole steps stay whole."""
+    """Round to the nearest pixel, and halves up, so that points at a distance of whole pixels keep it."""
     return np.asarray(np.floor(place + 0.5), np.intp)

@@ -1,20 +1,23 @@
-"""Splice nets by their graph: each target shows a knot of A with its lines, cut to those of its neighbours.
+"""Splice nets by their graph: each target gets a knot of A with its lines, cut along those of its neighbours.
 
-A net, such as chainmail or a keyboard, is connected but not divided into cells; its elements are the knots. Bent as
-printed (Liu et al. 2009, Eq. 5) it reaches half of the displacements, and is torn or mirrored. Here lines are not
-bent. The steps, and the module of each step:
+A net, such as chainmail or a keyboard, is connected but not divided into cells. Its elements are the knots. The
+printed deformation (Liu et al. 2009, Eq. 5) reaches only half of the displacements of a net, and tears or mirrors
+parts of it. Here lines are not bent. The steps, and the module of each step:
 
-1. Find the requested places of the knots: the points of B's layout at the spacing of A's, continued on their lattice
-   (`targets`). A strength below 1 interpolates between A's own points and these.
+1. Find the requested places of the knots: the points of B's layout at the spacing of A's knots, continued on their
+   lattice (`targets`). A strength below 1 interpolates between A's own points and these places.
 
-2. Build the Gabriel graphs of A's points and of the targets, and features of each pixel in its graph (`graph`).
+2. Build the Gabriel graphs of A's points and of the targets, and compute features of each pixel in its graph
+   (`graph`).
 
 3. Lay at each target the knot whose surroundings have the most similar features and fit the earlier knots best. It is
-   cut in, in a band between targets. It may be off by a little so that lines meet (`knots`).
+   3. Copy a knot of A to each target. Its surroundings have features similar to the target's, and fit the knots that
+      are already there. The seam is in a band between targets. The knot can be shifted slightly so that lines meet
+      (`knots`).
 
-4. Grow the pixels far from all knots by the stitcher, with the same features as a guide.
+4. Fill the pixels far from all knots with patches. The same features guide their choice.
 
-The four steps give a source map of whole pixels, and the image is looked up once.
+The result is a source map of whole pixels, so the image is looked up only once.
 """
 
 from __future__ import annotations
@@ -47,26 +50,29 @@ __all__ = ["has_knots", "is_net", "splice_nets"]
 Points = NDArray[np.float64]
 
 SURE = 0.5
-"""Confidence of the layout above which a connected texture without cells counts as a net."""
+"""Minimum confidence of the layout for a connected texture without cells to count as a net."""
 FEWEST = 6
-"""Least number of knots. Fewer would repeat visibly."""
+"""Minimum number of knots. Fewer would repeat visibly."""
 LEAST = 8.0
-"""Least distance of knots in pixels. Below it lines cannot be distinguished from knots."""
+"""Minimum distance of knots in pixels. Below it, lines cannot be distinguished from knots."""
 PATCH, CANDIDATES, WEIGHT = 0.8, 4, 3
-"""Settings of the grown rest: side of a patch in spacings, number of places that are tried, and weight of the graph."""
+"""Settings for pixels without a knot: side of a patch in spacings, number of tried places, weight of the graph."""
 NEAR = 1.5
-"""Largest offset of the pixel shown at a knot's place, in pixels. Otherwise the knot counts as missing."""
+"""Maximum distance of the source pixel at a knot's place from the knot, in pixels.
+
+Above it, the knot counts as missing.
+"""
 
 
 def is_net(entry: ElementAnalysis) -> bool:
-    """Return whether a texture is reliably connected and has enough knots."""
+    """Return True if a texture is reliably connected and has at least 6 knots, 8 pixels apart."""
     sure = entry.report.get("confidence")
     trust = sure.get("layout", 1.0) if isinstance(sure, dict) else 1.0
     return trust >= SURE and has_knots(entry)
 
 
 def has_knots(entry: ElementAnalysis) -> bool:
-    """Return whether a texture is connected and has enough knots at sufficient distances."""
+    """Return True if a texture is connected and has at least 6 knots, with a spacing of 8 pixels or more."""
     return entry.layout != Layout.DISJOINT and len(entry.points) >= FEWEST and spacing(entry.points) >= LEAST
 
 
@@ -81,29 +87,30 @@ def splice_nets(
     seed: int,
     watch: Progress,
 ) -> Synthesis:
-    """Show the knots of A at the points of B.
+    """Synthesise a net: place the knots of A at the points of B.
 
     Parameters
     ----------
     a, b : ElementAnalysis
         The textures.
     cells : Cells, optional
-        Cells of B, whose centres are then its points.
+        Cells of B. If given, their centres are used as B's points.
     size : (rows, columns)
         Size of the result, in pixels.
     strength : float
-        Share of the way from A's own places, 0, to B's, 1.
+        Fraction of the way that knots move, from 0 (A's own places) to 1 (B's points).
     scale : float, optional
         Scale of B's layout. Default: the scale that gives it the spacing of A's knots.
     seed : int
-        Number that selects random choices.
+        Seed of all random choices.
     watch : callable
         Function called as ``watch(stage, share)``.
 
     Returns
     -------
     Synthesis
-        Labels of the source map are targets, counted from 1 as in the report's "matches", and 0 for grown pixels.
+        The result. Labels of its source map are targets, counted from 1 as in the report's "matches", and 0 for pixels
+        without a knot.
 
     Raises
     ------
@@ -120,7 +127,7 @@ def splice_nets(
     mine, theirs = describe_places(a.points, shape, unit), describe_places(wanted.points, size, unit)
     laid = lay_knots(a, mine, wanted.points, theirs, unit, seed, watch)
     places = grow_rest(a, laid, mine, theirs, unit, seed, watch)
-    # Number the visible targets from top to bottom.
+    # Number the visible targets from top to bottom, because labels start at 1.
     shown = np.unique(laid.target[laid.target != FREE]).astype(np.intp)
     shown = shown[np.lexsort((wanted.points[shown, 1], wanted.points[shown, 0]))]
     number = np.zeros(len(wanted.points) + 1, np.uint32)
@@ -144,7 +151,7 @@ def splice_nets(
 def grow_rest(
     a: ElementAnalysis, laid: PlacedKnots, mine: Floats, theirs: Floats, unit: float, seed: int, watch: Progress
 ) -> NDArray[np.int32]:
-    """Return the source pixels after patches, grown around the knots, filled the pixels without a knot."""
+    """Fill the pixels without a knot with patches, and return the source pixel of each pixel."""
     free = laid.target == FREE
     if not free.any():
         return laid.places
@@ -169,7 +176,7 @@ def grow_rest(
 
 
 def _code(said: Floats) -> NDArray[np.int16]:
-    """Return numbers up to 2 as integers, in thousandths."""
+    """Convert numbers from -2 to 2 to integers, in thousandths."""
     return np.rint(np.clip(said, -2, 2) * 1000).astype(np.int16).reshape(-1)
 
 
@@ -181,7 +188,7 @@ def _report(
     shown: NDArray[np.intp],
     unit: float,
 ) -> dict[str, Any]:
-    """Return the requested and reached knots, in JSON types."""
+    """Return the report: counts, and the requested and reached place of each knot, in JSON types."""
     size, source = places.shape[:2], laid.source[shown]
     own = a.points + (np.array(size) - a.mask.shape) / 2
     start = None if wanted.start is None else wanted.start[shown]
@@ -201,7 +208,7 @@ def _report(
 
 
 def _find_places(a: ElementAnalysis, laid: PlacedKnots, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
-    """Return the position of each knot in the output, from the source map; NaN if it is not visible."""
+    """Return the position of each knot in the output, according to the source map; NaN if it is not visible."""
     found: Points = laid.found[shown]
     size = np.array(places.shape[:2])
     pixel = np.rint(found)

@@ -1,4 +1,4 @@
-"""Graph of a net: which knots a line connects, and features of each pixel relative to the graph."""
+"""Graph of a net: pairs of knots that a line connects, and features of each pixel relative to the graph."""
 
 from __future__ import annotations
 
@@ -12,23 +12,27 @@ __all__ = ["describe_places", "join_knots"]
 Points = NDArray[np.float64]
 
 EMPTY = 1e-3
-"""Share of a circle's radius that knots may be inside it, while it counts as empty.
+"""Tolerance of an empty circle, as a share of its radius. Knots this close to the circle do not count as inside.
 
-Lattices have many knots on one circle.
+A tolerance is needed because lattices have many knots on one circle.
 """
 FAR = 1.0
-"""Distance from a knot beyond which the feature is constant, in spacings."""
+"""Maximum distance from a knot in the features, in spacings. Larger distances are set to it."""
 ASIDE = 0.5
-"""Distance from a line beyond which the feature is constant and the direction has no weight, in spacings."""
+"""Maximum distance from a line in the features, in spacings. The direction of a line has no weight at this distance.
+"""
 DENSE = 1.0
-"""Distance between sampled points of a line, in pixels, when the nearest line of a pixel is searched."""
+"""Distance between the sample points on a line, in pixels. They are used to find the nearest line."""
 
 
 def join_knots(points: Points) -> NDArray[np.intp]:
-    """Return the pairs (n, 2) of neighbouring knots: the Gabriel graph, whose diametral circles are empty.
+    """Return the pairs (n, 2) of neighbouring knots: the Gabriel graph.
+
+    The circle over each pair contains no other knot.
 
     K. R. Gabriel and R. R. Sokal, "A new statistical approach to geographic variation analysis", Systematic Zoology 18(3),
-    1969. It is a part of the Delaunay triangulation. Knots on one line are joined one after the other.
+    1969. The graph is a part of the Delaunay triangulation. If all knots are on one line, each is connected to the
+          next.
     """
     from scipy.spatial import Delaunay, QhullError, cKDTree
 
@@ -46,10 +50,11 @@ def join_knots(points: Points) -> NDArray[np.intp]:
 
 
 def describe_places(points: Points, shape: tuple[int, int], unit: float) -> Floats:
-    """Return four features of each pixel, (rows, columns, 4), for its place in a net.
+    """Return four features (rows, columns, 4) that describe each pixel's place in a net.
 
-    They are the distances to the nearest knot and line, in spacings, and the direction of that line. The direction is
-    a doubled angle, because lines have no forward end. Its weight decreases with the distance.
+    The first two are the distances to the nearest knot and the nearest line, in half spacings. The others are the
+    cosine and sine of twice that line's angle, because a line has no forward end. Their weight decreases with the
+    distance from the line.
     """
     from scipy.spatial import cKDTree
 

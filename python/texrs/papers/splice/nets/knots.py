@@ -1,4 +1,4 @@
-"""Lay knots: each target shows a knot of A with its lines, cut to its neighbours in a band between them."""
+"""Copy knots of A to the targets, each with its lines, and cut them along seams in bands between the targets."""
 
 from __future__ import annotations
 
@@ -18,52 +18,51 @@ __all__ = ["PlacedKnots", "lay_knots"]
 Points = NDArray[np.float64]
 
 REACH = 1.4
-"""Distance around a knot that it may show if no other knot is nearer, in spacings.
+"""Radius around a target that its knot can cover if no other target is nearer, in spacings.
 
-The net then continues as in A in gaps of a layout.
+The net then continues in gaps of a layout as it does in A.
 """
 BAND = 0.3
-"""Half width of the band between two knots, in spacings.
+"""Half width of the band between two targets, in spacings.
 
-A pixel in the band may show either knot; outside it shows the nearer one.
+A pixel in the band can belong to either knot. A pixel outside the band belongs to the nearer one.
 """
 CORE = 0.18
-"""Distance around a knot that always shows it, in spacings."""
+"""Radius around a target that its knot always covers, in spacings."""
 LOOSE = 0.05
-"""Largest distance of a knot from its target, in spacings, so that its lines meet the lines of others."""
+"""Maximum distance of a knot from its target, in spacings. Such a shift makes its lines meet the lines of others."""
 TRIED, CUT = 6, 6
-"""Number of knots that are shifted, and number of places that are cut in; the cheapest stays."""
+"""Number of best knots that are also tried with shifts, and number of best places whose seams are computed."""
 GRAPH, BEYOND, USES, AWAY, CHANCE = 1.0, 6.0, 0.1, 0.3, 0.02
-"""Weights of a place's cost: graph, pixels beyond the image, earlier uses of the knot, distance from the target,
-chance.
+"""Weights of a place's cost: graph, pixels beyond the image, earlier uses of the knot, distance to the target, chance.
 
-Unrelated places differ by 1 in colour.
+For comparison, the colours of two unrelated places cost 1 on average.
 """
 COLOUR, DEPTH, DEEP = 1.0, 0.3, 6.0
-"""Weights of a seam: for the colours on both sides, in standard deviations, and for the depth in the foreground.
+"""Weights of a seam: for colour differences, in standard deviations, and for the depth in the foreground, in pixels.
 
-The depth has a maximum, in pixels. It keeps keys whole.
+The last number is the maximum depth, in pixels. The weight keeps seams out of elements such as the keys of a keyboard.
 """
 SEEN = 16
-"""Number of compared pixels per spacing when places are evaluated."""
+"""Number of compared pixels per spacing when the cost of a place is computed."""
 LOST = 0.35
-"""Largest share of a window beyond the image."""
+"""Maximum share of a window that is beyond the image of A."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedKnots:
-    """Pixels of the laid knots.
+    """Knots of A, copied to their targets.
 
     Attributes
     ----------
     places : (H, W, 2) int32
-        Pixel of A that each pixel shows; 0 where it is unknown.
+        Source pixel in A of each pixel, or 0 for pixels without a knot.
     target : (H, W) uint32
-        Target of each pixel, as a row of the targets, or ``FREE`` without a target.
+        Target of each pixel, as an index of the targets, or ``FREE`` without a target.
     source : (n,) int
-        Knot of each target, or -1.
+        Knot of A at each target, or -1 without a knot.
     found : (n, 2) float64
-        Position of that knot in the output; NaN without a knot.
+        Position of that knot in the output, or NaN without a knot.
 
     """
 
@@ -82,9 +81,9 @@ class Window:
     box : (slice, slice)
         Slices of the window in the output.
     off : (h, w, 2) int
-        Pixel positions relative to the target's.
+        Offset of each pixel from the target, in rows and columns.
     cell, core : (h, w) bool
-        Pixels that a knot may cover, and pixels that it must cover.
+        True for pixels that the knot can cover, and for pixels that it must cover.
 
     """
 
@@ -97,7 +96,7 @@ class Window:
 def lay_knots(
     a: ElementAnalysis, mine: Floats, targets: Points, theirs: Floats, unit: float, seed: int, watch: Progress
 ) -> PlacedKnots:
-    """Lay a knot at each target.
+    """Copy a knot of A to each target, and cut it against the earlier knots.
 
     Parameters
     ----------
@@ -106,13 +105,13 @@ def lay_knots(
     mine : (h, w, 4) float32
         Features of each pixel of A in its net (`describe_places`).
     targets : (n, 2) float64
-        Requested places of knots, also around the output.
+        Requested places of knots, including places around the output.
     theirs : (H, W, 4) float32
         Features of each output pixel in the requested net.
     unit : float
         Spacing of both nets, in pixels.
     seed : int
-        Number that selects among knots that fit equally well.
+        Seed of the choice among knots that fit equally well.
     watch : callable
         Function called as ``watch("nets", share)``.
 
@@ -135,7 +134,7 @@ def lay_knots(
     chance = CHANCE * np.random.default_rng(seed).random((len(targets), len(points)))
     shifts = list_shifts(LOOSE * unit)
     tree = cKDTree(targets)
-    # Visit the targets row by row, so that each knot is cut to earlier neighbours.
+    # Visit the targets row by row, so that each knot is cut against earlier neighbours.
     order = np.lexsort((targets[:, 1], np.round(2 * targets[:, 0] / unit)))
     for turn, t in enumerate(order.tolist()):
         watch("nets", turn / len(order))
@@ -147,7 +146,7 @@ def lay_knots(
         there = flat[np.where(known, shown[box], 0)]
 
         judge = partial(judge_places, window, described, there, known, theirs[box], step)
-        # Rank knots at the exact target, then small shifts of the best knots.
+        # Rank knots without a shift first, then small shifts of the best knots.
         first = judge(middles) + USES * used + chance[t]
         best = np.argsort(first, kind="stable")[:TRIED]
         best = best[np.isfinite(first[best])]
@@ -159,7 +158,7 @@ def lay_knots(
         tried = tried[np.isfinite(cost[tried])]
         offers = [make_patch(window, middles[of[k]] + away[k], shape) for k in tried.tolist()]
         pastings = [Pasting(shown[box], seams[box], window.cell & ok, window.core & ok) for _, ok in offers]
-        # Cut in the offer with the cheapest seam.
+        # Use the place with the cheapest seam.
         price = [samples.judge(p, patch[None])[0] for p, (patch, _) in zip(pastings, offers, strict=True)]
         k = int(np.argmin(price))
         take, after = samples.cut(pastings[k], offers[k][0])
@@ -174,7 +173,7 @@ def lay_knots(
 
 
 def list_shifts(most: float) -> NDArray[np.intp]:
-    """Return offsets (n, 2) up to a length in pixels, (0, 0) first."""
+    """Return all tried offsets (n, 2) up to a length in pixels, with (0, 0) first."""
     reach = int(most)
     step = max(1, -(-reach // 2))
     every = np.arange(-(reach // step), reach // step + 1) * step
@@ -212,10 +211,10 @@ def judge_places(
     step: int,
     corners: NDArray[np.intp],
 ) -> Floats:
-    """Return the cost of a window for each pixel of A (n, 2) at the target; infinite if it cannot be there.
+    """Return the cost of placing each of some pixels of A (n, 2) at the target; infinite if it is not possible.
 
-    ``described``, (h, w, 4 + C), contains the features of A in its net, and its colours. Only every n-th pixel is
-    compared.
+    ``described``, (h, w, 4 + C), contains the features of A in its net, and its colours. Only every ``step``-th pixel
+    is compared along each axis.
     """
     thin = (slice(None, None, step),) * 2
     cell, shape = window.cell[thin], np.array(described.shape[:2])
@@ -242,7 +241,7 @@ def judge_places(
 
 
 def make_patch(window: Window, corner: NDArray[np.intp], shape: NDArray[np.intp]) -> tuple[NDArray[np.uint32], Bools]:
-    """Return the pixels of A that a window shows, as flat indices, and which of them exist."""
+    """Return the pixels of A that a window would show, as flat indices, and True for those inside the image."""
     at = window.off + corner
     ok = ((at >= 0) & (at < shape)).all(axis=-1)
     rows, columns = np.moveaxis(np.clip(at, 0, shape - 1), -1, 0)

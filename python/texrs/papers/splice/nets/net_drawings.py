@@ -28,7 +28,7 @@ Points = NDArray[np.float64]
 def draw_net_stages(
     a: ElementAnalysis, b: ElementAnalysis, targets: Points, label: NDArray[np.uint32], image: Array
 ) -> Stages:
-    """Return the stages of a splice by nets."""
+    """Return the stages of a splice by nets, as images that are drawn on access."""
     return Stages(
         {
             "source net": lambda: _draw_net(to_picture(a.image), a.points),
@@ -41,6 +41,6 @@ def draw_net_stages(
 
 
 def _draw_net(picture: Picture, points: Points) -> Picture:
-    """Draw a ring around each knot, and a line between neighbours."""
+    """Draw a ring around each knot, and lines between connected knots."""
     pairs = join_knots(points)
     return mark_points(draw_lines(picture, points[pairs[:, 0]], points[pairs[:, 1]]), points, RED)

@@ -1,4 +1,4 @@
-"""Find the requested places of a net's knots: the points of another layout, continued beyond its image."""
+"""Find the target places for a net's knots: the points of another layout, continued beyond its image."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ __all__ = ["Targets", "interpolate_layouts", "take_own_points", "take_points"]
 Points = NDArray[np.float64]
 
 AROUND = 1.5
-"""Distance around the output with targets, in spacings, because the lines of their knots are visible."""
+"""Width of the margin around the output with targets, in spacings, because lines from there reach into the output."""
 ROOM = 0.75
-"""Least median distance of targets, as a share of the distance between A's knots."""
+"""Minimum median distance of targets, as a share of the distance between A's knots."""
 FEWEST = 6
-"""Least number of points that define a lattice."""
+"""Minimum number of cells whose centres are used as targets."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,9 +38,10 @@ class Targets:
     scale : float
         Scale factor of the layout.
     continued : str
-        How the layout continues beyond its image: "lattice", "wrap", "quilted", "reflected", or "" if it need not.
+        How the layout continues beyond its image: "lattice", "wrap", "quilted" (grown from patches), "reflected", or
+        "" if it does not continue.
     start : (n, 2) float64, optional
-        Origin of each knot among A's own, if it moves only a share of its way.
+        Origin of each knot among A's own places, if the strength is below 1.
 
     """
 
@@ -60,10 +61,11 @@ def take_points(
     scale: float | None = None,
     seed: int,
 ) -> Targets:
-    """Return the centres of B's cells, or else its points, scaled to a spacing of ``unit`` pixels (A's own).
+    """Return the targets: the centres of B's cells, or else its points, scaled to a spacing of ``unit`` pixels.
 
-    Layouts whose points form pairs or rows are scaled up, so that A's knots have room in these. If ``scale`` is given,
-    it is used instead, and the centre of B's image is at the centre of the output.
+    ``unit`` is the spacing of A's knots. Layouts whose points are in pairs or rows are enlarged, so that A's knots
+    have room between close points. If ``scale`` is given, it is used instead, and the centre of B's image is at the
+    centre of the output.
 
     Raises
     ------
@@ -95,13 +97,13 @@ def take_points(
 
 
 def measure_gain(mine: Points, theirs: Points) -> float:
-    """Return the scale that gives enough knots room in a layout of the same spacing."""
+    """Return the factor, at least 1, that enlarges a layout of equal spacing so that close knots have room."""
     needed, there = (float(np.median(nearest_distances(p, 1))) for p in (mine, theirs))
     return max(1.0, ROOM * needed / max(there, 1e-6))
 
 
 def take_own_points(a: ElementAnalysis, size: tuple[int, int], unit: float) -> Targets:
-    """Return A's own knots around the centre of the output."""
+    """Return A's own knots as targets, with A's image at the centre of the output."""
     layout, offset = lay_out(a, beyond=True), (np.array(size) - a.mask.shape) // 2
     low, high = -AROUND * unit - offset, np.array(size) - 1 + AROUND * unit - offset
     points, _, mirrored = layout.within(low, high)
@@ -110,9 +112,9 @@ def take_own_points(a: ElementAnalysis, size: tuple[int, int], unit: float) -> T
 
 
 def interpolate_layouts(own: Targets, wanted: Targets, strength: float) -> Targets:
-    """Move knots a share of their way, matched at the least total squared distance (Eq. 4).
+    """Move knots a share of the way from their own places to the targets, matched by least squared distance (Eq. 4).
 
-    Knots without a partner stay for the first half of the way, or enter in the second.
+    Knots without a target stay until a strength of 0.5. Targets without a knot get one from 0.5 on.
     """
     if strength <= 0:
         return own
