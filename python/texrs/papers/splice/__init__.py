@@ -395,8 +395,8 @@ def self_splice(
         texture. The steps use the element numbers of the report's "elements", which lists their places before the
         steps. Default: the size of the image of ``elements``.
     seed : int
-        Seed of all random choices, 0 to 2^64 - 1: random steps, elements that enter over a border, patches in holes,
-        and the noise of the refinement. Default: 0.
+        Seed of all random choices, 0 to 2^64 - 1. They are random steps, elements that enter over a border, patches in
+        holes, and the noise of the refinement. Default: 0.
     method : {None, "paper", "preview"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
         triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
