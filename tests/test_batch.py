@@ -210,7 +210,7 @@ def test_a_batch_that_was_stopped_goes_on(here: Path, capsys: Capture, number: i
         rest = process.stderr.read().decode().splitlines()
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     if number == signal.SIGINT:
-        assert any("the same command goes on from there" in line for line in rest)
+        assert any("the same command continues from there" in line for line in rest)
         assert "what was done is kept: made/dots-still-3.png, made/dots-still-4.png" in rest[-1]
     done = {n: (here / n).stat().st_mtime_ns for n in files(here) if n.startswith("made/dots-still")}
     assert len(done) >= 2
@@ -310,7 +310,7 @@ def test_stopped_workers_leave_nothing_and_nobody(here: Path, number: int) -> No
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     assert "Traceback" not in rest
     if number == signal.SIGINT:
-        assert "the same command goes on from there" in rest
+        assert "the same command continues from there" in rest
     assert not [n for n in files(here) if ".texrs-" in n]
 
 

@@ -82,7 +82,7 @@ MASKS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "the picture itself with the hole erased": (
         lambda: np.dstack([samples.load("pebbles", size=SIZE).image, 255 - WHITE]),
-        "read as a picture with a transparent part, which is marked",
+        "read as an image whose transparent part is marked",
     ),
     "a plain layer over much of the picture": (
         lambda: Mask(as_layer((9, 9, 9), 255 - WHITE), invert=True),

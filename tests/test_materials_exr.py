@@ -212,7 +212,7 @@ def test_channels_beside_a_picture_are_no_part_of_it(tmp_path: Path) -> None:
         "colour": ("colour", 3),
         "Z": ("other", 1),
     }
-    with pytest.warns(InputWarning, match="Z not used: these channels are not part of the picture"):
+    with pytest.warns(InputWarning, match="Z not used, because these channels are not part of the image"):
         assert io.read(path).shape[2] == 3
     io.read(write(tmp_path / "b.exr", [({}, {"R": one, "G": one, "B": one, "A": one})]))
     io.read(write(tmp_path / "c.exr", [({}, {"Z": one})]))

@@ -2,7 +2,7 @@
 Two textures mixed by a map
 ===========================
 
-A map gives the share of two examples at each pixel. Elements of one example lie whole on the other one, so the border
+A map gives the share of two examples at each pixel. Whole elements of one example are on the other example, so the border
 follows their outlines and not the edge of the map.
 """
 

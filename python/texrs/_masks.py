@@ -215,7 +215,7 @@ def _look_through(levels: Array, alpha: Array, called: str) -> Array:
         seen.size > MUCH * alpha.size
         and np.bincount(np.rint(255 * seen.clip(0, 1)).astype(np.intp)).max() < PLAIN * seen.size
     ):
-        assume(f"{called}: read as a picture with a transparent part, which is marked")
+        assume(f"{called}: read as an image whose transparent part is marked")
         return np.where(alpha < full, full, 0).astype(alpha.dtype)
     assume(f"{called}: read as a layer, because its transparency varies; its opaque pixels are marked")
     return alpha

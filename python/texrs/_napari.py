@@ -206,7 +206,7 @@ def _show_lazy(
     if channel is None:
         kept: dict[str, Any] = {}
     else:
-        # The range of a lazy array is not computed. Floats are colours only if the store says so.
+        # The range of a lazy array is not computed. Floats are colours only if the store states it.
         colours = first.shape[channel] in (3, 4) and first.dtype in (np.uint8, np.uint16)
         if colours:
             from dask import array as lazy

@@ -218,7 +218,7 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
                     failed[number] = said
                     note(f"{where}: {job.source} failed{one.show()}", quiet=quiet)
     except (Stopped, KeyboardInterrupt, typer.Abort):
-        complain(f"stopped after {over} of {total}; the same command goes on from there")
+        complain(f"stopped after {over} of {total}; the same command continues from there")
         raise
     return [(work.jobs[number], failed[number]) for number in sorted(failed)], partly
 

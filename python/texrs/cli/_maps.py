@@ -30,10 +30,10 @@ APPLIED = Options(
     leave={
         "source": "it is an argument",
         "exemplars": "they are arguments, as many as wanted",
-        "finish.known": "one an exemplar, and no map is of them",
-        "finish.parts": "the verb knows them",
-        "finish.light": "the verb knows where its pixels lie",
-        "finish.fade": "the verb knows where its filling fades",
+        "finish.known": "there is one mask per exemplar, and no map of them",
+        "finish.parts": "the verb gives them",
+        "finish.light": "the verb gives the position of its pixels",
+        "finish.fade": "the verb gives the fade of its filling",
     },
     optional=dict.fromkeys(
         (

@@ -122,7 +122,7 @@ class Options:
         axes: int = 2,
     ) -> None:
         self.function, self.axes = function, axes
-        self.leave = {"progress": "the command line shows it by itself", **(leave or {})}
+        self.leave = {"progress": "the command line shows progress itself", **(leave or {})}
         self._arguments, self._names, self.optional = dict(arguments or {}), dict(names or {}), dict(optional or {})
         self._kinds = self._arguments | dict(kinds or {})
         self.groups: dict[str, Any] = dict(makers or {})
@@ -233,7 +233,7 @@ class Options:
             both = f"{flag}/--no-{flag.removeprefix('--')}" if type_ is bool else flag
             metavar = kind.pick(kind.metavar, self.axes) if kind else None
             panel = path[0].replace("_", " ").capitalize() if len(path) == 2 else None
-            # The word default says nothing. The text contains the default.
+            # Do not show the word default, because the text describes the default.
             shown = False if default == "default" else shown
             info = typer.Option(both, metavar=metavar, help=help_, show_default=shown, rich_help_panel=panel)
         return Option(path, flag, type_, kind, default, required, info)

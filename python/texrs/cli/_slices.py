@@ -171,7 +171,7 @@ def slice_command(
         if as_turntable:
             with show_progress(quiet=quiet) as progress, _outputs.write_output(out) as temporary:
                 turntable(voxels, temporary, **options, progress=progress)
-            note(f"wrote {out}: {given['frames']} pictures, in {time.monotonic() - start:.1f} s", quiet=quiet)
+            note(f"wrote {out}: {given['frames']} images, in {time.monotonic() - start:.1f} s", quiet=quiet)
             return
         if paged:
             with _outputs.write_output(out) as temporary:

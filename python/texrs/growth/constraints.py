@@ -259,7 +259,7 @@ class Conditions:
         Raises
         ------
         InvalidInput
-            If constraints or maps have other shapes or types, if coordinates lie outside the exemplar, or if a guide
+            If constraints or maps have other shapes or types, if coordinates are outside the exemplar, or if a guide
             is combined with values.
 
         """

@@ -105,7 +105,7 @@ def read_image(path: Path, limit: int) -> Array:
     image = channels[names[0]] if len(names) == 1 else np.stack([channels[name] for name in names], axis=-1)
     rest = [*(channels.keys() - set(names)), *(f"{part}.{key}" for part, found, _ in parts[1:] for key in found)]
     if rest:
-        ignore(f"{path}: {', '.join(sorted(rest))} not used: these channels are not part of the picture")
+        ignore(f"{path}: {', '.join(sorted(rest))} not used, because these channels are not part of the image")
     return image
 
 

@@ -200,7 +200,7 @@ def _arrange(
 ) -> tuple[tuple[Any, ...], list[int], int | None]:
     """Return the index for each axis, the order of the axes, and the axis of channels (or None)."""
     space = _SPACE[-axes:]
-    what = ("a picture", "a volume")[axes - 2]
+    what = ("an image", "a volume")[axes - 2]
     keep: list[Any] = [slice(None)] * len(shape)
     if names is not None and set(space) <= {n.lower() for n in names}:
         lower = [n.lower() for n in names]

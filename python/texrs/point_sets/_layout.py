@@ -94,7 +94,7 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
     wrap : bool
         If True, the image is periodic and its ends are the lines.
     beyond : bool
-        If True, lines may lie beyond the ends of the image. This is useful for points alone, without pixels.
+        If True, lines may be beyond the ends of the image. This is useful for points alone, without pixels.
 
     """
     if wrap:

@@ -13,7 +13,7 @@ __all__ = ["Points", "directions", "mark_inner", "nearest_distances", "spacing"]
 Points = NDArray[np.float64]
 
 NEIGHBOURS = 5
-"""Number k of neighbours of the scale normalisation. The paper says 4 to 6."""
+"""Number k of neighbours of the scale normalisation. The paper uses 4 to 6."""
 INSIDE = 0.5
 """Minimum distance of an inner point from the outermost ones along every axis, in nearest-point distances."""
 PEAK, CLEAR = 1.3, 6.0

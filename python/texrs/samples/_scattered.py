@@ -250,7 +250,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     scene.albedo[:] = palette("2a1c15")[0]
     scene.height += np.float32(0.3) * scene.noise(6) - 6
     skin, tone = scene.noise(20, 2, gain=0.6), palette("7a2f25")[0]
-    # The first beans touch. Later beans lie deeper and are visible between them.
+    # The first beans touch. Later beans are deeper and are visible between them.
     for taken, depth in ((0.10, 0.0), (0.28, 2.6), (0.5, 4.6)):
         darts = rng.random((int(0.02 * scene.period[0] * scene.period[1]), 2)) * scene.period
         for dart in darts:

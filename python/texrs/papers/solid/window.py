@@ -179,7 +179,7 @@ class SolidTexture(Texture):
         sides = as_size(size)
         reach = np.abs(middle) + np.abs(steps).T @ np.array(sides)
         if reach.max() >= MAX_COORDINATE:
-            raise InvalidInput(f"point, axes, size: the slice must lie within {MAX_COORDINATE} of the origin")
+            raise InvalidInput(f"point, axes, size: the slice must be within {MAX_COORDINATE} voxels of the origin")
         image = self._exemplar.image if self._material is None else self._material.base
         out = np.empty((*sides, *image.shape[3:]), image.dtype)
         for top in range(0, sides[0], TILE):
