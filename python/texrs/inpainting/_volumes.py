@@ -73,7 +73,8 @@ def is_volume(image: object, hole: object) -> bool:
     sides: tuple[int, ...] = getattr(image, "shape", ())
     # An image with few channels stays an image, whatever its hole.
     deep = len(sides) == 4 or (len(sides) == 3 and sides[2] > MOST_CHANNELS)
-    if marks is None or marks in ("nan", "nodata") or isinstance(marks, int | float):
+    named = isinstance(marks, str) and marks in ("nan", "nodata")
+    if marks is None or named or isinstance(marks, int | float):
         if isinstance(image, str | os.PathLike):
             return os.path.exists(image) and holds_volume(image)
         if deep:
