@@ -1,4 +1,4 @@
-"""Database: a folder of analysed textures that can be spliced with each other."""
+"""Store analysed textures in a folder, and splice them with each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contact sheet of a matrix: a thumbnail of each splice."""
+"""Draw the contact sheet of a matrix of splices."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ GAP = 4
 
 
 class ContactSheet:
-    """Thumbnails in rows and columns, with the textures along the left and the upper edge."""
+    """Image with a thumbnail of each splice, and of the textures along its left and upper edges."""
 
     def __init__(self, rows: int, columns: int, side: int) -> None:
         self.side, step = side, side + GAP
         self.picture = np.full(((rows + 1) * step, (columns + 1) * step, 3), 255, np.uint8)
 
     def put(self, row: int, column: int, image: Array | None) -> None:
-        """Put a thumbnail into its position. None leaves it grey."""
+        """Draw the thumbnail of an image in a cell of the sheet. If the image is None, the cell is grey."""
         side = self.side
         small = np.full((side, side, 3), 128, np.uint8) if image is None else make_thumbnail(image, side)
         top, left = row * (side + GAP), column * (side + GAP)
@@ -30,7 +30,7 @@ class ContactSheet:
 
 
 def make_thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
-    """Return a thumbnail of an image."""
+    """Return an image as 8-bit colours whose longer side has a given number of pixels."""
     from skimage.transform import resize
 
     guide = as_rgb(guidance(as_image(image)))

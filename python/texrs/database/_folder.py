@@ -1,4 +1,4 @@
-"""Folder of a database: entries, and a manifest that one process changes at a time and that entries can restore."""
+"""Manage the folder of a database: one file per texture, and a manifest that can be rebuilt from these files."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from texrs.errors import FileError, InvalidInput, TexrsError
 
 MANIFEST, LOCK = "manifest.json", ".lock"
 VERSION = 2
-"""Version of the manifest."""
+"""Version of the format of the manifest."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 PATIENCE, PAUSE = 60.0, 0.05
-"""Maximum time, in seconds, to wait for the lock of another process, and time between two attempts."""
+"""Maximum time to wait for the lock of another process, and time between two attempts, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,20 +34,20 @@ class Record:
 
     name: str
     file: str
-    """File name of the entry, in the folder."""
+    """Name of the texture's file in the folder."""
     image: str
-    """File of the image, in the folder or elsewhere."""
+    """Path of the image, relative to the folder or absolute."""
     hash: str
     version: int
     layout: Layout
     box: tuple[int, ...]
     elements: int
     options: Mapping[str, Any] = field(repr=False)
-    """Options of its analysis."""
+    """Options of `texrs.elements.analyse` for this texture."""
 
 
 class Folder:
-    """The manifest of a folder, and the operations that change its entries."""
+    """Folder of a database, with the operations that change its manifest and its files."""
 
     def __init__(self, path: FilePath, log: Callable[[str], object] | None) -> None:
         self.path, self._say, self._made = path, log, False
@@ -64,7 +64,7 @@ class Folder:
         pixels: Array | None = None,
         replace_other: bool = True,
     ) -> ElementAnalysis:
-        """Write an entry, its ``pixels`` to the file ``image`` if they are given, and its record in the manifest."""
+        """Write an entry and its record. If ``pixels`` are given, write them to the file ``image`` as well."""
         plain = {k: _to_plain(v) for k, v in options.items()}
         # Store everything that the manifest contains, so that a lost manifest can be rebuilt.
         entry = replace(entry, report={**entry.report, "database": {"image": image, "options": plain}})
@@ -84,7 +84,7 @@ class Folder:
         return entry
 
     def drop(self, name: str) -> bool:
-        """Remove a texture, with the copy of its pixels if there is one. Return whether it existed."""
+        """Remove a texture, and the copy of its pixels if there is one. Return True if the texture existed."""
         if not self.path.is_dir():
             return False
         with self._lock_manifest():
@@ -116,7 +116,7 @@ class Folder:
         try:
             text = (self.path / MANIFEST).read_text(encoding="utf-8")
         except FileNotFoundError:
-            # If there are entries, the manifest was lost. Otherwise nobody has written it yet.
+            # If there are entries, the manifest was lost. Otherwise the database is new.
             return None if any(self.path.glob("*.npz")) else {}
         except (OSError, UnicodeDecodeError):
             return None
@@ -153,7 +153,7 @@ class Folder:
 
     @contextmanager
     def _lock_manifest(self) -> Iterator[None]:
-        """Lock the manifest against changes by other processes and threads."""
+        """Lock the manifest during a block, against changes by other processes and threads."""
         number, end = self._open_lock(), time.monotonic() + PATIENCE
         try:
             while not (_lock_file(number) and self._is_lock(number)):
@@ -189,7 +189,7 @@ class Folder:
         raise FileError(f"{self.path}: other processes keep creating and removing the folder")
 
     def _is_lock(self, number: int) -> bool:
-        """Return whether the opened file is still the lock file in the folder."""
+        """Return whether an open file is still the lock file of the folder."""
         with suppress(OSError):
             return os.path.samestat(os.fstat(number), os.stat(self.path / LOCK))
         return False
@@ -203,13 +203,13 @@ class Folder:
 
 
 def check_free(found: Mapping[str, Record], name: str, hash: str) -> None:
-    """Check that no texture with another image has the name."""
+    """Raise an error if another image is already stored under a name."""
     if name in found and found[name].hash != hash:
         raise InvalidInput(f"name: {name} exists already, with another image; use replace=True to replace it")
 
 
 def _lock_file(number: int) -> bool:
-    """Lock a file until it is closed. If a process dies, the operating system closes its files."""
+    """Lock an open file and return whether this worked. The lock ends when the file is closed or the process dies."""
     try:
         try:
             import fcntl
@@ -233,7 +233,7 @@ def _record_of(name: str, file: str, entry: ElementAnalysis) -> Record:
 
 
 def _read_record(name: str, item: Mapping[str, Any]) -> Record:
-    # The manifest must name a file in the folder, not a path or "..".
+    # Accept only names of files in this folder, because a damaged manifest could contain a path or "..".
     if not NAME.fullmatch(name) or not re.fullmatch(rf"{NAME.pattern}\.npz", item["file"]):
         raise ValueError(name)
     return Record(
@@ -250,7 +250,7 @@ def _read_record(name: str, item: Mapping[str, Any]) -> Record:
 
 
 def _to_plain(value: Any) -> Any:
-    """Return an option as text, numbers, lists and mappings. A mask is stored as its runs."""
+    """Return an option as JSON types. Masks are stored by the positions where their value changes."""
     if isinstance(value, np.ndarray) and value.dtype.kind in "b" and value.ndim == 2:
         changes = np.flatnonzero(np.diff(value.ravel().astype(np.int8), prepend=0))
         return {"shape": list(value.shape), "changes": changes.tolist()}
@@ -266,7 +266,7 @@ def _to_plain(value: Any) -> Any:
 
 
 def restore_option(value: Any) -> Any:
-    """Return an option in the form that it had before `_to_plain`."""
+    """Return an option that `_to_plain` converted in its original form."""
     if isinstance(value, dict) and "shape" not in value:
         return ElementSearch(**value)
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Database: a folder of analysed textures that can be spliced with each other."""
+"""Provide `TextureDatabase`: a folder of analysed textures that can be spliced with each other."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
 KEPT = 256 << 20
-"""Approximate maximum bytes of entries in memory while a matrix is spliced."""
+"""Approximate size limit, in bytes, for entries kept in memory during a matrix."""
 
 
 class AnalyseOptions(TypedDict, total=False):
@@ -46,7 +46,7 @@ class AnalyseOptions(TypedDict, total=False):
 
 
 class SpliceOptions(TypedDict, total=False):
-    """Options of `texrs.splice`, without the two textures and the size."""
+    """Options of `texrs.splice`, except the two textures and the size."""
 
     seed: int
     method: Literal["paper", "preview"] | None
@@ -65,15 +65,15 @@ class Matrix:
     """Splices of several textures with each other."""
 
     rows: tuple[str, ...]
-    """Names of the textures that supply the elements."""
+    """Names of the textures that supply the elements, one for each row of the sheet."""
     columns: tuple[str, ...]
-    """Names of the textures that supply the arrangement."""
+    """Names of the textures that supply the arrangement, one for each column of the sheet."""
     results: Mapping[tuple[str, str], Synthesis]
-    """Splices by names. It is empty if they were passed to ``each``."""
+    """Splices by (row name, column name). Empty if they were passed to ``each``."""
     sheet: NDArray[np.uint8]
-    """Image of all splices, with the textures along its left and its upper edge."""
+    """Image with thumbnails of all splices, and of the textures along its left and upper edges."""
     failed: Mapping[tuple[str, str], str]
-    """Reasons for missing splices, by names. Their positions on the sheet are grey."""
+    """Reasons for missing splices, by (row name, column name). Their cells on the sheet are grey."""
 
 
 class TextureDatabase:
@@ -88,7 +88,7 @@ class TextureDatabase:
     path : path_like
         Folder. If it is missing, it is created with the first texture, but its parent must exist.
     log : callable, optional
-        Function called with a sentence when something was rebuilt. Default: a Python warning.
+        Function that is called with a sentence if a damaged or outdated file was rebuilt. Default: a Python warning.
 
     Raises
     ------
@@ -126,7 +126,7 @@ class TextureDatabase:
         return isinstance(name, str) and name in self._folder.read()
 
     def __getitem__(self, name: str) -> ElementAnalysis:
-        """Return an entry, analysed again if necessary."""
+        """Return the analysis of a texture. It is repeated if the entry is outdated or damaged."""
         return self.analyse(name)
 
     def list(self) -> list[Record]:
@@ -165,7 +165,7 @@ class TextureDatabase:
         Parameters
         ----------
         image : path_like or (H, W[, C]) array
-            Image: a file, which stays where it is, or pixels, which are copied.
+            Image: a path, whose file stays where it is, or pixels, which are copied to the folder.
         name : str, optional
             Name of up to 100 letters, digits, ``.``, ``_`` and ``-``. Default: the name of the file.
         replace : bool
@@ -227,7 +227,7 @@ class TextureDatabase:
                 )
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise InvalidInput(f"name: must be up to 100 letters, digits, '.', '_' and '-', got {name!r}")
-        # Refuse a taken name before the analysis, which is slow.
+        # Reject a taken name before the analysis, which is slow.
         pixels = as_image(image) if file is None else io.read(file)
         if not as_bool(replace, "replace"):
             check_free(self._folder.read(), name, hash_image(pixels))
@@ -244,7 +244,7 @@ class TextureDatabase:
         )
 
     def remove(self, name: str) -> None:
-        """Remove a texture: its entry, and the copy of pixels that were given as an array. Image files stay.
+        """Remove a texture and, if it was added as an array, its pixels. Image files stay.
 
         Parameters
         ----------
@@ -280,7 +280,9 @@ class TextureDatabase:
             self._find_record(name)
 
     def analyse(self, name: str, *, progress: Progress | bool | None = None) -> ElementAnalysis:
-        """Return an entry, analysed again if its image or version has changed, or if it is damaged.
+        """Return the analysis of a texture.
+
+        It is repeated if its image or version has changed, or the entry is damaged.
 
         Parameters
         ----------
@@ -322,7 +324,7 @@ class TextureDatabase:
                 entry = load(self.path / record.file)
             except TexrsError as error:
                 reason = str(error).removeprefix(f"{self.path / record.file}: ")
-        # A missing image does not matter as long as the entry is valid.
+        # If the image is missing, a valid entry can still be used.
         image = self._read_image(record)
         if image is None:
             if entry is None:
@@ -454,7 +456,7 @@ class TextureDatabase:
         results: dict[tuple[str, str], Synthesis] = {}
         failed: dict[tuple[str, str], str] = {}
         sheet = ContactSheet(len(down), len(across), side)
-        # Draw the textures themselves along the left and upper edges of the sheet.
+        # Draw the textures along the left and upper edges of the sheet.
         for j, b in enumerate(across, start=1):
             with answering(progress, "matrix", 0.0):
                 sheet.put(0, j, read(b).image)
@@ -468,7 +470,7 @@ class TextureDatabase:
                 try:
                     with answering(progress, "matrix", share):
                         made = splice(read(a), read(b), size, **options)
-                # A limit stops the matrix, but a pair that cannot be spliced is only reported.
+                # A limit on time or memory stops the whole matrix. A pair that cannot be spliced is only reported.
                 except LimitExceeded:
                     raise
                 except InvalidInput as error:
@@ -492,7 +494,7 @@ class TextureDatabase:
         return found[name]
 
     def _choose(self, names: Sequence[str] | None, which: str) -> tuple[str, ...]:
-        """Return existing names; all of them by default."""
+        """Check a list of names of textures. By default, return all names."""
         if isinstance(names, str):
             raise InvalidInput(f"{which}: must be a sequence of names, got {names!r}")
         chosen = []

@@ -1,9 +1,8 @@
-"""Registration of point sets: the layout of one texture for the elements of another.
+"""Register point sets: fit the layout of one texture to the elements of another.
 
 Y. Liu et al., "Texture splicing", 2009, section 4.1. Scales are normalised by the mean distance to the nearest points,
-and orientations by the directions of aligned points. Points are matched one to one at the minimum total cost
-(Eq. 4). The paper does not state how both point sets continue beyond the borders of their images; this package defines
-it.
+and orientations by the directions of rows of points. Points are matched one to one at the minimum total cost (Eq. 4).
+The paper does not state how both point sets continue beyond the borders of their images; this package defines it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Lattices of points."""
+"""Find lattices and courses in layouts of points, and continue a layout on its lattice."""
 
 from __future__ import annotations
 
@@ -10,26 +10,28 @@ from texrs.point_sets._measures import Points, spacing
 __all__ = ["continue_on_lattice", "find_courses", "find_lattice", "fit_lattice"]
 
 VOTERS = 400
-"""Number of points in the middle of a layout that determine its lattice."""
+"""Maximum number of points for fitting a lattice. They are in the middle of the layout."""
 REGULAR = 0.12
-"""Maximum root mean square distance of points from their lattice sites, in spacings. Layouts with a larger distance are
-not continued on the lattice.
+"""Maximum root mean square distance of points from their lattice sites, in spacings.
+
+Points that are farther off have no lattice.
 """
 FEWEST, SHARE, STEP, STRAIGHT = 3, 0.8, 0.2, 0.06
-"""Limits of a wall: number of courses, share of points in courses of two or more, row distance of courses, straightness.
+"""Limits for the courses of a wall.
 
-The first three are minima, and the distance is in spacings. The last is the maximum root mean square distance of points
-from their course, in steps between courses. Random points have 0.07 steps or more.
+The first two are the minimum number of courses, and the minimum share of points in courses of two or more. The third
+is the minimum distance of courses in spacings. The last value is the maximum root mean square distance of points from
+their course, as a share of the distance between courses. Random points have 0.07 or more.
 """
 AREAS = (0.6, 1.6)
-"""Minimum and maximum area of a lattice cell, in squared spacings. Other lattices do not describe the points."""
+"""Minimum and maximum area of a lattice cell with one point, in squared spacings."""
 
 
 def fit_lattice(points: Points) -> tuple[Points, Points]:
-    """Fit a lattice by least squares; return its origin, and two vectors as rows.
+    """Fit a lattice to points by least squares. Return its origin, and its two vectors as rows.
 
-    The vectors are the differences of near points that most pairs repeat. If none is repeated, the result is a square
-    lattice of the same density.
+    The vectors are the differences of neighbouring points that occur most often. If no difference is repeated, the
+    result is a square lattice of the same density.
     """
     scale = spacing(points)
     near = np.argsort(np.hypot(*(points - points.mean(axis=0)).T), kind="stable")[:VOTERS]
@@ -37,7 +39,8 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
     difference = voters[:, None] - voters[None]
     length = np.hypot(*difference.reshape(-1, 2).T)
     near = difference.reshape(-1, 2)[(length > 0) & (length < 2.2 * scale)]
-    # Differences occur with both signs, so use one half of the plane. Those within 1/6 of a spacing vote for each other.
+    # Differences occur with both signs, so use one half of the plane. Differences that agree within 1/6 of a spacing
+    # support each other.
     half = near[(near[:, 0] > 1e-9) | ((np.abs(near[:, 0]) <= 1e-9) & (near[:, 1] > 0))]
     basis = np.zeros((0, 2))
     if len(half):
@@ -57,7 +60,7 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
         area = float(np.prod(np.ptp(points, axis=0) + scale))
         basis = np.eye(2) * np.sqrt(area / len(points))
     origin = points[int(np.hypot(*(points - points.mean(axis=0)).T).argmin())]
-    # Fit the lattice to all points. Their sites may change with the fit.
+    # Fit the lattice to all points in turns, because the nearest site of a point can change with the fit.
     for _ in range(3):
         index = np.rint((points - origin) @ np.linalg.inv(basis))
         system = np.concatenate([index, np.ones((len(points), 1))], axis=1)
@@ -71,9 +74,9 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
 
 
 def find_lattice(points: Points, unit: float) -> tuple[Points, Points, NDArray[np.intp]] | None:
-    """Return the lattice of points with one point a site, or None.
+    """Return the lattice of points that has one point per site, or None.
 
-    The lattice is its origin, its vectors as rows, and the sites of the points.
+    The result is the origin, the vectors as rows, and the site (n, 2) of each point.
 
     ``unit`` is the spacing of the points.
     """
@@ -87,7 +90,7 @@ def find_lattice(points: Points, unit: float) -> tuple[Points, Points, NDArray[n
 
 
 def find_courses(points: Points, unit: float) -> Points | None:
-    """Return the rows (n,) of the courses that points form, in pixels. None if they form no courses.
+    """Return the row of each course that points form, (n,) in pixels. None if they form no courses.
 
     ``unit`` is the spacing of the points.
 
@@ -116,9 +119,9 @@ def find_courses(points: Points, unit: float) -> Points | None:
 def continue_on_lattice(
     points: Points, unit: float, low: Points, high: Points
 ) -> tuple[Points, NDArray[np.intp]] | None:
-    """Return lattice places in a box and the point that each repeats. None if the points have no lattice.
+    """Return the lattice sites in a box, and the index of the point that each repeats. None without a lattice.
 
-    Points are a little off their sites, and their copies have the same offsets.
+    Points deviate slightly from their sites, and their copies deviate in the same way.
     """
     found = find_lattice(points, unit)
     if found is None:
@@ -131,7 +134,8 @@ def continue_on_lattice(
     sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij"), -1)
     sites = sites.reshape(-1, 2)
     own = {tuple(k): n for n, k in enumerate(index.tolist())}
-    # A site without a point repeats a point chosen from the site's position, so that the choice is always the same.
+    # A site without a point repeats a point that depends only on the site, so that the result does not depend on the
+    # box.
     of = np.array([own.get((i, j), (7919 * i + 104729 * j) % len(points)) for i, j in sites.tolist()])
     mine = np.array([(i, j) in own for i, j in sites.tolist()])
     # Round, because least squares and matrix products differ in their last digits between processors.

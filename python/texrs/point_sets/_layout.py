@@ -16,13 +16,14 @@ from texrs.point_sets._measures import Points, mark_inner, nearest_distances, sp
 __all__ = ["Fold", "PointLayout", "find_fold"]
 
 AROUND = 6
-"""Number of neighbours that determine how a layout continues. Fewer do not distinguish shifted rows from unshifted
-rows.
+"""Number of neighbours that are compared to find the lines of reflection.
+
+With fewer, shifted rows would look like unshifted rows.
 """
 FEWEST = 9
 """Minimum number of points that can determine a lattice."""
 MERGE = 0.6
-"""Distance in spacings below which two points are merged where a point set is folded."""
+"""Distance below which a point and a copy of another point are merged, in median distances to the nearest point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +33,9 @@ class Fold:
     Attributes
     ----------
     low, high : float
-        The two lines. The points between them determine all others. A periodic axis has the period ``high - low``.
+        The two lines. Points between them are repeated outside. A periodic axis has the period ``high - low``.
     wrap : bool
-        If True, the axis is periodic and not reflected.
+        True if the axis is periodic, False if it is reflected.
 
     """
 
@@ -45,7 +46,7 @@ class Fold:
     __repr__ = brief
 
     def apply(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the equivalent coordinates between the lines, and whether they are mirrored.
+        """Return the equivalent coordinates between the lines, and whether each is mirrored.
 
         Examples
         --------
@@ -63,11 +64,11 @@ class Fold:
     def copies(
         self, x: NDArray[np.float64], low: float, high: float
     ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the equivalents of each coordinate, the turns, and a mask.
+        """Return all copies of coordinates, the number of the turn of each copy, and a mask of the copies in a range.
 
-        The equivalents are (n, turns), and the mask marks those in [low, high].
+        The copies and the mask are (n, turns). The mask marks copies in [low, high].
 
-        Odd turns are mirrored if the axis is reflected.
+        If the axis is reflected, copies in odd turns are mirrored.
         """
         side = self.high - self.low
         turns = np.arange(math.floor((low - self.low) / side) - 1, math.floor((high - self.low) / side) + 2)
@@ -79,22 +80,22 @@ class Fold:
 def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
     """Find the two lines that reflect a layout along an axis so that it continues naturally.
 
-    Several positions around the outermost points are tried for each line. The best is the one where points near the
-    line have neighbours as far away as points inside. This position is on a point of a lattice row, or midway between
-    two points.
+    Several positions around the outermost points are tried for each line. The best position is where points near the
+    line have neighbours at the same distances as points inside. For a lattice, this line passes through a row of
+    points or midway between two rows.
 
     Parameters
     ----------
     points : (n, 2) array
         The layout.
     axis : int
-        Number of the axis.
+        Number of the axis: 0 for rows, 1 for columns.
     ends : (float, float)
         First and last coordinate of the image.
     wrap : bool
         If True, the image is periodic and its ends are the lines.
     beyond : bool
-        If True, lines may be beyond the ends of the image. This is useful for points alone, without pixels.
+        If True, lines may be outside the image. This is useful if the points have no pixels.
 
     """
     if wrap:
@@ -109,7 +110,7 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
         outermost, end = float(x.max()), sign * (ends[0] if sign < 0 else ends[1])
         steps = outermost + np.linspace(-0.2, 0.8, 21) * scale
         if not beyond:
-            # Try the last pixel as a line too: a reflection there loses no pixel.
+            # Try the last pixel as a line as well: a reflection there uses all pixels.
             steps = np.append(steps[steps <= end], end)
         costs = [_measure_misfit(points, axis, sign, float(at), scale, inner) for at in steps]
         lines.append(sign * float(steps[int(np.argmin(costs))]))
@@ -122,7 +123,7 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
 
 
 def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: float, inner: Points) -> float:
-    """Return the difference between the neighbours of points near a line and those of points inside."""
+    """Return how much the neighbour distances of points near a line differ from those of points inside."""
     x = sign * points[:, axis]
     kept = points[x <= line + 0.25 * scale]
     if len(kept) < 3:
@@ -145,7 +146,7 @@ def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLayout:
-    """Layout that continues without end.
+    """A layout of points that continues without end.
 
     Attributes
     ----------
@@ -154,7 +155,7 @@ class PointLayout:
     folds : (Fold, Fold)
         Continuation along rows and along columns.
     scale : float
-        Spacing of the points.
+        Spacing of the points, in pixels.
 
     """
 
@@ -166,14 +167,14 @@ class PointLayout:
 
     @classmethod
     def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> PointLayout:
-        """Return the layout of an image with its continuation."""
+        """Return the layout of an image with the best continuation along each axis."""
         folds = [find_fold(points, a, (0.0, shape[a] - 1.0), wrap=wrap[a], beyond=beyond) for a in range(2)]
         return cls(points, (folds[0], folds[1]), spacing(points))
 
     def within(self, low: Points, high: Points) -> tuple[Points, NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the points in a box, and the point that each repeats.
+        """Return the points and copies of points in a box, the index of the point each repeats, and where it is mirrored.
 
-        The latter is an index, with the axes along which the point is mirrored.
+        The last value, (n, 2), is True along the axes where the copy is mirrored.
         """
         along = [self.folds[a].copies(self.points[:, a], float(low[a]), float(high[a])) for a in range(2)]
         which, up, aside = np.nonzero(along[0][2][:, :, None] & along[1][2][:, None])
@@ -189,11 +190,11 @@ class PointLayout:
         return found[kept], which[kept], mirrored[kept]
 
     def cover(self, low: Points, high: Points) -> tuple[Points, str]:
-        """Return the points in a box, and how the layout continues there.
+        """Return the points in a box, continued on a lattice if there is one, and the name of the continuation.
 
-        It continues by "lattice", "wrap", "reflected", or "" (not at all).
+        The name is "lattice", "wrap", "reflected", or "" if no point in the box is a copy.
 
-        A lattice is continued as a lattice, because a reflection would turn an oblique one around.
+        A lattice is not reflected, because its mirror image would slant the other way.
 
         Examples
         --------
@@ -217,13 +218,13 @@ class PointLayout:
 
 
 def drop_duplicates(points: Points, turn: NDArray[np.intp], apart: float) -> NDArray[np.intp]:
-    """Return a mask of the points that have no earlier point of another turn within ``apart``."""
+    """Return the indices of the points without an earlier point of another turn within a distance of ``apart``."""
     from scipy.spatial import cKDTree
 
     dropped = np.zeros(len(points), bool)
     pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
     for first, second in sorted(map(tuple, np.sort(pairs, axis=1).tolist())):
-        # Points that are this close within one turn are so in the layout itself.
+        # Points of one turn that are this close are equally close in the layout itself, so keep both.
         if not dropped[first] and (turn[first] != turn[second]).any():
             dropped[second] = True
     return np.flatnonzero(~dropped)

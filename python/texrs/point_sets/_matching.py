@@ -12,29 +12,30 @@ from texrs.point_sets._measures import Points
 __all__ = ["match_points"]
 
 DENSE = 1 << 20
-"""Maximum number of pairs of a source and a target for which all pairs are considered."""
+"""Maximum number of pairs of a source and a target for which the cost of every pair is computed."""
 NEAR = 64
-"""Number of nearest sources that are considered for each target above this limit."""
+"""Number of nearest sources that are considered per target if there are more pairs."""
 TIE = 1e-9
-"""Additional cost of a source over the one before it, so that the first of equal sources is used."""
+"""Additional cost of each source over the previous one, so that the first of equally distant sources is used."""
 
 
 def match_points(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
     """Match each target with its own source at the minimum total squared distance (Eq. 4).
 
-    Distances are squared, because the best matching then has no crossings. The first of equal sources is used.
+    Distances are squared, because the best matching then has no crossings. The first of equally distant sources is
+    used.
 
     Returns
     -------
     of : (targets) int
-        Source of each target.
+        Index of the source of each target.
     cost : float
-        Mean squared distance.
+        Mean squared distance of a target from its source, in squared pixels.
 
     Raises
     ------
     InvalidInput
-        If there are fewer sources than targets.
+        There are fewer sources than targets.
 
     Examples
     --------
@@ -54,7 +55,7 @@ def match_points(source: Points, target: Points) -> tuple[NDArray[np.intp], floa
 
 
 def _assign(square: Points) -> NDArray[np.intp]:
-    """Match rows with columns. Every pair has a cost."""
+    """Return the column for each row of a cost matrix at the minimum total cost."""
     from scipy.optimize import linear_sum_assignment
 
     rows, columns = linear_sum_assignment(square + TIE * np.arange(square.shape[1]))
@@ -64,11 +65,11 @@ def _assign(square: Points) -> NDArray[np.intp]:
 
 
 def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
-    """Match many targets, each with one of the sources near it.
+    """Match many targets, considering only the nearest sources of each.
 
-    A matching is accepted if each of its pairs is in the nearer half of the considered ones. A better one would send a
-    target beyond the other half, which only pays if many other targets gain by it. Considering all pairs would need
-    memory quadratic and time cubic in their number.
+    A matching is accepted if each target gets a source from the nearer half of the considered ones. A better matching
+    would move a target to a source that was not considered. This only pays if many other targets gain by it.
+    Considering all pairs would need quadratic memory and cubic time.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import min_weight_full_bipartite_matching
@@ -77,7 +78,7 @@ def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
     tree, count = cKDTree(source), NEAR
     while count < len(source):
         far, near = tree.query(target, k=count)
-        # The sparse solver takes a zero cost for a missing pair.
+        # Add 1, because the sparse solver treats a zero cost as a missing pair.
         cost = 1 + far**2 + TIE * near
         pairs = csr_array(
             (cost.ravel(), near.ravel(), np.arange(len(target) + 1) * count), shape=(len(target), len(source))

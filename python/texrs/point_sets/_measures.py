@@ -1,4 +1,4 @@
-"""Distances between points, and the directions of their alignment."""
+"""Measure the spacing of points, and the directions of their rows."""
 
 from __future__ import annotations
 
@@ -13,21 +13,28 @@ __all__ = ["Points", "directions", "mark_inner", "nearest_distances", "spacing"]
 Points = NDArray[np.float64]
 
 NEIGHBOURS = 5
-"""Number k of neighbours of the scale normalisation. The paper uses 4 to 6."""
+"""Number k of nearest points for normalising the scale. The paper uses 4 to 6."""
 INSIDE = 0.5
-"""Minimum distance of an inner point from the outermost ones along every axis, in nearest-point distances."""
+"""Minimum distance of an inner point from the outermost points along every axis, in median distances to the nearest point.
+"""
 PEAK, CLEAR = 1.3, 6.0
-"""Minimum prominence of a direction: above the median direction, and in standard deviations of all directions."""
+"""Minimum strength of an accepted direction, relative to the median of all directions.
+
+Minimum difference from the median, in robust standard deviations.
+"""
 FINE, COARSE = 0.15, 0.8
-"""Widths in spacings of the Gaussians that draw the points. Lines are visible at the first width, outlines at both."""
+"""Standard deviations, in spacings, of the Gaussians that points are drawn with.
+
+Rows of points are visible with the first, the outline of all points with both.
+"""
 FEW = 4096
-"""Maximum number of pairs of points for which all distances are computed."""
+"""Maximum number of pairs for which all distances are computed directly."""
 WIDE_BINS = 64
-"""Additional bins at the ends for the wider Gaussians."""
+"""Number of empty bins at each end of a projection. The wider Gaussian extends into them."""
 
 
 def nearest_distances(points: Points, count: int, among: Points | None = None) -> Points:
-    """Return the distances to the ``count`` nearest points, (n, count), by default within ``points``."""
+    """Return the distances to the ``count`` nearest points, (n, count), among other points or in the same set."""
     from scipy.spatial import cKDTree
 
     own = among is None
@@ -43,7 +50,7 @@ def nearest_distances(points: Points, count: int, among: Points | None = None) -
 
 
 def spacing(points: Points, count: int = NEIGHBOURS) -> float:
-    """Return the median over inner points of the mean distance to the nearest points.
+    """Return the spacing of points: the median, over inner points, of the mean distance to their nearest points.
 
     Examples
     --------
@@ -60,18 +67,18 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
 
 
 def mark_inner(points: Points, far: Points) -> NDArray[np.bool_]:
-    """Return a mask of the points that are not outermost, or of all points if all are outermost."""
+    """Return a mask of the inner points. All points are marked if none is an inner point."""
     edge = INSIDE * float(np.median(far[:, 0]))
     found: NDArray[np.bool_] = ((points > points.min(axis=0) + edge) & (points < points.max(axis=0) - edge)).all(axis=1)
     return found if found.any() else ~found
 
 
 def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
-    """Return the directions of alignment of points, in degrees in [0, 180), strongest first.
+    """Return the directions of rows of points, in degrees in [0, 180), the strongest first.
 
-    Angles go from the axis of the columns to the axis of the rows. The method is a Radon transform of the points,
-    drawn as Gaussians of 0.15 spacings. It varies most where lines of points are seen end on [1]_. The result is empty
-    if no direction is prominent.
+    Angles are measured from the column axis towards the row axis. The method is a Radon transform of the points, drawn
+    as Gaussians of 0.15 spacings. Its variation is largest if the projection is along the rows [1]_. The result is
+    empty if no direction is prominent.
 
     References
     ----------
@@ -88,7 +95,7 @@ def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
     """
     scale = spacing(points)
     away = points - points.mean(axis=0)
-    # Use the points within a disc, because other outlines have directions of their own.
+    # Use only points within a disc, because the outline of another shape would add directions of its own.
     radius = np.hypot(*away.T)
     disc = away[radius <= max(float(np.abs(away).max(axis=0).min()), 2.5 * scale)]
     if len(disc) < 8:
@@ -102,7 +109,7 @@ def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
     fine, coarse = (
         s * (smooth(counts.astype(np.float64), (0, s / 0.05), mode="constant") ** 2).sum(axis=1) for s in (FINE, COARSE)
     )
-    # Compare with the outline of the whole: a cloud without lines varies equally at both widths.
+    # Divide by the variation at the coarse width, which only depends on the outline of all points.
     power = fine / coarse
     usual = float(np.median(power))
     spread = 1.4826 * float(np.median(np.abs(power - usual)))
