@@ -5,7 +5,8 @@ J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using defo
 
 1. Segment the exemplar into layers and child layers (section 3.2).
 
-2. Deform each child by translations, rotations, mirrors and scales that a logistic map chooses (section 3.3, Eq. 1 and 2).
+2. Deform each child by translations, rotations, mirrors and scales that a logistic map chooses (section 3.3, Eq. 1 and
+   2).
 
 3. Stitch the deformed layers by graph cut (section 3.4, Eq. 3) and mark the holes (Eq. 4).
 
@@ -17,60 +18,62 @@ J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using defo
 
 Departures from the paper, with their reasons:
 
-- The child layers are elements, not colour layers. A layer that moves as a whole tears the elements that its border
-  crosses.
+- The child layers are elements instead of colour layers, because a colour layer that moves as a whole tears the
+  elements that its border crosses.
 
-- The printed generator uses one number for the operation and for its extent. It therefore never enlarges and often
-  does nothing. Here each operation takes three values of the map. Each child has its own start, after a burn-in.
+- The printed generator uses one number for both the operation and its extent. It therefore never enlarges an element,
+  and often leaves it unchanged. Here each operation uses three values of the logistic map. Each child layer has its
+  own start of the map, after a burn-in.
 
-- An element that the border of the exemplar cuts only slides along that border. Elements do not overlap.
+- An element that the border of the exemplar cuts can only move along that border. Elements do not overlap.
 
-- The inside of an element is a hard constraint of each cut. A context band of its surroundings is offered with it.
-  Without these, the minimum cut removes an element that is wholly overlapped.
+- The inside of an element is a hard constraint of each cut. The pixels around the element, its context band, are
+  offered to the cut too. Without both, the minimum cut would remove an element that lies completely over known pixels.
 
-- Seams between patches of the large texture cost the squared difference, plus the depth inside the elements that meet
-  there. Seams therefore run between elements, and avoid edges that do not fit (see `texrs.quilting`).
+- A seam between patches of the large texture costs the squared colour difference, plus the depth inside the elements
+  that it crosses. Seams therefore run between elements, and avoid edges that do not match (see `texrs.quilting`).
 
-- Elements of one shape that are in a heap take each other's places. They are turned and scaled to the shape that they
-  fill. Most elements of a heap of leaves stay, because no background would remain if all moved. An element brings only
-  background along, not parts of its neighbours.
+- Elements of a heap exchange places with elements of similar shape. Each is turned and scaled to the shape of the
+  element that it replaces. If the heap consists of leaves, most elements stay in place, because no background would
+  remain if all moved. A moved element brings along only background from its surroundings, not parts of its neighbours.
 
-- Holes are filled with background only, if the example has enough of it. Otherwise, if another element took an
-  element's place in a heap, the uncovered rest of the old element stays. The inside of elements is never filled over,
-  because patches would tear it.
+- Holes are filled with background only, if the example has enough of it. Otherwise, if an element in a heap is
+  replaced and its successor does not cover all of it, the rest remains visible. Patches never replace the inside of
+  elements, because they would tear it.
 
-- If moved elements score clearly worse than elements in place, they stay, and only patches give variety. Both ways are
-  tried at a small size (see `texrs.metrics`). Elements in heaps of fruit can only be cut out roughly. There this
-  reduces the length of torn outlines to a third.
+- Both moving the elements and leaving them in place are tried at a small size and scored (see `texrs.metrics`). If
+  moving scores clearly worse, elements stay in place, and only the patches give variety. This reduces the length of
+  torn outlines to a third for heaps of fruit, whose elements can only be cut out roughly.
 
-- Images are not mirrored along an axis if the example differs from its mirror image. Reasons are light from one side
-  or hanging leaves. ``rotate=0`` states that the example has an upper side, and then mirroring is off.
-  ``allow_mirror`` overrides both. Examples with directions of their own (bark, brickwork) are not turned. On a
-  lattice, elements move only from one lattice position to another.
+- Images are not mirrored along an axis if the mirror image looks different from the example. Light from one side and
+  hanging leaves cause such a difference. ``rotate=0`` means that the example has an upper side, and disables
+  mirroring. ``allow_mirror`` overrides both rules. Elements of examples with a preferred direction (bark, brickwork)
+  are not turned. On a lattice, elements move only from one lattice position to another.
 
-- An example on a lattice is stretched and sheared by at most 15 %. A whole number of periods then fits a tileable
-  texture. Patches are shifted by whole periods only, so that bricks do not merge where the courses close. The report's
-  "lattice_stretch" contains the stretch.
+- An example on a lattice is stretched and sheared by at most 15 %, so that a whole number of periods fits a tileable
+  texture. Patches are shifted by whole periods only, so that bricks do not merge where the texture repeats. The
+  report's "lattice_stretch" contains the matrix of the stretch.
 
-- An example in courses that do not repeat, such as a wall of stones of all lengths, is levelled. Its courses are laid
-  on top of each other, as tall as the texture, several times, with courses of equal height exchanged. Patches move
-  freely along the courses and keep their place across them, so that all joints continue
+- An example in courses (rows of stones) that do not repeat is levelled. Several sheets as tall as the texture are
+  built from its courses, and courses of similar height are exchanged between the sheets. Patches of the sheets move
+  freely along the courses, but keep their position across the courses, so that all joints continue
   (`texrs.papers.design.course_sheets`). The report's "courses" describes the courses that were found.
 
-- A tileable texture (section 3.5) is stitched on the torus from the start. Patches are chosen to fit both sides of the
-  border. The paper instead folds a finished image whose patches were not chosen to fit there.
+- A tileable texture (section 3.5) is stitched on a torus from the start, so that patches match on both sides of the
+  border. The paper instead folds a finished image, whose patches were not chosen to match at the border.
 
-- Each of several exemplars is stitched into a texture of the full size. A map, or territories of smooth noise, choose
-  which texture is visible. A cut moves their borders to outlines, by at most the size of an element
-  (`texrs.papers.design.mixing`). Assigning patches to exemplars, as in the paper, gives rectangles and cannot follow a
-  map. Colours are not corrected where exemplars meet. With ``density``, elements of the other exemplars are scattered
-  over the first one (`texrs.papers.design.scattering`).
+- If there are several exemplars, each is stitched into a texture of the full size. A map, or territories of smooth
+  noise, select the texture that is visible at each pixel. A cut then moves the borders between textures to outlines of
+  elements, by at most the size of an element (`texrs.papers.design.mixing`). The paper assigns patches to exemplars,
+  which gives rectangles and cannot follow a map. Colours are not corrected where exemplars meet. With ``density``,
+  elements of the other exemplars are scattered over a texture of the first one (`texrs.papers.design.scattering`).
 
-- The colour correction restores the differences of the sources on both sides of a seam. The paper restores the
-  differences of the image itself. A weight on the values keeps the colours from drifting. The step along the outline
-  of an element is kept.
+- The colour correction restores the colour differences that the sources have on both sides of a seam. The paper
+  restores the differences of the stitched image itself. A weight on the original values prevents the colours from
+  drifting. The colour step along the outline of an element is kept.
 
-``method="paper"`` leaves out the departures (`texrs.papers.design.literal`), except for the torus and the squares.
+``method="paper"`` omits these departures (`texrs.papers.design.literal`), except for the torus and the squared seam
+cost.
 """
 
 from __future__ import annotations
@@ -115,13 +118,14 @@ def design(
     method: Method = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Design a large texture from one example.
+    """Synthesise a large texture from one example by moving its elements and stitching patches.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
         Example image, of any real dtype, at least 16 pixels a side. Several exemplars are mixed if they have the same
-        dtype and number of channels. A set of analysed elements, as for `splice`, contains its own elements.
+        dtype and number of channels. A `texrs.elements.ElementAnalysis`, as for `splice`, contains an image and its
+        elements.
     size : int or (rows, columns), optional
         Size of the result, in pixels, at least 16 a side. Default: twice the size of the exemplar.
     seed : int
@@ -130,14 +134,15 @@ def design(
     wrap : bool or (rows, columns), optional
         Axes along which the result repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Share of each exemplar, as one number each, 0 or more. Python also accepts a map of exemplar numbers or a map
-        of shares per pixel. Borders follow outlines, at most one element away from their place in a map. The total
-        shares are kept within 3 %. Default: equal shares.
+        Shares of the exemplars: one number for each, 0 or more. Python also accepts a map of exemplar numbers, or a
+        map of shares for each pixel. Borders follow the outlines of elements, at most one element away from their
+        position in a map. The shares of the whole result are correct within 3 %. Default: equal shares.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number, one for each
-        of these exemplars, or maps. Whole elements are scattered over a texture of the first exemplar. Elements of the
-        last exemplar are on top. Cannot be combined with ``weights``. The report's "density" contains the requested
-        and the reached densities, and the densities in the exemplars. Default: elements are not scattered.
+        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number for all of
+        these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
+        exemplar. Elements of the last exemplar are on top. Cannot be combined with ``weights``. The report's "density"
+        contains the requested and the reached densities, and the densities in the exemplars. Default: elements are not
+        scattered.
     elements : ElementOptions or ElementAnalysis
         Options that control how elements are found, or the result of `texrs.elements.analyse`, whose ``labels`` are
         used. Default: the default options.
@@ -146,23 +151,24 @@ def design(
     motion : {"auto", "move", "keep"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images between them. "auto" tries both at a small size and uses the
-        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses is
-        laid course by course unless elements move. Default: "auto".
+        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such
+        as a stone wall, is built course by course unless "move" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
         Side of the patches that fill holes, in pixels, from 4 to the exemplar's shorter side. Default: 1/6 of the
-        shorter side, but 12 to 32.
+        shorter side, but at least 12 and at most 32.
     screening : float, optional
         Weight of the original values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller
-        weight spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in
-        the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
+        weight spreads the correction farther from the seams. If None or 0, colours are not corrected. `texrs.blend`
+        corrects other maps in the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
     method : {None, "paper"}
-        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired, for comparison. The
-        printed generator moves whole colour layers, once each or ``operations`` times. They are stitched at the plain
-        cost, holes take the best match, and colours are corrected without a weight on the values. The ``segmentation``
-        of elements has no effect then, nor have ``translate``, ``rotate`` and ``mirror`` of their deformation, nor the
-        amount of ``screening``. Default: the algorithm with departures from the paper.
+        Algorithm to use. "paper" is the algorithm as printed, for comparison, with only its misprints repaired. It
+        moves whole colour layers, once each or ``operations`` times. It stitches them at the cost of the paper, fills
+        holes with the best match, and corrects colours without a weight on the original values. It ignores
+        ``segmentation`` in ``elements``, and ``translate``, ``rotate`` and ``allow_mirror`` in ``deformation``.
+        ``screening`` only switches its colour correction on, or off if 0. Default: the algorithm with departures from
+        the paper.
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
         the work stops. True shows a progress bar. Default: none.
@@ -175,38 +181,42 @@ def design(
 
         Stages:
 
-        - ``segmentation``: The first example, each element in a colour.
+        - ``segmentation``: The first example, with each element in a different colour.
         - ``deformed``: The moved elements of the first copy.
-        - ``holes``: Pixels of this copy that no element covers.
-        - ``completed``: This copy with filled holes.
-        - ``before_blending``: The texture before colours are corrected.
+        - ``holes``: Pixels of this copy that neither elements nor background cover.
+        - ``completed``: This copy after its holes are filled.
+        - ``before_blending``: The texture before its colours are corrected.
 
         Report:
 
         - ``method``: "default" or "paper".
-        - ``seed``: The seed.
+        - ``seed``: The seed of this texture.
         - ``size``: (rows, columns).
         - ``wrap``: Whether the texture repeats along (rows, columns).
-        - ``elements``: Number of elements that were found in all examples.
-        - ``segmentation``: Kind of elements of the first example: "components", "grid" or "none".
-        - ``reason``: Why this kind was chosen, one sentence.
-        - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses".
+        - ``elements``: Total number of elements that were found in the examples.
+        - ``segmentation``: Kind of elements of the first example: "components" (separate elements), "labels" (given as
+          labels), "grid" (cells) or "none".
+        - ``reason``: Reason for this kind, as one sentence.
+        - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses". A "heap" has
+          similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
         - ``motion``: For each example: "move" or "keep".
-        - ``candidates``: For each example, the figures of either motion, or None if it was given. They are ``score`` (0 is
-          best), ``torn``, ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
-        - ``courses``: For each example, the courses that it was laid in, or None.
-        - ``lattice_stretch``: For each example, the (2, 2) matrix that made its lattice fit the size, or None.
-        - ``rotate``: Largest rotation that was used, in degrees.
+        - ``candidates``: For each example, the scores of each motion that was tried, or None without a trial. The
+          scores are ``score`` (0 is best), ``torn``, ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of
+          `texrs.metrics.evaluate`.
+        - ``courses``: For each example, the courses that the texture is built from, or None.
+        - ``lattice_stretch``: For each example, the (2, 2) matrix that stretches its lattice to fit the size, or None.
+        - ``rotate``: Largest permitted rotation of elements of the first example, in degrees.
         - ``pixel_counts``: Number of pixels from each example.
-        - ``density``: For each scattered example, its density as ``asked``, ``reached`` and in the example (``own``), and the
-          number of ``elements``; else None.
-        - ``holes``: For each copy, the share of its pixels that were filled.
-        - ``screening``: Weight of the values in the colour correction.
-        - ``seams``: Visibility of the seams ``before`` and ``after`` the correction: number of ``edges``, ``mean`` (1 is that
-          of the example) and share of ``outliers``.
-        - ``operations``: For each copy, the operations on each element. An entry names the ``element``, its ``operations``
-          and its ``place``.
-        - ``tiling``: Result of `texrs.check_tiling` along each axis that wraps: ``tiles``, ``seam`` and ``place``.
+        - ``density``: For each scattered example, its densities (0 to 1) as ``asked``, as ``reached`` and in the
+          example (``own``), and the number of ``elements``. None without ``density``.
+        - ``holes``: For each copy, the share of its pixels that were filled, 0 to 1.
+        - ``screening``: Weight of the original values in the colour correction.
+        - ``seams``: Visibility of the seams ``before`` and ``after`` the correction. It consists of the number of
+          ``edges`` (pairs of pixels), the ``mean`` difference (1 is the mean of the example) and the share of
+          ``outliers``.
+        - ``operations``: For each copy, the operations on each element. An entry contains the ``element``, its
+          ``operations`` and, if the element replaces another one, the translation to its ``place`` in pixels.
+        - ``tiling``: Result of `texrs.check_tiling` for each axis that wraps: ``tiles``, ``seam`` and ``place``.
 
     Raises
     ------
@@ -217,14 +227,14 @@ def design(
 
     See Also
     --------
-    design_variants : Many different textures of one example, which is analysed once.
+    design_variants : Generate many different textures of one example, which is analysed only once.
 
     Notes
     -----
     Each pixel of the result needs 18 bytes, or 14 bytes plus twice the bytes of a pixel of the image if this is more.
-    Another 0.5 GB are needed in any case: 5.9 GB for 16384 x 16384 pixels of 8-bit RGB. ``method="paper"`` needs 24
-    more bytes per pixel. Several exemplars need 100 more and 75 for each exemplar, and a map of ``weights`` needs 8
-    for each exemplar.
+    Another 0.5 GB are always needed, so that 16384 x 16384 pixels of 8-bit RGB need 5.9 GB. ``method="paper"`` needs
+    24 more bytes per pixel. Several exemplars need 100 more bytes per pixel, plus 75 for each exemplar. A map of
+    ``weights`` needs another 8 for each exemplar.
 
     References
     ----------
@@ -288,16 +298,17 @@ def design_variants(
     method: Method = None,
     progress: Progress | bool | None = None,
 ) -> Iterator[Synthesis]:
-    """Design several different textures from one example, which is analysed once.
+    """Synthesise several different textures from one example, which is analysed only once.
 
-    The arguments are checked at once. Each texture is generated on request, so that finished textures are available if
-    the work stops. Each equals the result of `design` with its seed.
+    The arguments are checked when the function is called. Each texture is computed when the iterator reaches it, so
+    that finished textures are available if the work stops. It equals the result of `design` with its seed.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
         Example image, of any real dtype, at least 16 pixels a side. Several exemplars are mixed if they have the same
-        dtype and number of channels. A set of analysed elements, as for `splice`, contains its own elements.
+        dtype and number of channels. A `texrs.elements.ElementAnalysis`, as for `splice`, contains an image and its
+        elements.
     count : int
         Number of textures, 1 to 4096.
     size : int or (rows, columns), optional
@@ -307,14 +318,15 @@ def design_variants(
     wrap : bool or (rows, columns), optional
         Axes along which each texture repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Share of each exemplar, as one number each, 0 or more. Python also accepts a map of exemplar numbers or a map
-        of shares per pixel. Borders follow outlines, at most one element away from their place in a map. The total
-        shares are kept within 3 %. Default: equal shares.
+        Shares of the exemplars: one number for each, 0 or more. Python also accepts a map of exemplar numbers, or a
+        map of shares for each pixel. Borders follow the outlines of elements, at most one element away from their
+        position in a map. The shares of the whole result are correct within 3 %. Default: equal shares.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number, one for each
-        of these exemplars, or maps. Whole elements are scattered over a texture of the first exemplar. Elements of the
-        last exemplar are on top. Cannot be combined with ``weights``. The report's "density" contains the requested
-        and the reached densities, and the densities in the exemplars. Default: elements are not scattered.
+        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number for all of
+        these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
+        exemplar. Elements of the last exemplar are on top. Cannot be combined with ``weights``. The report's "density"
+        contains the requested and the reached densities, and the densities in the exemplars. Default: elements are not
+        scattered.
     elements : ElementOptions or ElementAnalysis
         Options that control how elements are found, or the result of `texrs.elements.analyse`, whose ``labels`` are
         used. Default: the default options.
@@ -323,23 +335,24 @@ def design_variants(
     motion : {"auto", "move", "keep"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images between them. "auto" tries both at a small size and uses the
-        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses is
-        laid course by course unless elements move. Default: "auto".
+        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such
+        as a stone wall, is built course by course unless "move" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
         Side of the patches that fill holes, in pixels, from 4 to the exemplar's shorter side. Default: 1/6 of the
-        shorter side, but 12 to 32.
+        shorter side, but at least 12 and at most 32.
     screening : float, optional
         Weight of the original values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller
-        weight spreads the correction wider. None or 0: colours are not corrected. `texrs.blend` corrects other maps in
-        the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
+        weight spreads the correction farther from the seams. If None or 0, colours are not corrected. `texrs.blend`
+        corrects other maps in the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
     method : {None, "paper"}
-        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired, for comparison. The
-        printed generator moves whole colour layers, once each or ``operations`` times. They are stitched at the plain
-        cost, holes take the best match, and colours are corrected without a weight on the values. The ``segmentation``
-        of elements has no effect then, nor have ``translate``, ``rotate`` and ``mirror`` of their deformation, nor the
-        amount of ``screening``. Default: the algorithm with the departures of `design`.
+        Algorithm to use. "paper" is the algorithm as printed, for comparison, with only its misprints repaired. It
+        moves whole colour layers, once each or ``operations`` times. It stitches them at the cost of the paper, fills
+        holes with the best match, and corrects colours without a weight on the original values. It ignores
+        ``segmentation`` in ``elements``, and ``translate``, ``rotate`` and ``allow_mirror`` in ``deformation``.
+        ``screening`` only switches its colour correction on, or off if 0. Default: the algorithm with the departures
+        of `design`.
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
         the work stops. True shows a progress bar. Default: none.
@@ -347,7 +360,7 @@ def design_variants(
     Returns
     -------
     iterator of Synthesis
-        One result per seed, as of `design`.
+        One result for each seed, with the same attributes as the result of `design`.
 
     Raises
     ------
@@ -397,7 +410,7 @@ def make_textures(arguments: Arguments) -> Iterator[Synthesis]:
 
 
 def segment(arguments: Arguments) -> list[Plan]:
-    """Segment each exemplar, and decide how its elements may move (step 1)."""
+    """Segment each exemplar, and decide how its elements can move (step 1)."""
     plans: list[Plan] = []
     # The printed algorithm moves whole layers, so elements are not segmented.
     elements = replace(arguments.elements, segmentation="none") if arguments.literal else arguments.elements

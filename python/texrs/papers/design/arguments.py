@@ -41,9 +41,9 @@ Method: TypeAlias = Literal["paper"] | None
 Choice: TypeAlias = Literal["auto", "move", "keep"]
 
 MINIMUM_SIDE = 16
-"""Shortest side of an exemplar, in pixels. A shorter side is too small for a texture."""
+"""Minimum side of an exemplar, in pixels. A smaller image is too small for a texture."""
 LARGER = "texrs.CornerTiles creates an unbounded design in parts"
-"""Hint for errors about size: the way to synthesise larger textures."""
+"""Remedy in error messages about a size that exceeds a limit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ class Arguments:
 
     exemplars: list[Exemplar]
     guides: list[Exemplar]
-    """The same exemplars on one scale of values. Decisions are based on these."""
+    """The same exemplars on one common scale of values, which is used for all decisions of the algorithm."""
     size: tuple[int, int]
     seeds: list[int]
     wrap: tuple[bool, bool]
@@ -111,7 +111,7 @@ def check_arguments(
     sides = size if size is not None else [2 * n for n in exemplars[0].shape]
     rows, columns = as_size(sides, minimum=MINIMUM_SIDE, way=LARGER)
     first, cyclic = as_seed(seed), as_wrap(wrap, usual=True)
-    # These depend on the size of the result.
+    # Check the shares after the size, because a map of shares must have the size of the result.
     shares = as_shares(weights, len(exemplars), (rows, columns))
     as_method(method, None, "paper")
     if density is not None and (weights is not None or method is not None):
@@ -137,15 +137,15 @@ def check_arguments(
         method == "paper",
         progress or (lambda stage, share: None),
     )
-    # Compare the memory of the work with the limit before it begins.
+    # Check that the required memory is available before the work begins.
     check_work("design", [e.pixels for e in exemplars], (rows, columns), way=LARGER, method=method)
     return arguments
 
 
 def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], elements: Any) -> Any:
-    """Return how elements are found, with the labels of the analysed exemplars.
+    """Return the element options, with the labels of those exemplars that are element analyses.
 
-    If ``elements`` is set explicitly, it overrides the labels of the analysed exemplars.
+    If ``elements`` is set explicitly, it overrides the labels of the element analyses.
     """
     if isinstance(elements, ElementAnalysis):
         shapes = [e.shape for e in exemplars]
@@ -163,7 +163,10 @@ def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], element
 
 
 def part_at_borders(entry: ElementAnalysis) -> NDArray[np.integer[Any]]:
-    """Return the labels of analysed elements, split at periodic borders. Elements move within the exemplar only."""
+    """Return the labels of analysed elements, where elements that cross a periodic border are split.
+
+    Elements move within the exemplar only.
+    """
     from scipy.ndimage import label
 
     if not any(entry.wrap):
@@ -173,7 +176,7 @@ def part_at_borders(entry: ElementAnalysis) -> NDArray[np.integer[Any]]:
 
 
 def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:
-    """Check that the exemplars can be mixed."""
+    """Check that the exemplars can be mixed, and that labels are given for all exemplars or none."""
     if not exemplars:
         raise InvalidInput("exemplar: must be at least one, got none")
     kinds = [(e.pixels.dtype.name, e.pixels.shape[-1]) for e in exemplars]
@@ -186,7 +189,10 @@ def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:
 
 
 def scale_together(exemplars: list[Exemplar]) -> list[Exemplar]:
-    """Return exemplars scaled to [0, 1] together; integers are unchanged, because their dtype sets the scale."""
+    """Return float exemplars scaled to [0, 1] by one common scale.
+
+    Integers are unchanged, because their dtype sets the scale.
+    """
     if len(exemplars) == 1 or exemplars[0].pixels.dtype.kind != "f":
         return exemplars
     pixels = [e.pixels for e in exemplars]
@@ -196,7 +202,7 @@ def scale_together(exemplars: list[Exemplar]) -> list[Exemplar]:
 
 
 def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.float64]:
-    """Check the shares of the exemplars: (count,) for the whole, or (rows, columns, count) over the texture."""
+    """Return the checked shares of the exemplars: (count,) for the whole texture, or (rows, columns, count)."""
     if weights is None:
         return np.full(count, 1 / count)
     array = try_array(weights, np.float64)
@@ -218,7 +224,7 @@ def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.
 
 
 def as_density(density: object, count: int, size: tuple[int, ...]) -> NDArray[np.float64]:
-    """Check the densities of all exemplars but the first: (count - 1,), or (rows, columns, count - 1) over the texture."""
+    """Return the checked densities of the exemplars after the first: (count - 1,) or (rows, columns, count - 1)."""
     if count < 2:
         raise InvalidInput(
             "density: must have at least two exemplars, because elements of the others are scattered over the first; got one"

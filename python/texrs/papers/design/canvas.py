@@ -1,4 +1,4 @@
-"""Canvas that deformed elements are stitched on by graph cut: section 3.4, Eq. 3 and 4 of `texrs.papers.design`."""
+"""Canvas where deformed elements are stitched by graph cut: section 3.4, Eq. 3 and 4 of `texrs.papers.design`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from texrs.source_map import SourceMap
 __all__ = ["Canvas", "Draft", "Tile"]
 
 AGREEMENT = 0.6
-"""Largest mean difference between the surroundings of an element and those of its new place, in standard deviations."""
+"""Maximum mean difference between an element's context band and the pixels below it, in standard deviations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class Draft:
     label: NDArray[np.uint32]
     covered: Bools
     frames: list[NDArray[np.float64]]
-    """The Jacobian matrix of each label."""
+    """Jacobian matrix of each label, which maps steps in the tile to steps in the exemplar."""
     mirror: Flip
     """Mirror image of the exemplar that the tile is built from."""
     log: list[dict[str, Any]]
@@ -45,7 +45,7 @@ class Tile:
     source: SourceMap
     colours: Floats
     holes: float
-    """Share of the tile that was open, 0 to 1."""
+    """Share of the tile that was holes before they were filled, 0 to 1."""
     mirror: Flip
     """Mirror image of the exemplar that the tile is built from."""
     log: list[dict[str, Any]]
@@ -55,16 +55,16 @@ class Tile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Canvas(Draft):
-    """A draft in progress, and the places of the elements on it."""
+    """A draft in progress, with the pixels that its elements occupy."""
 
     hard: Bools
-    """Hard constraints: pixels that certainly belong to placed elements."""
+    """Hard constraints of later cuts: pixels deep inside of placed elements."""
     occupied: Labels
-    """Label of the element that occupies each pixel; other elements keep out."""
+    """Label of the element that occupies each pixel, or 0. Other elements must not cover it."""
 
     @classmethod
     def start(cls, picture: Floats, mirror: Flip, covered: Bools, hard: Bools, occupied: Labels) -> Canvas:
-        """Start from the covered pixels of an image, which is one of the mirror images of the exemplar."""
+        """Return a canvas with the covered pixels of an image, which is one of the mirror images of the exemplar."""
         own, log = SourceMap.identity(covered.shape), [{"element": 0, "mirror": list(mirror)}]
         return cls(picture.copy(), own.coordinates, own.label, covered, [np.eye(2)], mirror, log, hard, occupied)
 
@@ -72,20 +72,20 @@ class Canvas(Draft):
     def start_on_background(
         cls, picture: Floats, mirror: Flip, labels: Labels, still: frozenset[int], free: bool
     ) -> Canvas:
-        """Start from the background: all pixels except the moving elements and a border of one pixel around them."""
+        """Return a canvas with the image, except for its moving elements and a border of one pixel around them."""
         from scipy.ndimage import binary_dilation, binary_erosion
 
         rest = np.isin(labels, sorted(still))
         covered: Bools = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
         hard: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(INNER), border_value=1)
-        # If elements are apart, an element keeps out of the places of others that may still move. Each element can
-        # then stay in its own place.
+        # If elements are separate, elements that have not moved yet also occupy their pixels. Each element can then
+        # stay in its own place.
         occupied = labels.copy() if free else np.where(hard, labels, 0)
         return cls.start(picture, mirror, covered, hard, occupied)
 
     @classmethod
     def start_on_picture(cls, picture: Floats, mirror: Flip) -> Canvas:
-        """Start from the whole image, which any element may cover."""
+        """Return a canvas with the whole image, which elements can cover anywhere."""
         everywhere = np.ones(picture.shape[:2], bool)
         return cls.start(picture, mirror, everywhere, ~everywhere, np.zeros(picture.shape[:2], np.int32))
 
@@ -99,7 +99,7 @@ class Canvas(Draft):
         return bool(difference < AGREEMENT * picture.std(axis=(0, 1)).mean())
 
     def open_remains(self, labels: Labels, element: Element, label: int) -> None:
-        """Open the visible rest of an element whose place another one took, except for borders one pixel wide."""
+        """Mark the visible rest of a replaced element as a hole, except for borders one pixel wide."""
         from scipy.ndimage import binary_opening
 
         low = np.maximum(element.origin.astype(int), 0)
@@ -109,9 +109,9 @@ class Canvas(Draft):
         self.covered[window] &= ~binary_opening(left, np.ones((2, 2), bool))
 
     def stitch(self, picture: Floats, labels: Labels, placement: Placement, element: int) -> None:
-        """Cut an element and its context band into the canvas (Eq. 3)."""
+        """Stitch an element and its context band into the canvas along a minimum cut (Eq. 3)."""
         window, hard = placement.window, placement.hard
-        # Only background comes along from the surroundings, because parts of other elements would look torn.
+        # Offer only background from the surroundings, because parts of other elements would look torn.
         ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
         offered = ((placement.distance > -1) | ((placement.distance > -CONTEXT) & ground)) & placement.inside
         colours = gather(picture, placement.coordinates, interpolation="cubic")
@@ -119,8 +119,8 @@ class Canvas(Draft):
         taken = offered
         if (offered & known).any():
             old_hard = self.hard[window] & known & ~hard
-            # Costs divided by the local gradient would lead the seam along strong edges, where the rest of them stays
-            # visible.
+            # Do not divide costs by the local gradient. Seams would follow strong edges, and leave parts of these
+            # edges visible.
             seam = cut(self.colours[window], colours, known, offered, core_a=old_hard, core_b=hard, cost="paper")
             taken = seam.mask & offered
         self.colours[window][taken] = colours[taken]

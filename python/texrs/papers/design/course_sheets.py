@@ -1,7 +1,8 @@
-"""Lay an exemplar in courses again, course by course, as tall as the texture. The results are called sheets.
+"""Build sheets as tall as the texture from the courses of an exemplar, such as the rows of a stone wall.
 
-A departure from the paper, which does not treat walls. All sheets of a texture have their joints at the same places.
-Patches keep their places across the courses and are free along them, so their joints always meet.
+This is a departure from the paper, which does not treat walls. All sheets of a texture have the joints between courses
+at the same positions. Patches of the sheets keep their position across the courses and move freely along the courses,
+so that these joints always meet.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from texrs.source_map import SourceMap
 __all__ = ["lay_sheets", "measure_stones"]
 
 TRIES = 64
-"""Number of orders of courses that are drawn for a periodic texture. The order that must be stretched least is taken.
+"""Number of random orders of the courses that are tried for a periodic texture.
+
+The order that needs the least stretch is used.
 """
 ALIKE = 0.16
 """Largest relative difference in height of two courses that may replace each other."""
@@ -37,7 +40,7 @@ def lay_sheets(
     mirror: bool,
     seed: int,
 ) -> list[SourceMap]:
-    """Lay the courses of an exemplar on top of each other, in several ways.
+    """Build several sheets from the courses of an exemplar, each with another selection of courses.
 
     Parameters
     ----------
@@ -48,7 +51,8 @@ def lay_sheets(
     size : int
         Size of the texture across the courses, in pixels.
     beyond : int
-        Additional pixels of sheets beyond ``size``. If the texture wraps, they repeat the beginning there.
+        Number of additional pixels of a sheet across the courses, beyond ``size``. If the texture wraps, they repeat
+        the beginning of the sheet.
     count : int
         Number of sheets.
     wrap : bool
@@ -61,13 +65,13 @@ def lay_sheets(
     Returns
     -------
     list of SourceMap
-        Source maps into the levelled exemplar, as long as it along the courses.
+        Source maps of the sheets. They refer to the levelled exemplar, and have its length along the courses.
 
     """
     axis = courses.axis
     order = order_courses(courses.heights, size, wrap, seed)
     heights = courses.heights[order]
-    # A texture that does not wrap begins at a random height of its first course.
+    # A texture that does not wrap begins at a random height within its first course.
     ends = np.concatenate([[0.0], np.cumsum(heights * (size / heights.sum() if wrap else 1.0))])
     # Find for each row of the texture its course, and its relative height within this course.
     rows = np.arange(size + beyond) + 0.5
@@ -77,7 +81,7 @@ def lay_sheets(
     length = shape[1 - axis]
     sheets = []
     for sheet in range(count):
-        # Each sheet shows other courses at the same heights.
+        # Each sheet has other courses between the same joints.
         taken = exchange_courses(courses.heights, order, sheet, seed)
         across = np.array(courses.joints)[taken[laid]] + share * courses.heights[taken[laid]]
         along = np.arange(length, dtype=np.float64)
@@ -94,10 +98,10 @@ def lay_sheets(
 
 
 def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int) -> NDArray[np.intp]:
-    """Return the order of courses: as in the exemplar, and from its end on at a random course."""
+    """Return course numbers that fill a size: in the exemplar's order, and after its end from a random course on."""
     found: list[tuple[float, list[int]]] = []
     for attempt in range(TRIES if wrap else 1):
-        # A texture that begins within a course needs one more.
+        # A texture that begins within a course needs one more course.
         order: list[int] = []
         missing = size if wrap else size + heights.max() + 1
         at = int(uniform(seed, attempt, 0, 0, 7) * len(heights))
@@ -114,7 +118,7 @@ def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int
 def exchange_courses(
     heights: NDArray[np.float64], order: Sequence[int] | NDArray[np.intp], sheet: int, seed: int
 ) -> NDArray[np.intp]:
-    """Return the courses of a sheet: each is replaced by one of equal height, and equal ones are not adjacent."""
+    """Return the courses of a sheet, each replaced by one of similar height that differs from the course before."""
     taken: list[int] = []
     for place, own in enumerate(order):
         alike = np.flatnonzero(np.abs(np.log(heights / heights[own])) <= ALIKE).tolist()
@@ -126,9 +130,9 @@ def exchange_courses(
 
 
 def measure_stones(courses: Courses, level: Floats, reach: float) -> Floats:
-    """Return the depth of each pixel of a level exemplar inside a stone: 0 at joints, 1 from ``reach`` pixels on.
+    """Return how deep each pixel of a levelled exemplar is inside a stone: 0 at joints, 1 from ``reach`` pixels on.
 
-    Joints along a course are found by the colour of the joints between courses.
+    Joints within a course are detected by the mean colour of the joints between courses.
     """
     from scipy.ndimage import distance_transform_edt
 

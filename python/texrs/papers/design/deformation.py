@@ -1,7 +1,7 @@
 """Deform elements and stitch them over the background: sections 3.3 and 3.4 of `texrs.papers.design`.
 
-Elements that are apart move, and leave holes. A heap, a lattice and a grid of cells are full. There an element is cut
-into the image at the place of another one. Most elements of a heap of leaves stay: no two shapes are equal, and no
+Separate elements move, and leave holes. Heaps, lattices and grids of cells do not have free background, so an element
+can only replace another one. Most elements of a heap of leaves stay in place, because no two shapes are equal, and no
 background would remain if all moved.
 """
 
@@ -26,18 +26,18 @@ from texrs.papers.design.plan import Plan
 __all__ = ["classify", "deform_elements"]
 
 DENSE, RAGGED = 0.42, 0.825
-"""Share of the image above which elements form a heap, and the solidity below which they are leaves.
+"""Share of the image above which elements form a heap, and solidity (area / convex hull) below which they are leaves.
 
-Leaves and flowers rarely have the shape of another element, so they move as if they were apart.
+Leaves and flowers rarely have the shape of another element, so they move like separate elements.
 """
 MOVED, MOVED_RAGGED = 0.7, 0.12
-"""Share of the elements whose place others may take, and share of a heap of leaves that moves."""
+"""Share of the elements of a heap or lattice that can be replaced, and share of a heap of leaves that moves."""
 
 Arrangement: TypeAlias = Literal["apart", "layers", "leaves", "heap", "full"]
 
 
 def classify(parts: Segmentation) -> Arrangement:
-    """Return the arrangement: apart, full, a heap of elements of one shape, a heap of leaves, or whole layers."""
+    """Return the arrangement: separate, full (lattice or cells), heap of similar shapes, heap of leaves, or layers."""
     if parts.lattice is not None or parts.kind == "grid":
         return "full"
     if parts.kind == "none":
@@ -48,7 +48,7 @@ def classify(parts: Segmentation) -> Arrangement:
 
 
 def choose_resting(arrangement: Arrangement, count: int, seed: int, tile: int) -> frozenset[int]:
-    """Choose the elements that stay in place."""
+    """Return the labels of the elements that stay in place, chosen at random."""
     share = {"apart": 1.0, "layers": 1.0, "leaves": MOVED_RAGGED, "heap": MOVED, "full": MOVED}[arrangement]
     return frozenset(e for e in range(1, count + 1) if uniform(seed, tile, e, 0, 4) >= share)
 
@@ -66,13 +66,13 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
     Returns
     -------
     Draft
-        The tile, with holes where no element and no background is.
+        The tile, with holes where neither an element nor background is.
 
     """
     if plan.still:
         return rest(plan, tile)
     parts = plan.parts
-    # The background takes one of the mirror images, and the elements are cut out of the mirrored image.
+    # Choose a mirror image of the exemplar. Both the background and the elements are copied from it.
     mirror = plan.mirrors[int(uniform(seed, tile, 0, 0, 1) * len(plan.mirrors))]
     picture, labels, moves = flip(plan.guide, mirror), flip(parts.elements, mirror), plan.moves.mirror(mirror)
     elements, arrangement = measure_elements(labels), classify(parts)
@@ -102,14 +102,15 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
         canvas.log.append(describe(mover, operations, full=full))
         if operations or not full:
             canvas.stitch(picture, labels, placement, mover.label)
-        # Open the rest of the replaced element, because parts of other elements next to it would tear it again.
+        # Open the uncovered rest of the replaced element, if holes are filled with background only. Patches with parts
+        # of other elements would tear it again.
         if heap is not None and plan.pure:
             canvas.open_remains(labels, element, len(canvas.frames) - 1)
     return canvas
 
 
 def rest(plan: Plan, tile: int) -> Draft:
-    """Return the unchanged exemplar, in each of its mirror images in turn."""
+    """Return a tile with the unchanged exemplar. Successive tiles use its permitted mirror images in turn."""
     mirror = plan.mirrors[tile % len(plan.mirrors)]
     return Canvas.start_on_picture(flip(plan.guide, mirror), mirror)
 

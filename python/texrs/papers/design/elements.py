@@ -17,18 +17,21 @@ from texrs.papers.design.operations import TRIES, Moves, Operation, compose
 __all__ = ["CONTEXT", "INNER", "Element", "Placement", "fit", "measure_elements", "place"]
 
 CONTEXT = 6.0
-"""Width of the context band, in pixels: the surroundings that are offered to the cut with an element."""
+"""Width in pixels of the context band: the pixels around an element that are offered to the cut with it."""
 INNER = 3.0
 """Depth in pixels beyond which the inside of an element is a hard constraint of the cut."""
 
 
 GOOD, BAD = 0.03, 0.12
-"""Collision score up to which a placement is accepted at once, and above which it is refused."""
+"""Collision score up to which a placement is accepted immediately, and score above which it is rejected.
+
+The score is the share of the element that overlaps other elements or is outside the canvas.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Element:
-    """A child layer, ready to be moved."""
+    """An element of the exemplar, with the measures that are needed to move it."""
 
     label: int
     area: int
@@ -43,13 +46,14 @@ class Element:
     It is smaller in a thin element, which would have no constraint otherwise.
     """
     axes: NDArray[np.float64]
-    """Standard deviations along the longest axis and across it in pixels, and the angle of that axis in degrees,
-    counter-clockwise.
+    """(3,): standard deviation of its pixels along and across its longest axis, and angle of this axis.
+
+    The deviations are in pixels, the angle is in degrees, counter-clockwise.
     """
 
 
 def measure_elements(labels: Labels) -> list[Element]:
-    """Measure the elements, and sort them: first those that the border cuts, then by descending area."""
+    """Return the measured elements: elements that the border cuts first, then by descending area."""
     from scipy.ndimage import find_objects
 
     height, width = labels.shape
@@ -92,7 +96,10 @@ def sum_up(labels: Labels) -> list[list[int]]:
 
 
 def find_axes(count: int, row: int, column: int, rows: int, both: int, columns: int) -> tuple[float, float, float]:
-    """Return the standard deviations of pixels with these sums along and across the longest axis, and its angle."""
+    """Return the deviations of an element along and across its longest axis, and the angle of the axis, from its sums.
+
+    The arguments are the sums of `sum_up`. The deviations are in pixels, and the angle is in degrees.
+    """
     area = count * count
     down, aslant, across = (count * rows - row * row, count * both - row * column, count * columns - column * column)
     a, b, c = down / area + 1 / 12, aslant / area, across / area + 1 / 12
@@ -101,7 +108,7 @@ def find_axes(count: int, row: int, column: int, rows: int, both: int, columns: 
 
 
 def reach_beyond(rows: slice, columns: slice, pad: int) -> Floats:
-    """Return inner distances of an element that covers the whole image, to a corner beyond its window."""
+    """Return inner distances of an element that covers the image and has no outline: distances to its box's corner."""
     shape = (rows.stop - rows.start + 2 * pad, columns.stop - columns.start + 2 * pad)
     row, column = np.indices(shape)
     distance: Floats = np.sqrt((row + 1) ** 2 + column**2).astype(np.float32)
@@ -110,7 +117,7 @@ def reach_beyond(rows: slice, columns: slice, pad: int) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """An element under an affine map, over the part of the canvas that it may cover."""
+    """A moved element, on the window of the canvas that it can cover."""
 
     window: tuple[slice, slice]
     coordinates: Floats
@@ -127,7 +134,7 @@ class Placement:
 
 
 def place(element: Element, operations: Sequence[Operation], shape: tuple[int, int]) -> Placement | None:
-    """Move an element about its centroid; return None if it leaves the canvas."""
+    """Apply operations to an element about its centroid. Return None if the element leaves the canvas."""
     matrix, shift = compose(operations)
     moved = move_shape(
         element.distance, element.origin.tolist(), element.centre.tolist(), matrix, shift, shape, element.depth
@@ -149,8 +156,8 @@ def fit(
 ) -> tuple[list[Operation], Placement] | None:
     """Draw operations until the element does not collide with others and ``suits`` accepts its new place.
 
-    Later draws move the element less. The first good placement is taken, else the best one, which may be the original
-    place. The result is None if even the best one collides.
+    Each further attempt moves the element less. The first placement with a good collision score is returned, or else
+    the best placement, which can be the original place. The result is None if even the best placement collides.
     """
     values = moves.draw_values(seed, tile, element.label)
     best: tuple[float, list[Operation], Placement] | None = None

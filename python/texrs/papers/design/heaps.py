@@ -19,13 +19,14 @@ from texrs.papers.design.operations import TRIES, Moves, Operation
 __all__ = ["Heap"]
 
 ALIKE, TAKERS = 0.8, 4
-"""Least intersection over union of two shapes if one takes the other's place, and number of candidates (the most
-similar ones).
+"""Minimum intersection over union of an element and the shape that it replaces, and number of candidates for a place.
+
+The most similar elements are candidates.
 """
 LONG, SLANT = 1.25, 15.0
-"""Ratio of length to width above which an element's direction counts.
+"""Ratio of length to width above which an element has a direction.
 
-Largest difference of directions in degrees where elements are not turned.
+Largest difference in degrees between the directions of two elements, if one replaces the other without a rotation.
 """
 
 
@@ -36,8 +37,9 @@ class Heap:
     elements: Sequence[Element]
     labels: Labels
     measures: NDArray[np.float64]
-    """(n, 4): logarithms of each element's side and elongation, its angle in degrees, and 1 if the border does not cut
-    it.
+    """(n, 4): for each element log(side), log(elongation), angle in degrees, and 1 if the border does not cut it.
+
+    The side is the square root of the area.
     """
 
     @classmethod
@@ -50,7 +52,7 @@ class Heap:
         return cls(elements, labels, np.array(rows, np.float64).reshape(-1, 4))
 
     def rank_takers(self, site: int, moves: Moves) -> list[tuple[Element, float, float, bool]]:
-        """Return similar elements, their rotation and scale to fit a place, and whether any rotation fits."""
+        """Return (element, rotation in degrees, scale, whether any rotation fits) for the best fits of a place."""
         side, long, angle, whole = self.measures.T
         angle = (angle[site] - angle + 90) % 180 - 90
         directed = np.minimum(long, long[site]) >= math.log(LONG)
@@ -66,7 +68,7 @@ class Heap:
     def take_place(
         self, site: int, moves: Moves, seed: int, tile: int
     ) -> tuple[Element, list[Operation], Placement] | None:
-        """Find an element that fits the place of another one when turned and scaled; return None if none fits."""
+        """Return an element that replaces another one, with its operations and placement, or None if none fits."""
         place_of = self.elements[site]
         count = moves.count(1)
         if any(place_of.touches) or not (count and moves.options.translate):

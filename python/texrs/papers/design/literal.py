@@ -1,20 +1,21 @@
-"""DESIGN as printed (``method="paper"``): the printed generator moves whole colour layers.
+"""DESIGN as printed (``method="paper"``): a logistic map moves whole colour layers.
 
 This implements sections 3.3 and 3.4 of Shen, Jin, Mao and Feng 2006, with their misprints repaired:
 
 - The real number h(k) is floored before ``mod``, because the worked example computes with integers.
 
-- Starts that end in a fixed point are refused. The ends of (0, 255) are reachable, and are allowed.
+- A start raises an error if the logistic map reaches a fixed point from it. The paper's interval (0, 255) is open, but
+  0 and 255 are reachable, and are allowed.
 
-- e = xi n is clipped to the interval of the paper. m and n come from one number. With the paper's u, v and xi, S
-  therefore only occurs with n = 3 (e = 0.39) and n = 7 (e = 0.91).
+- e = xi n is clipped to the interval of the paper. The operation m and the extent n come from one number. With the
+  paper's u, v and xi, S therefore only occurs with n = 3 (e = 0.39) and n = 7 (e = 0.91).
 
 - The second term of Eq. 3 is ``|C_i(v_t) - C_j(v_t)|``.
 
-The paper leaves some choices open. Here l = n / u of half the shorter side, and a = n / u of 90 degrees. Every
-operation is about the centre of the image. Sense and axis are the two lowest bits of h(k) div u; a lowest bit of 0
-means up and left. (The lowest bits of h(k) itself depend on the operation: h(k) is even for every T and odd for every
-R.)
+The paper does not specify some details. Here the length l is n / u of half the shorter side, and the angle a is n / u
+of 90 degrees. Every operation is about the centre of the image. The two lowest bits of h(k) div u are the sense and
+the axis. If the lowest bit is 0, the sense is up or left. (The lowest bits of h(k) itself depend on the operation:
+h(k) is even for every T and odd for every R.)
 """
 
 from __future__ import annotations
@@ -38,11 +39,11 @@ __all__ = ["START", "choose_operation", "choose_start", "move_layers", "stitch_l
 START = 0.76234783
 """Start of the logistic map for the first tile (section 3.3)."""
 FARTHEST, WIDEST = 0.5, 90.0
-"""Extents for n = u: translation as a share of the shorter side, and rotation in degrees."""
+"""Largest extents, which n = u would give: translation as a share of the shorter side, and rotation in degrees."""
 
 
 def choose_operation(value: float, side: int, options: DeformationOptions = DeformationOptions()) -> Operation:
-    """Choose O(m) and its extent from one value of the logistic map (section 3.3, step 2).
+    """Return the operation O(m) and its extent, chosen by one value of the logistic map (section 3.3, step 2).
 
     Parameters
     ----------
@@ -51,12 +52,12 @@ def choose_operation(value: float, side: int, options: DeformationOptions = Defo
     side : int
         Shorter side of the exemplar, in pixels.
     options : DeformationOptions
-        Options; ``u``, ``v``, ``xi`` and ``scale`` are used.
+        Options of the deformation. Only ``u``, ``v``, ``xi`` and ``scale`` are used. Default: the default options.
 
     Returns
     -------
     Operation
-        The kind, extent and axis.
+        Operation with its kind, extent and axis.
 
     Examples
     --------
@@ -79,14 +80,14 @@ def choose_operation(value: float, side: int, options: DeformationOptions = Defo
 
 
 def move_layers(plan: Plan, seed: int, which: int, tile: int) -> Draft:
-    """Move the layers of an exemplar, and stitch them."""
+    """Move the colour layers of an exemplar as the logistic map chooses, and stitch them."""
     options = plan.moves.options
     start = choose_start(options.start, options.growth_rate, seed, which, tile)
     return stitch_layers(plan.guide, plan.parts.elements, start, options)
 
 
 def choose_start(start: float | None, growth_rate: float, seed: int, which: int, number: int) -> float:
-    """Return the start of the logistic map for a tile: the paper's start for the first tile, a random one for others."""
+    """Return the logistic map's start for a tile: the given or printed one for the first tile, else a random one."""
     if (which, number) == (0, 0):
         return START if start is None else start
     for attempt in range(64):
@@ -102,9 +103,9 @@ def choose_start(start: float | None, growth_rate: float, seed: int, which: int,
 def stitch_layers(
     picture: Floats, layers: Labels, start: float, options: DeformationOptions = DeformationOptions()
 ) -> Draft:
-    """Move each layer, and cut it into the earlier layers at the plain cost of Eq. 3.
+    """Move each layer, and stitch it into the earlier layers along a minimum cut with the cost of Eq. 3.
 
-    A layer that is wholly over others disappears, because no constraint connects the minimum cut to it.
+    A layer that lies completely over earlier layers disappears, because no hard constraint forces the cut to keep it.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def stitch_layers(
     start : float
         Start of the logistic map (Eq. 2).
     options : DeformationOptions
-        Number of operations, and the constants that choose them.
+        Number of operations on each layer, and the constants that choose them. Default: the default options.
 
     Returns
     -------
@@ -131,7 +132,7 @@ def stitch_layers(
     covered = np.zeros(shape, bool)
     made = Draft(np.zeros_like(picture), whole.coordinates.copy(), whole.label, covered, [], (False, False), [])
     centre, last = (np.array(shape) - 1) / 2, np.array(shape) - 1
-    # Draw each layer where its operations take it, about the centre of the image.
+    # Move each layer by its operations, about the centre of the image.
     for layer in range(count):
         chosen = [choose_operation(h, min(shape), options) for h in values[layer * each : (layer + 1) * each]]
         matrix, shift = np.eye(2), np.zeros(2)
@@ -140,7 +141,7 @@ def stitch_layers(
         inverse = np.asarray(np.linalg.inv(matrix), np.float64)
         places: Floats = (centre + (whole.coordinates - centre - shift) @ inverse.T).astype(np.float32)
         inside = np.all((places >= 0) & (places <= last), axis=-1)
-        # The layer covers a pixel if it covers more than half of its source position.
+        # The layer covers a pixel if it has more than half of the interpolation weight at the pixel's source position.
         mask = gather((layers == layer).astype(np.float32), places, interpolation="linear")
         offered: Bools = inside & (mask > 0.5)
         colours = gather(picture, places, interpolation="cubic")

@@ -16,7 +16,8 @@ __all__ = ["follow", "iterate"]
 LOOKED_AT, PERIODIC, STEADY = 64, 1.4, 3
 """Number of iterates that are checked for a fixed point.
 
-Growth rate up to which the map is periodic anyway. Number of equal neighbours that indicate a fixed point.
+Growth rate up to which the map is periodic from any start, so that starts are not checked. Number of pairs of equal
+consecutive iterates that indicate a fixed point.
 """
 
 
@@ -26,13 +27,13 @@ def iterate(start: float, growth_rate: float = 2.0, count: int = 64, *, burn_in:
     Parameters
     ----------
     start : float
-        The first x, inside (-1, 1).
+        First value of x, inside (-1, 1).
     growth_rate : float
-        The lambda of Eq. 2, 0 to 2. Default: 2.
+        Growth rate of the map (lambda in Eq. 2), 0 to 2. Default: 2.
     count : int
         Number of iterates to return. Default: 64.
     burn_in : int
-        Number of iterates before the first returned one. Default: 0.
+        Number of iterates that are skipped before the first returned one. Default: 0.
 
     Returns
     -------
@@ -42,8 +43,8 @@ def iterate(start: float, growth_rate: float = 2.0, count: int = 64, *, burn_in:
     Raises
     ------
     InvalidInput
-        The start is outside (-1, 1), or the growth rate is outside [0, 2]. Starts such as 0, 1/2 and -1/2, which end
-        in a fixed point, are refused also.
+        The start is outside (-1, 1), or the growth rate is outside [0, 2]. Also if the map reaches a fixed point from
+        the start, as from 0, 1/2 and -1/2.
 
     Examples
     --------
@@ -55,7 +56,7 @@ def iterate(start: float, growth_rate: float = 2.0, count: int = 64, *, burn_in:
 
 
 def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Iterator[float]:
-    """Return the values of `iterate` one by one, without an end. An invalid start raises an error at once.
+    """Return an endless iterator over the values of `iterate`. An invalid start raises an error before the first value.
 
     Examples
     --------
@@ -76,7 +77,7 @@ def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Itera
 
 
 def walk(x: float, rate: float) -> Iterator[float]:
-    """Return the iterates of the map."""
+    """Yield x and all further iterates of the logistic map, without an end."""
     while True:
         yield x
         x = 1 - rate * (x * x)

@@ -1,9 +1,10 @@
-"""Mix several exemplars in one texture: territories with organic borders, cut along outlines.
+"""Mix several exemplars in one texture, with borders along the outlines of elements.
 
-Each exemplar is stitched separately into a texture of the full size, so both sides of a border are complete textures.
-A map chooses which texture is visible, or smooth noise that is adjusted until every exemplar has its share. A cut then
-moves the borders by at most about an element to the least visible place. This is the outline of an element on either
-side, which then overlaps the other side. A border does not cross elements.
+Each exemplar is stitched separately into a texture of the full size. A map selects the texture that is visible at each
+pixel. Without a map, smooth noise selects it, and is adjusted until every exemplar has its share. The regions of one
+texture are its territories. A minimum cut then moves their borders to the least visible places, by at most about the
+size of an element. Such a place is the outline of an element on either side, which then overlaps the other side.
+Borders avoid the inside of elements.
 """
 
 from __future__ import annotations
@@ -32,24 +33,25 @@ CREASE = 0.15
 It is low because the outlines of elements in heaps are uncertain, and colour edges often follow them.
 """
 PULL = 0.5
-"""Cost of a pixel at the largest allowed distance from its requested place.
+"""Cost of a layer in a pixel at the largest allowed distance from the pixels where this layer is requested.
 
 The cost grows with the square of the distance.
 """
 FORBIDDEN = 1e3
-"""Cost of a pixel beyond the largest allowed distance."""
+"""Cost of a layer in a pixel beyond the largest allowed distance."""
 ROUNDS, FREE, EXACT, STEP = 16, 8, 0.01, 0.05
 """Maximum number of rounds that adapt the costs of the exemplars until their shares are right.
 
-Number of rounds after which the pull of the map doubles in each round, because large regions may change at once and
-shares with them. Allowed relative error of a share. Initial change of the costs for a given error.
+Number of rounds after which `PULL` doubles in each round, because large regions can change together, and the shares
+change abruptly with them. Allowed relative error of a share. Initial change of the costs for a given error.
 """
 FINER, FAINTER = 2.5, 0.5
-"""Second noise of a border: how many times finer than a territory, and its relative amplitude."""
+"""Second, finer noise of the territories: its frequency relative to the first noise, and its relative amplitude."""
 KNOTS = 6
-"""Number of noise samples along a territory.
+"""Number of random values along the side of a territory. The noise is interpolated between these values.
 
-They are smoothed over a third of this number, so that borders do not favour an axis.
+The values are smoothed by a Gaussian filter whose standard deviation is a third of this number, so that borders do not
+favour an axis.
 """
 
 
@@ -79,13 +81,13 @@ def mix(
     Parameters
     ----------
     layers : sequence of Layer
-        One layer per exemplar, all of one size.
+        One layer per exemplar, all of the same size.
     shares : (n,) or (rows, columns, n) float64
         Share of each exemplar in the whole texture, or in each pixel. Shares sum to 1.
     extent : float
         Size of an element, in pixels: the largest distance of a border from its requested place.
     territory : float
-        Size of the territories, in pixels, where the map gives several exemplars a share.
+        Size of the territories in pixels. Territories occur where several exemplars have a share.
     wrap : (bool, bool)
         Axes along which the texture is periodic.
     seed : int
@@ -106,10 +108,10 @@ def mix(
 def draw_territories(
     shares: NDArray[np.float64], size: tuple[int, ...], territory: float, seed: int
 ) -> NDArray[np.uint16]:
-    """Return the requested exemplar of each pixel.
+    """Return the number of the requested exemplar of each pixel.
 
-    If Gumbel noise is added to the logarithms of the shares, each exemplar has the largest sum with the probability of
-    its share. Smooth noise turns this choice into territories.
+    If Gumbel noise is added to the logarithms of the shares, the probability that an exemplar has the largest sum is
+    its share. Smooth noise turns this random choice into territories.
     """
     count = shares.shape[-1]
     if ((shares == 0) | (shares == 1)).all():
@@ -154,10 +156,10 @@ def measure_error(got: NDArray[np.float64], due: NDArray[np.float64]) -> float:
 def cut_borders(
     layers: Sequence[Layer], wanted: NDArray[np.uint16], extent: float, wrap: tuple[bool, bool]
 ) -> NDArray[np.uint16]:
-    """Return the visible layer of each pixel: near the requested one, with hidden borders and the requested shares.
+    """Return the layer of each pixel, with the borders moved to inconspicuous places and the shares preserved.
 
-    Each layer in turn is cut into the visible ones by a minimum cut. The cost of each layer is adapted until the
-    shares are right.
+    A minimum cut stitches each layer in turn into the others. The cost of each layer is adapted until the shares are
+    correct.
     """
     count, size = len(layers), wanted.size
     ends = [measure_ends(layer) for layer in layers]
@@ -188,7 +190,7 @@ def cut_borders(
 
 
 def measure_ends(layer: Layer) -> NDArray[np.float32]:
-    """Return the cost of ending a layer between each pixel and the next: (axis, side that stays, rows, columns)."""
+    """Return the cost of a layer's border between each pixel and the next: (axis, side that is kept, rows, columns)."""
     ends = np.empty((2, 2, *layer.depth.shape), np.float32)
     for axis in range(2):
         colours, depth = np.roll(layer.colours, -1, axis), np.roll(layer.depth, -1, axis)
@@ -202,7 +204,10 @@ def measure_ends(layer: Layer) -> NDArray[np.float32]:
 
 
 def measure_distance(asked: Bools, extent: float, wrap: tuple[bool, bool]) -> Floats:
-    """Return the distance of each pixel from the requested pixels, in extents; values above 1 are not exact."""
+    """Return the distance of each pixel from the requested pixels, in units of ``extent``.
+
+    Values above 1 are not exact.
+    """
     from scipy.ndimage import distance_transform_edt
 
     if not asked.any():
@@ -220,9 +225,9 @@ def cut_in(
     costs: NDArray[np.float32],
     wrap: tuple[bool, bool],
 ) -> NDArray[np.uint16]:
-    """Cut a layer into the visible ones.
+    """Stitch a layer into the visible layers along a minimum cut, and return the layer of each pixel.
 
-    A border costs the cheaper of its sides, because that side overlaps the other.
+    The cost of a border is the lower cost of its two sides, because the layer with the lower cost overlaps the other.
     """
     kept = np.take_along_axis(costs, chosen[np.newaxis].astype(np.intp), axis=0)[0]
     unary = np.stack([np.where(chosen == which, np.float32(np.inf), kept), costs[which]], axis=-1)

@@ -23,7 +23,7 @@ __all__ = ["TRIES", "Moves", "Operation", "compose"]
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """One of T, R, M, S (Eq. 1) with its extent."""
+    """A translation (T), rotation (R), mirror (M) or scaling (S) of an element (Eq. 1), with its extent."""
 
     kind: str
     amount: float
@@ -32,10 +32,10 @@ class Operation:
     A mirror does not use it.
     """
     axis: int
-    """Axis of a translation or mirror: 0 along rows, 1 along columns."""
+    """Axis of a translation or mirror: 0 changes row numbers (vertical), 1 changes column numbers (horizontal)."""
 
     def rows(self) -> Matrix:
-        """Return the rows of the linear part, in (row, column) order."""
+        """Return the rows of the operation's matrix, for vectors in (row, column) order."""
         match self.kind:
             case "R":
                 c, s = math.cos(math.radians(self.amount)), math.sin(math.radians(self.amount))
@@ -48,7 +48,7 @@ class Operation:
                 return (1.0, 0.0), (0.0, 1.0)
 
     def matrix(self) -> NDArray[np.float64]:
-        """Return the linear part."""
+        """Return the (2, 2) matrix of the operation, for vectors in (row, column) order."""
         return np.array(self.rows())
 
     def shift(self) -> NDArray[np.float64]:
@@ -56,14 +56,14 @@ class Operation:
         return np.eye(2)[self.axis] * self.amount if self.kind == "T" else np.zeros(2)
 
     def describe(self) -> list[Any]:
-        """Return kind, extent and axis for the log."""
+        """Return the kind, extent and axis of the operation for the report."""
         return [self.kind, round(self.amount, 3), self.axis]
 
 
 def compose(operations: Sequence[Operation]) -> tuple[Matrix, tuple[float, float]]:
-    """Return the linear part and the shift of operations that are applied in sequence.
+    """Return the matrix and the translation (row, column), in pixels, of operations that are applied in sequence.
 
-    It uses plain numbers, because arrays take ten times as long for a few operations.
+    The function uses plain numbers, because arrays take ten times as long for a few operations.
     """
     (a, b), (c, d) = (1.0, 0.0), (0.0, 1.0)
     shift = [0.0, 0.0]
@@ -77,9 +77,10 @@ def compose(operations: Sequence[Operation]) -> tuple[Matrix, tuple[float, float
 
 
 TRIES = 12
-"""Maximum number of draws for an element."""
+"""Maximum number of random placements of an element that are tried."""
 BURN_IN = 64
-"""Number of iterates that are skipped. Two starts that differ by 1e-8 give different sequences after about 24 steps."""
+"""Number of skipped iterates of the map. Two starts that differ by 1e-8 give different sequences after about 24 steps.
+"""
 USUAL = 2
 """Number of operations on an element if the options do not specify it."""
 
@@ -96,11 +97,11 @@ class Moves:
 
     @property
     def rotate(self) -> float:
-        """Largest rotation in degrees; 0 until it is decided."""
+        """Largest rotation in degrees, or 0 if the options do not specify one."""
         return self.options.rotate or 0.0
 
     def mirror(self, axes: Flip) -> Moves:
-        """Return the operations for a mirror image of the exemplar, where the shifts of its lattice are mirrored also."""
+        """Return the moves for a mirror image of the exemplar, whose lattice translations are mirrored too."""
         shifts = tuple((-r if axes[0] else r, -c if axes[1] else c) for r, c in self.shifts)
         return replace(self, shifts=shifts)
 
@@ -111,7 +112,7 @@ class Moves:
     def draw_values(self, seed: int, tile: int, element: int, times: int = 1) -> Iterator[float]:
         """Return enough values of the logistic map to draw an element's operations ``times`` times.
 
-        Each element has a start of its own.
+        Each element has its own start of the map.
         """
         options = self.options
         count = 3 * times * ((TRIES + 1) * self.count() + 1)
@@ -132,9 +133,9 @@ class Moves:
     ) -> list[Operation]:
         """Choose the operations of one element, each by three values of the logistic map.
 
-        The values choose the kind, then sense and axis, then the extent. ``reach`` scales the extents of translations
-        and rotations, 0 to 1. ``touches`` is True for axes where the exemplar's border cuts the element. Such an
-        element only slides along that border.
+        The values choose the kind, then the sense and the axis, then the extent. The extents of translations and
+        rotations are multiplied by ``reach``, 0 to 1. ``touches`` is True for axes where the exemplar's border cuts
+        the element. Such an element can only move along that border.
         """
         if self.shifts and self.count():
             _, h2, h3 = next(values), next(values), next(values)
@@ -143,7 +144,7 @@ class Moves:
         return self._draw(["T", *self.changes], self.count(), values, touches, side, reach)
 
     def draw_changes(self, values: Iterator[float], count: int, reach: float) -> list[Operation]:
-        """Choose further changes of an element that takes another's place, scaled by ``reach``, 0 to 1."""
+        """Choose rotations, mirrors and scalings of an element. Their extents are multiplied by ``reach``, 0 to 1."""
         drawn = self._draw(self.changes, count, values, (False, False), 0, reach) if self.changes else []
         return [replace(o, amount=1 + reach * (o.amount - 1)) if o.kind == "S" else o for o in drawn]
 

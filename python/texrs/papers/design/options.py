@@ -19,44 +19,45 @@ class DeformationOptions:
     Attributes
     ----------
     operations : int, optional
-        Number of deformations that are applied in sequence to each element, 0 to 8. Default: 2, or 1 in heaps and in
-        the printed algorithm. The first deformation in a heap puts the element into the place of another, turned and
-        scaled to its shape. Further ones turn, mirror and scale the element as long as it fills that place. On a
-        lattice, and without separate elements, the only deformation is a move from place to place, because others
-        would be visible. ``report["arrangement"]`` contains the arrangement that was found.
+        Number of deformations that are applied in sequence to each element, 0 to 8. The first deformation in a heap
+        moves the element to the place of another one, turned and scaled to its shape. Further deformations turn,
+        mirror and scale the element as long as it still fills that place. On a lattice, and if elements are cells of a
+        grid, only translations are used, because other deformations would be visible. ``report["arrangement"]``
+        contains the arrangement that was found. Default: 2, but 1 in heaps and with ``method="paper"``.
     translate : float
-        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. Elements of heaps and lattices go to
-        the next place that fits, unless this is 0. Default: 0.12.
+        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. Elements of a heap move to the place
+        of a similar element at any distance. On a lattice, elements move at least to the nearest places. If 0,
+        elements do not change places. Default: 0.12.
     rotate : float, optional
         Largest rotation in degrees, 0 to 180. Use 0 for textures with light from one side or with letters. Default:
-        60, but 0 if the example has directions of its own (bark, brickwork), no separate elements, or a lattice.
+        60, but 0 if the example has a preferred direction (bark, brickwork), cells instead of elements, or a lattice.
     scale : (float, float)
-        Least and largest scale factor, within 0.5 to 2. Default: 0.8 to 1.2.
+        Smallest and largest scale factor, 0.5 to 2. Default: 0.8 to 1.2.
     allow_mirror : bool, optional
         If True, elements, backgrounds and patches may be mirrored along both axes. If False, as for letters, they are
-        not mirrored. Default: True, except for axes whose direction light or a slant shows, and False with
-        ``rotate=0``, because the example then has an upper side.
+        not mirrored. Default: True, except for axes along which light or slanted elements would reveal it, and False
+        with ``rotate=0``, because the example then has an upper side.
     start : float, optional
         Start of the logistic map (Eq. 2), within (-1, 1). Default: drawn from the seed for each element.
     growth_rate : float
         Growth rate of the logistic map (lambda in Eq. 2), 0 to 2. Below about 1.4 the sequence is periodic. Default:
         2.
     u : int
-        Divisor of a value h of the logistic map, 1 to 256. The operation is mod(mod(h, u), v). The extent of the
-        printed algorithm is n = mod(h, u), so a larger u gives finer extents. Otherwise the extent comes from another
-        value of the map. Default: 10.
+        Divisor of a value h of the logistic map, 1 to 256. The operation is mod(mod(h, u), v). With
+        ``method="paper"``, the extent is n = mod(h, u), so a larger u gives finer extents. Otherwise the extent comes
+        from another value of the map. Default: 10.
     v : int
         Number of operations to choose from, 1 to 4: translation, rotation, mirror and scale, in this order. Default:
         4.
     xi : float
-        Factor of n that gives the scaling extent e in the printed algorithm, 0.001 to 2. The extent is limited to
-        ``scale``. Otherwise extents are drawn uniformly within ``scale``. Default: 0.13.
+        Factor that converts n to the scale factor e = xi n with ``method="paper"``, 0.001 to 2. The result is limited
+        to ``scale``. Other methods ignore xi, and draw scale factors within ``scale``. Default: 0.13.
 
     Raises
     ------
     InvalidInput
-        A field has the wrong type or is out of range, or the logistic map does not leave the start. The message names
-        the field.
+        An attribute has the wrong type or is out of range, or the logistic map reaches a fixed point from ``start``.
+        The message names the attribute.
 
     Examples
     --------

@@ -22,7 +22,7 @@ __all__ = ["Plan", "make_plan"]
 ROTATE, DIRECTED = 60.0, 0.25
 """Largest rotation by default, in degrees, and anisotropy above which elements are not turned."""
 BACKGROUND_PLACES = 64
-"""Least number of places for a patch of pure background, if holes are filled with background only."""
+"""Minimum number of patches of pure background in the exemplar for which holes are filled with background only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class Plan:
     guide: Floats
     parts: Segmentation
     index: PatchIndex
-    """Patches that fill holes, in each of the mirror images."""
+    """Index of the patches that fill holes, from all permitted mirror images."""
     mirrors: tuple[Flip, ...]
     """Permitted mirror images."""
     moves: Moves
@@ -47,24 +47,24 @@ class Plan:
     tried: Mapping[str, Mapping[str, float]] | None = None
     """Scores of each plan that was tried, or None."""
     tiles: Sequence[Tile] = ()
-    """First tiles of the trial's seed, if the trial has just computed them."""
+    """Tiles that the trial has just computed. A texture with the trial's seed uses them again."""
 
 
 def make_plan(
     exemplar: Exemplar, parts: Segmentation, options: DeformationOptions, *, side: int | None, literal: bool = False
 ) -> Plan:
-    """Decide mirrors, rotations, patch side and the source of holes for an exemplar.
+    """Decide the permitted mirrors and rotations of an exemplar, its patch side, and the patches that fill holes.
 
     Parameters
     ----------
     exemplar : Exemplar
-        The example as an image.
+        Exemplar that decisions are based on.
     parts : Segmentation
-        Its elements.
+        Elements of the exemplar.
     options : DeformationOptions
-        Options of the deformation.
+        Options that control how elements are deformed.
     side : int, optional
-        Side of a patch, in pixels. Default: a sixth of the exemplar's shorter side, 12 to 32.
+        Side of a patch, in pixels. Default: 1/6 of the exemplar's shorter side, but at least 12 and at most 32.
     literal : bool
         If True, the paper is followed as printed. Default: False.
 
@@ -80,9 +80,10 @@ def make_plan(
 
 
 def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Flip, ...]:
-    """Return the permitted mirror images: the requested ones, else those that look like the exemplar."""
+    """Return the permitted mirror images: as requested, or by default all that look like the exemplar."""
     if options.allow_mirror is None:
-        # A user who forbids rotation knows of an upper side, light or letters, which the statistics may miss.
+        # A user who forbids rotation knows that the example has an upper side, light or letters. The statistics can
+        # miss them.
         return (NONE,) if options.rotate == 0 else exemplar.mirror_symmetries
     return ALL if options.allow_mirror else (NONE,)
 
@@ -105,7 +106,7 @@ def settle_moves(
 
 
 def mark_background(parts: Segmentation, side: int) -> Bools | None:
-    """Return the background, if it is large enough to fill holes with background only."""
+    """Return a mask of the background, or None if it is too small to fill holes with background only."""
     free = parts.elements == 0
     found = parts.kind in ("components", "labels") and np.count_nonzero(mark_corners(free, side)) >= BACKGROUND_PLACES
     return free if found else None

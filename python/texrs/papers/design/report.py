@@ -27,11 +27,11 @@ def draw_stages(plan: Plan, tile: Tile, picture: Array) -> dict[str, Array]:
 
 
 TINT = 0.55
-"""Share of an element's colour where it covers the exemplar in the image of the segmentation."""
+"""Opacity of the colours of elements in the image of the segmentation, 0 to 1."""
 
 
 def draw_elements(plan: Plan) -> Array:
-    """Return the exemplar with each element in a colour, between white lines."""
+    """Return the exemplar with each element tinted in a different colour, and white lines around the elements."""
     seen, elements = as_rgb(plan.guide), plan.parts.elements
     tinted = (1 - TINT) * seen + TINT / 255 * label_to_color(elements)
     picture = np.where(elements[..., np.newaxis] > 0, tinted, seen)
@@ -75,7 +75,7 @@ def describe(
 
 
 def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | None:
-    """Return the matrix, (row, column), that stretches an exemplar so that its lattice closes, or None."""
+    """Return the (2, 2) matrix that stretches an exemplar's lattice to fit a periodic texture, or None."""
     closing = None
     if plan.parts.lattice is not None and any(arguments.wrap):
         closing = plan.parts.lattice.close(arguments.size, arguments.wrap)
@@ -83,13 +83,13 @@ def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | No
 
 
 def describe_courses(plan: Plan) -> dict[str, Any] | None:
-    """Return the courses of an exemplar that is laid in courses, or None."""
+    """Return the courses of an exemplar as JSON types, or None if the texture is not built from courses."""
     courses = plan.parts.courses if plan.still else None
     return None if courses is None else asdict(courses)
 
 
 def describe_density(plans: Sequence[Plan], composite: SourceMap, density: NDArray[np.float64]) -> list[dict[str, Any]]:
-    """Return the requested, reached and own density of each scattered exemplar, and its number of elements."""
+    """Return the requested, reached and original density of each scattered exemplar, and its number of elements."""
     asked = density.reshape(-1, len(plans) - 1).mean(axis=0)
     return [
         {

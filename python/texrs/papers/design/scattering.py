@@ -1,10 +1,10 @@
-"""Scatter elements of some exemplars over another one at a requested density: flowers over leaves over moss.
+"""Scatter elements of some exemplars over another one at a requested density, such as flowers over leaves over moss.
 
-A departure from Figure 7 of the paper, which distributes whole exemplars. Each element is visible whole, and is
-turned, mirrored and scaled like the elements of its exemplar, without its surroundings. Layers overlap in the order of
-the exemplars. They are laid from the top, so an element that was laid earlier is above later ones and is never cut.
-Elements of one layer do not touch. They overlap in part only if they form a heap in their exemplar, and when free
-places run out.
+This is a departure from Figure 7 of the paper, which distributes whole exemplars. Here each element is cut out without
+its surroundings, and is turned, mirrored and scaled like a moving element of its exemplar. The elements of one
+exemplar form a layer, and layers of later exemplars are above earlier ones. The top layer is placed first, and each
+new element is placed below all existing ones, so that it never covers them. Elements of one layer do not touch. Only
+if they form a heap in their exemplar can they overlap, when free places run out.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from texrs.source_map import SourceMap
 __all__ = ["find_scattered_elements", "scatter"]
 
 SMALL, LARGE = 0.3, 4.0
-"""Least and largest area of an element, relative to the median.
+"""Smallest and largest area of a scattered element, relative to the median.
 
 Smaller ones are splinters, larger ones are clumps of elements that were not separated.
 """
@@ -38,25 +38,27 @@ EDGE = 0.75
 Closer to the outline its colour is mixed with the background.
 """
 GAP = 1.5
-"""Least gap between elements, in pixels."""
+"""Minimum gap between elements, in pixels."""
 SEEN, SEEN_BELOW = 0.65, 0.45
-"""Least visible share of an element below others of its own heap, and below all elements above it."""
+"""Minimum visible share of an element that others of its own layer overlap, and that elements of any layer overlap."""
 CRUMB = 0.08
-"""Least share of an element for a visible piece. Smaller pieces are not shown."""
+"""Minimum size of a visible piece of an overlapped element, relative to the element. Smaller pieces are left out."""
 TRIES, PATIENCE = 24, 80
-"""Number of places that are tried for an element, and number of failed elements in a row after which a layer is full.
+"""Number of places that are tried for an element, and number of consecutive failures after which a layer is full.
 
-Elements of a heap may overlap after half of these failures.
+Elements of a heap can overlap after half of these failures.
 """
 CLUSTER, UNEVEN = 4.0, 0.5
-"""Size of clusters in element sizes, and relative variation of the density between them. Both are used without a map.
+"""Size of clusters in element sizes, and relative variation of the density between them.
+
+They are only used if the density is not a map.
 """
 CELLS, AROUND, ROUNDS = 0.5, 2.5, 64
-"""Size of the cells that measure density, and averaging distance of the lack, both in element sizes.
+"""Side of the cells that measure density, and distance of the averages of the lack of elements, in element sizes.
 
-The averages include gaps, because there is always room between two elements of a sparse layer.
+The averages include several elements and gaps, because even a full layer has room between two elements.
 
-Least number of measurements.
+Minimum number of times that the lack is measured while a layer is filled.
 """
 EXACT, LAST, FITTED = 0.01, 2.0, 12
 """Allowed relative error of a density.
@@ -66,7 +68,7 @@ Remaining area, in element areas, below which the next element is chosen by its 
 
 
 def find_scattered_elements(plan: Plan, number: int) -> list[Element]:
-    """Return the elements that can be scattered: whole ones, neither splinters nor clumps.
+    """Return the elements that can be scattered: not cut by the border, and neither splinters nor clumps.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def find_scattered_elements(plan: Plan, number: int) -> list[Element]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stamp:
-    """A turned, mirrored and scaled element, with pixels around its centre."""
+    """Pixels of a turned, mirrored and scaled element, and of the gap around it."""
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
@@ -97,7 +99,7 @@ class Stamp:
     coordinates: Floats
     """Source positions of the pixels."""
     inner: Bools
-    """Pixels of the element; the others are the gap around it."""
+    """True for pixels of the element, False for pixels of the gap around it."""
     frame: NDArray[np.float64]
 
     @property
@@ -107,13 +109,13 @@ class Stamp:
 
 
 def cut_out(element: Element, moves: Moves, shape: tuple[int, int], seed: int, which: int, number: int) -> Stamp:
-    """Turn, mirror and scale an element as the logistic map chooses."""
+    """Return the pixels of an element that is turned, mirrored and scaled as the logistic map chooses."""
     values = moves.draw_values(seed, which, number)
     matrix = np.eye(2)
     for operation in moves.draw_changes(values, moves.count(), 1.0):
         matrix = operation.matrix() @ matrix
     inverse = np.asarray(np.linalg.inv(matrix), np.float64)
-    # The centre is rounded, so that an unchanged element copies pixels exactly.
+    # Round the centre, so that an unchanged element copies pixels exactly.
     centre = np.round(element.centre)
     low, high = element.origin - centre, element.origin + np.array(element.distance.shape) - 1 - centre
     corners = np.array([[low[0], low[1]], [low[0], high[1]], [high[0], low[1]], [high[0], high[1]]]) @ matrix.T
@@ -130,7 +132,7 @@ def cut_out(element: Element, moves: Moves, shape: tuple[int, int], seed: int, w
 
 @dataclass(slots=True, eq=False)
 class ScatteredSheet:
-    """The texture in progress."""
+    """Texture in progress, with the elements scattered so far."""
 
     coordinates: Floats
     exemplar: NDArray[np.uint16]
@@ -141,7 +143,7 @@ class ScatteredSheet:
     wrap: tuple[bool, bool]
 
     def look(self, stamp: Stamp, row: int, column: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Bools]:
-        """Return the pixels below a stamp, and which of them are inside the texture."""
+        """Return the rows and columns of a stamp's pixels on the texture, and a mask of pixels that are inside it."""
         height, width = self.layer.shape
         rows, columns = stamp.rows + row, stamp.columns + column
         there = np.ones(len(rows), bool)
@@ -151,7 +153,7 @@ class ScatteredSheet:
         return rows % height, columns % width, there
 
     def fit(self, stamp: Stamp, row: int, column: int, which: int, *, apart: bool) -> NDArray[np.intp] | None:
-        """Return the visible pixels of a stamp at a place, or None if it does not fit there."""
+        """Return the indices of the visible pixels of a stamp at a place, or None if it does not fit there."""
         if np.ptp(stamp.rows) >= self.layer.shape[0] or np.ptp(stamp.columns) >= self.layer.shape[1]:
             return None
         rows, columns, there = self.look(stamp, row, column)
@@ -171,7 +173,7 @@ class ScatteredSheet:
     def lay(
         self, stamp: Stamp, row: int, column: int, which: int, seen: NDArray[np.intp]
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Lay a stamp below the elements that are there, and return its visible pixels."""
+        """Draw a stamp below the existing elements, and return the rows and columns of its visible pixels."""
         rows, columns, _ = self.look(stamp, row, column)
         at = rows[seen], columns[seen]
         self.coordinates[at] = stamp.coordinates[seen]
@@ -182,7 +184,7 @@ class ScatteredSheet:
 
 
 def drop_crumbs(stamp: Stamp, seen: Bools, least: float) -> NDArray[np.intp]:
-    """Return the visible pixels of a stamp without small pieces."""
+    """Return the indices of the visible pixels of a stamp, except pieces smaller than ``least`` pixels."""
     from scipy.ndimage import label
 
     rows, columns = stamp.rows - stamp.rows.min(), stamp.columns - stamp.columns.min()
@@ -204,9 +206,10 @@ def scatter(
     ground : SourceMap
         A texture of the first exemplar.
     plans : sequence of Plan
-        The exemplars, their elements, and the permitted changes of these.
+        Plans of the exemplars, with their elements and permitted operations.
     density : (n - 1,) or (rows, columns, n - 1) float64
-        Share of the area that the visible elements of each exemplar cover in the whole texture, or around each pixel.
+        Share of the area that the visible elements of each exemplar cover, 0 to 1, in the whole texture or around each
+        pixel.
     wrap : (bool, bool)
         Axes along which the texture is periodic.
     seed : int
@@ -229,7 +232,7 @@ def scatter(
 
 
 def scatter_layer(sheet: ScatteredSheet, plan: Plan, which: int, density: NDArray[np.float64], seed: int) -> None:
-    """Scatter the elements of one exemplar below those that are there, until they reach their density."""
+    """Scatter the elements of one exemplar below the existing elements, until they reach the requested density."""
     shape = plan.guide.shape[0], plan.guide.shape[1]
     due = float(np.mean(density)) * sheet.layer.size
     elements = find_scattered_elements(plan, which)
@@ -242,10 +245,10 @@ def scatter_layer(sheet: ScatteredSheet, plan: Plan, which: int, density: NDArra
     usual = float(np.mean([e.area for e in elements]))
     every = max(1, int(due / usual / ROUNDS))
     covered, number, vain = 0, 0, 0
-    # Lay one element per round, until the area is covered or too many elements in a row found no place.
+    # Place one element per round, until the area is covered or too many elements in a row found no place.
     while covered < (1 - EXACT) * due and vain < PATIENCE:
         left = due - covered
-        # The last element is chosen by size, so that it covers the remaining area.
+        # Choose the last element by its size, so that it covers the remaining area.
         drawn = [cut_out(elements[int(rng.integers(len(elements)))], plan.moves, shape, seed, which, number)]
         if left < LAST * usual:
             for index in rng.permutation(len(elements))[:FITTED]:
@@ -269,7 +272,7 @@ def scatter_layer(sheet: ScatteredSheet, plan: Plan, which: int, density: NDArra
 
 @dataclass(slots=True, eq=False)
 class Room:
-    """Places where more elements are needed, in cells."""
+    """Number of element pixels that each cell of the texture still needs."""
 
     side: int
     size: tuple[int, ...]
@@ -279,11 +282,14 @@ class Room:
     free: NDArray[np.float64]
     """Number of free pixels of each cell."""
     lack: NDArray[np.float64]
-    """Cumulative sum, over the cells in order, of the lack around each cell."""
+    """Cumulative sum over the cells, in order, of the average lack of element pixels around each cell."""
 
     @classmethod
     def measure(cls, density: NDArray[np.float64], sheet: ScatteredSheet, extent: float, seed: tuple[int, int]) -> Room:
-        """Measure where elements are needed; without a map they form loose clusters, as plants do."""
+        """Measure how many element pixels each cell needs.
+
+        Without a map of densities, elements form loose clusters, as plants do.
+        """
         side, size = max(2, round(CELLS * extent)), sheet.layer.shape
         if density.ndim == 0:
             noise = draw_noise(size, min(CLUSTER * extent, min(size) / 2), seed).astype(np.float64)
@@ -298,13 +304,13 @@ class Room:
             np.subtract.at(cells, (rows // self.side, columns // self.side), 1)
 
     def measure_lack(self) -> None:
-        """Measure how many element pixels are lacking around each cell."""
+        """Measure the average lack of element pixels around each cell."""
         from scipy.ndimage import gaussian_filter
 
         # Exclude cells where elements were not requested, and cells that elements above cover.
         open_ = np.isfinite(self.wanted) & (self.free > 0)
         lack = gaussian_filter(np.where(np.isfinite(self.wanted), self.wanted, 0), AROUND / CELLS, mode=self.mode)
-        # If other cells are too full to be completed, their elements must not go to cells that lack none.
+        # If a cell is too full to reach its density, the missing elements must not go to cells that lack none.
         wanting = np.where(open_, np.maximum(lack, 0), 0)
         self.lack = np.cumsum(wanting if wanting.any() else open_.astype(np.float64))
 
@@ -318,6 +324,6 @@ class Room:
 
 
 def sum_cells(values: NDArray[np.float64], side: int) -> NDArray[np.float64]:
-    """Return sums over cells of ``side`` pixels; the last cells may be smaller."""
+    """Return the sums of values over square cells of ``side`` pixels. The last row and column can be smaller."""
     rows = np.add.reduceat(values, np.arange(0, values.shape[0], side), axis=0)
     return np.asarray(np.add.reduceat(rows, np.arange(0, values.shape[1], side), axis=1), np.float64)

@@ -30,11 +30,12 @@ PATCH, OVERLAP = 0.6, 0.25
 DEEP = 6.0
 """Depth in pixels beyond which all pixels of an element count as equally deep."""
 LEAST, TERRITORY = 6.0, 0.75
-"""Least distance in pixels that a border between exemplars may move, and size of territories as a share of the shorter
-side.
+"""Lower limit in pixels of the distance that a border between exemplars can move, and size of territories.
+
+The size is a share of the shorter side of the exemplars.
 """
 CLOSE = 0.5
-"""Share of the exemplar above which its elements are close to each other."""
+"""Share of the exemplar that elements cover above which they count as close to each other."""
 
 
 def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:
@@ -83,7 +84,7 @@ def stitch_alone(
 
 
 def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> list[Picture]:
-    """Return tiles as sources of patches; a lattice is stretched so that it closes on the torus."""
+    """Return the tiles as sources of patches. A lattice is stretched so that whole periods fit a periodic texture."""
     depth, lattice = measure_depth(plan), plan.parts.lattice
     closing = None if lattice is None else lattice.close(arguments.size, arguments.wrap)
     pictures = []
@@ -101,7 +102,7 @@ def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> li
 
 
 def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list[Picture]:
-    """Return sources of patches for an exemplar in courses: its courses, laid as tall as the texture."""
+    """Return sources of patches for an exemplar in courses: sheets of its courses, as tall as the texture."""
     courses = plan.parts.courses
     assert courses is not None
     axis = courses.axis
@@ -131,7 +132,7 @@ def report_share(watch: Progress, number: int, count: int, share: float) -> None
 
 
 def measure_layer(source: SourceMap, plan: Plan) -> Layer:
-    """Return the colours of a texture of one exemplar, and the places of its elements."""
+    """Return a texture of one exemplar as a layer, with its colours and the depth inside its elements."""
     parts, where = plan.parts, source.coordinates
     depth, elements = np.zeros((2, *plan.guide.shape[:2]), np.float32)
     if parts.kind in ("components", "labels"):
@@ -142,7 +143,7 @@ def measure_layer(source: SourceMap, plan: Plan) -> Layer:
 
 
 def measure_extent(plan: Plan) -> float:
-    """Return the median size of an element, in pixels."""
+    """Return the median side of the elements in pixels, or the patch side if elements are not separate."""
     areas = np.bincount(plan.parts.elements.ravel())[1:]
     if plan.parts.kind not in ("components", "labels") or not areas.any():
         return float(plan.side)
@@ -163,7 +164,7 @@ def measure_depth(plan: Plan) -> Floats:
 
 
 def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
-    """Set how the colours of a texture are corrected to hide its seams (section 3.6)."""
+    """Return a texture's source map with the colour correction that hides its seams (section 3.6)."""
     wrap, literal = arguments.wrap, arguments.literal
     if arguments.exemplars[0].labels:
         return composite.with_finish(wrap, interpolation="nearest")
@@ -175,7 +176,7 @@ def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
 
 
 def look_up(composite: SourceMap, arguments: Arguments) -> Array:
-    """Return the image of a texture before its colours are corrected; labels are not interpolated."""
+    """Return the image of a texture before its colours are corrected. Labels are not interpolated."""
     labels = arguments.exemplars[0].labels
     return composite.render(arguments.images, interpolation="nearest" if labels else "cubic")
 

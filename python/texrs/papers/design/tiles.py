@@ -17,9 +17,9 @@ from texrs.source_map import SourceMap
 __all__ = ["fill_holes"]
 
 CANDIDATES = 5
-"""Number of matches that are cut into a hole; the cheapest is kept."""
+"""Number of matches for which the cut into a hole is computed. The match with the cheapest cut is used."""
 KEPT = 2.0
-"""Depth in pixels beyond which elements are not cut when holes are filled. Seams may follow their outlines."""
+"""Depth in pixels beyond which elements are not cut when holes are filled. Seams can follow the outlines."""
 
 
 def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], which: int, seed: int) -> Tile:
@@ -72,7 +72,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
 
 
 def mark_elements(draft: Draft, plan: Plan) -> Bools:
-    """Return the pixels that show the inside of elements, because patches that fill holes would tear them."""
+    """Return a mask of the inside of elements, which patches that fill holes must not replace."""
     if plan.parts.kind not in ("components", "labels"):
         return np.zeros(draft.covered.shape, bool)
     inside = flip((plan.parts.measure_depth(KEPT) >= 1).astype(np.float32), draft.mirror)

@@ -1,7 +1,8 @@
 """Choose whether elements move, by a trial at a small size.
 
-A departure from the paper, which always deforms. Elements that are close, or were not segmented correctly, are torn if
-they move. Patches of the exemplar that are joined between its elements then give the better texture.
+This is a departure from the paper, which always moves elements. Elements that are close together, or were not
+segmented correctly, are torn if they move. Patches of the unchanged exemplar then give a better texture, because their
+seams run between elements.
 """
 
 from __future__ import annotations
@@ -26,12 +27,12 @@ from texrs.source_map import SourceMap
 __all__ = ["choose_plan", "make_composite"]
 
 CLEARLY = 0.85
-"""Ratio of scores below which elements stay in place instead of moving.
+"""Ratio of the score without motion to the score with motion, below which elements stay in place.
 
 It is below 1 because deformation gives more variety.
 """
 LEAST, SHARE = 192, 0.75
-"""Least side of a trial in pixels, and its side as a share of the exemplar's shorter side."""
+"""Minimum side of a trial texture in pixels, and its side as a share of the exemplar's shorter side."""
 TILES = 2
 """Maximum number of deformed copies of the exemplar that a trial is stitched from."""
 TRIAL = 0
@@ -64,9 +65,9 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     plan : Plan
         Plan whose elements move.
     exemplar : Exemplar
-        The example, on the scale of values that decisions are based on.
+        The example, on the common scale of values that decisions are based on.
     elements : ElementOptions
-        Options that its elements were found with.
+        Options with which the elements were found.
     arguments : Arguments
         Arguments of the request. The seed and the size are not used, so that all textures of an exemplar are treated
         the same way.
