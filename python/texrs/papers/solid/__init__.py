@@ -309,7 +309,8 @@ def synthesize(
 
     See Also
     --------
-    solid : The same in three dimensions. texrs.PlaneTexture : Any window of an unbounded image.
+    solid : The same in three dimensions.
+    texrs.PlaneTexture : Any window of an unbounded image.
 
     References
     ----------
