@@ -1,10 +1,10 @@
-"""Images of volumes, and statistics of the similarity of a synthesised volume to its exemplar.
+"""Render volumes, and measure the similarity of a synthesised volume to its exemplar.
 
 Images: `slices`, `oblique_slice`, `render_block`, `render_volume` (transparent), `turntable` and `Viewer` (a page with
-sliders). `label_to_color` gives labels colours, and `extract_surface` returns the triangles around a label. `cubes`
-converts other voxels to cubes.
+sliders). `label_to_color` gives each label a colour, and `extract_surface` returns the triangles of the surface of a
+label. `cubes` converts volumes to cubic voxels.
 
-Statistics. Each can be used alone, most of them also for images. `compare` makes a report of all:
+Statistics: each function can be used alone, and most of them also accept images. `compare` reports all of them:
 
 ===========================  ===============================================================
 `classes`                    colours of a texture's materials, and their shares

@@ -1,4 +1,4 @@
-"""Display of volumes whose voxels are not cubes."""
+"""Convert volumes to cubic voxels for display."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ __all__ = ["cubes", "find_cube"]
 
 
 def cubes(volume: ArrayLike, spacing: Sequence[float]) -> Array:
-    """Convert a volume to cubic voxels by repeating planes, rows and columns. No value changes.
+    """Convert a volume to cubic voxels by repeating planes, rows and columns. No values are interpolated.
 
     Parameters
     ----------
     volume : array_like
         Volume of shape (D, H, W) or (D, H, W, C).
     spacing : (plane, row, column) float
-        Voxel size along each axis, in any unit. The smallest becomes the side of the cubes.
+        Voxel size along each axis, in any unit. The smallest size becomes the side of the cubes.
 
     Returns
     -------
     ndarray
-        Volume in the same dtype; the volume itself if its voxels are cubes.
+        Volume of cubic voxels in the same dtype, or the same array if its voxels are already cubes.
 
     Raises
     ------
     InvalidInput
-        If the volume or the spacing is invalid.
+        The volume or the spacing is invalid.
 
     Examples
     --------
@@ -55,6 +55,6 @@ def cubes(volume: ArrayLike, spacing: Sequence[float]) -> Array:
 
 
 def find_cube(place: int, length: int, side: int) -> int:
-    """Return the cube along an axis that shows a plane, when ``length`` planes became ``side`` cubes."""
+    """Return the index of a plane of the original volume (``length`` planes) after conversion to ``side`` planes."""
     number = place + length if place < 0 else place
     return place if length == side or not 0 <= number < length else int((number + 0.5) * side / length)

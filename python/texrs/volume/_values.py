@@ -1,4 +1,4 @@
-"""Checks and views that the statistics share."""
+"""Argument checks and array views that the statistics share."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from texrs.fields._spaced import as_distances
 
 
 def drop_last(array: Array, axis: int, step: int) -> Array:
-    """Return all but the last lines along an axis."""
+    """Return a view without the last ``step`` lines along an axis."""
     return array[(slice(None),) * axis + (slice(0, array.shape[axis] - step),)]
 
 
 def drop_first(array: Array, axis: int, step: int) -> Array:
-    """Return all but the first lines along an axis."""
+    """Return a view without the first ``step`` lines along an axis."""
     return array[(slice(None),) * axis + (slice(step, None),)]
 
 
 def correlate(values: Array, reach: int, product: np.ufunc) -> NDArray[np.float64]:
-    """Return the mean product of values and those a number of steps further along each axis, (A, reach + 1).
+    """Return the mean product of values that are 0 to ``reach`` steps apart, along each axis, (A, reach + 1).
 
-    NaN beyond the ends.
+    Steps that are longer than the axis give NaN.
     """
     out = np.full((values.ndim, reach + 1), np.nan)
     for axis in range(values.ndim):
@@ -39,7 +39,7 @@ def correlate(values: Array, reach: int, product: np.ufunc) -> NDArray[np.float6
 
 
 def by_distance(curves: NDArray[np.float64], spacing: Sequence[float] | None) -> NDArray[np.float64]:
-    """Convert curves over steps along each axis (A, N) to curves over multiples of the smallest spacing."""
+    """Convert curves along each axis (A, N) from steps in samples to multiples of the smallest spacing."""
     steps, lags = np.array(as_distances(spacing, len(curves))), np.arange(curves.shape[1])
     if (steps == steps[0]).all():
         return curves
@@ -47,13 +47,13 @@ def by_distance(curves: NDArray[np.float64], spacing: Sequence[float] | None) ->
 
 
 def turn_in_space(field: Field, points: ArrayLike, spacing: Sequence[float] | None) -> NDArray[np.float64]:
-    """Return the Jacobians in space of a field of voxels at points."""
+    """Return the Jacobians of a field at points, converted from voxels to the unit of the spacing."""
     steps = np.array(as_distances(spacing, field.axes))
     return np.asarray(field.jacobians(points).astype(np.float64) * (steps[:, np.newaxis] / steps))
 
 
 def check_field(field: object, axes: int) -> Field | None:
-    """Check that a field, if given, has a number of axes, and return it."""
+    """Check that a field is None or has the given number of axes, and return it."""
     if field is not None and (not isinstance(field, Field) or field.axes != axes):
         got = field if isinstance(field, Field) else type(field).__name__
         raise InvalidInput(f"field: must be a field with {axes} axes, got {got}")
@@ -61,12 +61,12 @@ def check_field(field: object, axes: int) -> Field | None:
 
 
 def guess_axes(image: Array) -> int:
-    """Return the number of axes without channels. A last axis of up to 4 of three axes is taken for channels."""
+    """Return the number of spatial axes. With three axes, a last axis of up to 4 entries contains channels."""
     return {2: 2, 4: 3}.get(image.ndim, 2 if image.ndim == 3 and image.shape[-1] <= 4 else 3)
 
 
 def as_colours(image: ArrayLike, name: str, axes: int | None) -> Floats:
-    """Return the colours of an image or a volume in [0, 1], channels last."""
+    """Return the colours of an image or a volume, scaled to [0, 1], with the channels as the last axis."""
     if axes is None:
         with suppress(ValueError, TypeError):  # `as_image` reports values that are not arrays.
             image = as_ndarray(image, name, axes=3)
@@ -76,7 +76,7 @@ def as_colours(image: ArrayLike, name: str, axes: int | None) -> Floats:
 
 
 def as_values(values: ArrayLike, name: str = "values") -> Floats:
-    """Return finite values of one channel, in 2-D or in 3-D."""
+    """Return an array of one channel, (H, W) or (D, H, W), after a check that it is finite."""
     array = as_array(values, name, np.float32)
     if array.ndim not in (2, 3) or array.size == 0:
         raise InvalidInput(f"{name}: must have shape (H, W) or (D, H, W), got {array.shape}")
@@ -85,7 +85,7 @@ def as_values(values: ArrayLike, name: str = "values") -> Floats:
 
 
 def as_region(mask: ArrayLike) -> Bools:
-    """Return a mask in 2-D or in 3-D."""
+    """Return a bool mask, (H, W) or (D, H, W)."""
     array = as_array(mask, "mask", np.bool_)
     if array.ndim not in (2, 3) or array.size == 0:
         raise InvalidInput(f"mask: must have shape (H, W) or (D, H, W), got {array.shape}")
@@ -93,7 +93,7 @@ def as_region(mask: ArrayLike) -> Bools:
 
 
 def as_direction(value: object, name: str) -> NDArray[np.float64]:
-    """Return three numbers, for planes, rows and columns. A normal must have a length."""
+    """Return a vector (plane, row, column) of finite numbers. A normal must not be zero."""
     out = try_array(value, np.float64)
     if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
         raise InvalidInput(f"{name}: must be three numbers (plane, row, column), got {str(value)[:60]}")

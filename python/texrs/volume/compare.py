@@ -1,4 +1,4 @@
-"""Report on the similarity of a synthesised image or volume to its exemplar."""
+"""Report how similar a synthesised image or volume is to its exemplar."""
 
 from __future__ import annotations
 
@@ -28,38 +28,40 @@ _REACH = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Result of `compare`. Pairs are of the exemplar and the output.
+    """Result of `compare`. Each pair contains the value of the exemplar and the value of the output.
 
     Attributes
     ----------
     shares : (2, K) float64
-        Share of each class, from dark to light (or by label).
+        Fraction of the points in each of K classes, from dark to light (or by label).
     particles : tuple of ComponentStatistics
-        Connected pieces of the chosen classes or labels: their number in 100 000 voxels, and their sizes.
+        Connected components of the chosen classes or labels: their number per 100 000 points, and their sizes.
     frequency : tuple of float
-        Mean spectral frequency of the slices.
+        Mean spectral frequency of the slices, in cycles per sample.
     two_point : (2, A, 13) float64
-        Two-point correlation of the chosen material, along each axis, by step.
+        Two-point correlation of the chosen classes along each of A axes, for steps of 0 to 12.
     lineal_path : (2, A, 13) float64
-        Lineal path function of the chosen material.
+        Lineal path function of the chosen classes, for the same axes and steps.
     autocorrelation : (2, A, 13) float64
-        Autocorrelation of the lightness.
+        Autocorrelation of the lightness, for the same axes and steps.
     isolated : tuple of float
-        Share of voxels that differ from their surroundings.
+        Fraction of the points that differ from the median of their neighbourhood (`speckle`).
     values : float
-        Mean distance of the values of the slices from those of the exemplar, in [0, 1].
+        Mean Wasserstein distance of the lightness of the output's slices to that of the exemplar, in [0, 1].
     seams : (2,) float64
-        Minimum and maximum change from plane to plane of the output, divided by the median of its axis.
+        Minimum and maximum change between adjacent planes of the output, divided by the median change along the same
+        axis.
     orientation : (2, 2) float64 or None
         Median and 90th percentile of the angle between the layers and their expected direction, in degrees. The
-        exemplar is compared with its own normal, and the output with the field. None without a field.
+        expected direction is the exemplar's own normal in the first row, and the normal rotated by the field in the
+        second row (the output). None without a field.
     turned : float or None
-        Mean angle in degrees between the exemplar's normal before and after the field. If it is 0, the orientation has
-        no meaning.
+        Mean angle in degrees by which the field rotates the exemplar's normal. If it is 0, the field does not affect
+        the orientation. None without a field.
     reuse : CellReuse or None
-        Use of the exemplar. None without a source map.
+        How much of the exemplar the output uses, and how often. None without a source map.
     integrity : Integrity or None
-        Integrity of the elements. None without a source map, or without separate elements.
+        Integrity of separate elements. None without a source map, or if the exemplar has no separate elements.
 
     Examples
     --------
@@ -89,21 +91,21 @@ class Comparison:
 
     @property
     def relative_shares(self) -> NDArray[np.float64]:
-        """Share of each class in the output divided by that in the exemplar, (K,)."""
+        """Fraction of each class in the output, divided by its fraction in the exemplar, (K,)."""
         return np.asarray(self.shares[1] / np.maximum(self.shares[0], 1e-30))
 
     @property
     def frequency_ratio(self) -> float:
-        """Frequency of the output divided by that of the exemplar. 1 is equally fine, 0.5 twice as large."""
+        """Frequency of the output divided by that of the exemplar: 1 for equally fine, 0.5 for twice as coarse."""
         return self.frequency[1] / self.frequency[0]
 
     @property
     def text(self) -> str:
-        """Table of the report. A ratio near 1 and a distance near 0 mean that output and exemplar are similar.
+        """Table of the report. If output and exemplar are similar, ratios are near 1 and distances near 0.
 
         The distances of two-point correlations, lineal paths and autocorrelations are mean absolute differences over
         all axes and steps. "distance of values" is `values`, and "isolated voxels" is `isolated`. "change from plane
-        to plane / median" is `seams`. A large maximum means a visible seam.
+        to plane / median" is `seams`, where a large maximum means a visible seam.
         """
         rows = [("", "exemplar", "output", "output/exemplar")]
 
@@ -111,7 +113,7 @@ class Comparison:
             rows.append((name, format(pair[0], form), format(pair[1], form), f"{_divide(pair):.2f}"))
 
         for k, (before, after) in enumerate(self.shares.T.tolist()):
-            # Labels need not be consecutive: those that do not occur have no row.
+            # Labels need not be consecutive, so omit labels that do not occur.
             if before or after:
                 row(f"share of class {k}", (before, after), ".3f")
         first, second = self.particles
@@ -142,13 +144,13 @@ class Comparison:
             row("parts of several colours", self.integrity.mixed, ".3f")
             rows.append(("torn elements / all", "", f"{self.integrity.torn:.3f}", ""))
             rows.append(("crumbs in 100 000", "", f"{self.integrity.crumbs:.1f}", ""))
-        # Align the columns.
+        # Pad the columns to equal widths.
         widths = [max(len(r[i]) for r in rows) for i in range(4)]
         lines = [r[0].ljust(widths[0]) + "".join("  " + r[i].rjust(widths[i]) for i in (1, 2, 3)) for r in rows]
         return "\n".join(line.rstrip() for line in lines)
 
     def __str__(self) -> str:
-        """Return the table."""
+        """Return the report as a table."""
         return self.text
 
 
@@ -168,33 +170,38 @@ def compare(
     Parameters
     ----------
     exemplar, output : array_like
-        (H, W[, C]) or (D, H, W[, C]), of one dtype and one number of channels, with sides of at least 16.
+        Images (H, W[, C]) or volumes (D, H, W[, C]), with the same dtype and number of channels, and sides of at least
+        16.
     source : SourceMap, optional
-        Source map of the output. It adds reuse, and the integrity of elements.
+        Source map of the output. If given, the report includes the use of the exemplar and the integrity of elements.
+        Default: None.
     field : Field, optional
-        Field of the output. It adds the orientation of its layers, and determines which neighbours are coherent. The
-        size of the output sets parameters that are not given (`texrs.fields.Field.over`).
+        Field of the output. If given, the report includes the orientation of layers, and neighbours count as coherent
+        if they follow the field. Parameters that the field leaves open are derived from the size of the output
+        (`texrs.fields.Field.over`). Default: None.
     classes : int or None
-        Number of colour classes of the exemplar, 2 to 16. None: both arrays are labels, whole numbers from 0 to 255
+        Number of colour classes of the exemplar, 2 to 16. None if both arrays are labels: integers from 0 to 255,
         without channels.
     chosen : int or tuple of int, optional
-        Classes or labels whose pieces are counted. Default: the lighter half of the classes, or all labels except 0.
+        Classes or labels whose connected components are measured. Default: the lighter half of the classes, or all
+        labels except 0.
     axes : int, optional
-        Number of axes, 2 or 3. Default: from the shape: up to 4 along the last of three axes are channels.
+        Number of spatial axes, 2 or 3. Default: from the shape; if there are three axes and the last has up to 4
+        entries, these are channels.
     spacing : sequence of float, optional
-        Distances between samples along each axis, for both. Correlations, paths, sizes and orientations are then in
-        space, and the field is in space. Frequencies stay in samples. Default: the spacing that the file of the
-        exemplar states, else 1.
+        Distances between samples along each axis, for both arrays, in any unit. Correlations, paths, sizes,
+        orientations and the field then use this unit. Frequencies remain in cycles per sample. Default: the spacing
+        that the file of the exemplar states, else 1.
 
     Returns
     -------
     Comparison
-        Its `text` is a table.
+        Report, which `Comparison.text` formats as a table.
 
     Raises
     ------
     InvalidInput
-        If the arrays are invalid or too small, or no chosen class exists.
+        The arrays are invalid or too small, or a chosen class does not exist.
 
     Examples
     --------
@@ -217,7 +224,7 @@ def compare(
         )
     if source is not None and (not isinstance(source, SourceMap) or source.shape != second.shape[:count]):
         raise InvalidInput(f"source: must be the source map of the output, over {second.shape[:count]}")
-    # Classify both arrays, and choose the classes whose pieces are counted.
+    # Classify both arrays, and choose the classes whose connected components are measured.
     if classes is None:
         labels = _as_labels(first, "exemplar"), _as_labels(second, "output")
         kinds = int(max(a.max() for a in labels)) + 1
@@ -231,12 +238,12 @@ def compare(
         pick = tuple(range(kinds // 2 + kinds % 2, kinds)) if chosen is None else _choose(chosen, kinds)
         before, after = statistics.lightness(first, axes=count), statistics.lightness(second, axes=count)
     grey = before, after
-    # Compare both arrays with windows of the same size.
+    # Use windows of the same size for both arrays, so that their frequencies can be compared.
     masks = tuple(np.isin(a, pick) for a in labels)
     seams = np.concatenate(structure.seam_planes(grey[1]))
     window = min(64, *first.shape[:count], *second.shape[:count])
     orientation, turned = None, None
-    # Compare the output's layers with the exemplar's normal, turned by the field.
+    # Compare the layers of the output with the exemplar's normal, rotated by the field.
     if field is not None:
         check_field(field, count)
         field = space(field, spacing).over(second.shape[:count])
@@ -270,7 +277,7 @@ def compare(
 def _turn_normal(
     field: Field, shape: tuple[int, ...], normal: NDArray[np.float64], spacing: Sequence[float] | None
 ) -> float:
-    """Return the mean angle between the exemplar's normal and its direction after the field."""
+    """Return the mean angle in degrees by which a field rotates the exemplar's normal."""
     lines = [np.linspace(0, n - 1, min(n, 16)) for n in shape]
     frames = turn_in_space(field, np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1), spacing)
     there = np.einsum("...ji,j->...i", frames, normal)
@@ -279,7 +286,7 @@ def _turn_normal(
 
 
 def _share_range(first: Array, second: Array) -> tuple[Array, Array]:
-    """Scale floats to [0, 1] by the exemplar's range if it is larger. Integers use the range of their dtype."""
+    """Scale floats outside [0, 1] by the exemplar's range to [0, 1]. Return integers unchanged."""
     low, high = (float(f(first)) for f in (np.min, np.max))
     if first.dtype.kind != "f" or (low >= 0 and high <= 1):
         return first, np.clip(second, 0, 1) if second.dtype.kind == "f" else second
@@ -306,6 +313,6 @@ def _divide(pair: tuple[float, float]) -> float:
 
 
 def _measure_distance(pair: NDArray[np.float64]) -> float:
-    """Return the mean absolute difference where both are known."""
+    """Return the mean absolute difference of two curves at the steps where both are finite."""
     off = np.abs(pair[1] - pair[0])
     return float(off[np.isfinite(off)].mean())

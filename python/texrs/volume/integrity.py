@@ -1,4 +1,4 @@
-"""Integrity of the separate elements of an exemplar in a synthesised result."""
+"""Measure whether the separate elements of an exemplar are whole in a synthesised result."""
 
 from __future__ import annotations
 
@@ -17,35 +17,36 @@ from texrs.source_map import SourceMap
 __all__ = ["Integrity", "integrity"]
 
 FOLLOW = 1.6
-"""Maximum deviation in samples of neighbours' coordinates, after their frames, within one piece."""
+"""Maximum distance of neighbours in one piece, in exemplar samples, times the scale of their frames."""
 WHOLE, CRUMB = 0.9, 0.3
-"""Shares of an element: above the first a piece is whole, below the second it is a crumb."""
+"""Fractions of an element's area: pieces above the first are whole, and pieces below the second are crumbs."""
 LEAST = 40
-"""Minimum number of points of a part whose colours are compared."""
+"""Minimum number of points of a part or element that is measured."""
 SECOND = 0.12
-"""Minimum share of a second colour for a part to have several colours."""
+"""Minimum fraction of other colours for a part to count as one of several colours."""
 
 
 @dataclass(frozen=True, slots=True)
 class Integrity:
-    """Integrity of elements. Pairs are of the exemplar and the output.
+    """Integrity of elements. Each pair contains the value of the exemplar and the value of the output.
 
     Attributes
     ----------
     contacts : tuple of float
-        Pairs of neighbours in elements of different colours, in 1000 points. There should be a border between them.
+        Number of adjacent points, per 1000 points, that are in elements of different colours with no border between
+        them.
     largest : tuple of float
-        Share of the elements' points in the largest connected part.
+        Fraction of the points in elements that belongs to the largest connected part.
     mixed : tuple of float
-        Share of connected parts with several colours of elements.
+        Fraction of the connected parts that contain elements of several colours.
     density : tuple of float
-        Parts in 100 000 points. Parts that a border cuts are not counted, and the others count more to compensate
-        (Miles and Lantuéjoul). The size of the output then does not matter.
+        Number of connected parts per 100 000 points. Parts that a border cuts are excluded, and the others are
+        weighted to compensate (Miles and Lantuéjoul), so that the size of the output has no influence.
     torn : float
-        Share of the output's points in elements whose piece has less than 0.9 of its element. Pieces at a border of
-        the output are not counted.
+        Fraction of the points in elements of the output whose piece is less than 0.9 of its element. Pieces at a
+        border of the output are excluded.
     crumbs : float
-        Pieces with less than 0.3 of their element, in 100 000 points.
+        Number of pieces, per 100 000 points, that are less than 0.3 of their element.
 
     Examples
     --------
@@ -72,21 +73,21 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
     Parameters
     ----------
     exemplar : (D, H, W), (D, H, W, C), (H, W) or (H, W, C) array, or Exemplar
-        Exemplar of the result.
+        Exemplar from which the result was synthesised.
     source : SourceMap
-        Source map of an image or a volume that was made from this exemplar only.
+        Source map of an image or a volume that was synthesised from this exemplar only.
     axes : int
-        Number of axes of an array, 2 or 3.
+        Number of spatial axes of an array, 2 or 3.
 
     Returns
     -------
     Integrity or None
-        None if the exemplar has no separate elements (`texrs.Exemplar.instances`).
+        Measured integrity; None if the exemplar has no separate elements (`texrs.Exemplar.instances`).
 
     Raises
     ------
     InvalidInput
-        If the exemplar is not an image.
+        The exemplar is not an image or a volume.
 
     Examples
     --------
@@ -120,7 +121,7 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """Elements in a source map: the element of each point, its sample, and connected parts."""
+    """Elements that a source map shows: the element of each point, and connected parts of elements."""
 
     elements: NDArray[np.uint32]
     inside: NDArray[np.bool_]
@@ -147,7 +148,7 @@ class _Shown:
 
         total = 0.0
         for size, box in zip(self.sizes, ndimage.find_objects(self.parts), strict=True):
-            # Count the positions where the part would not touch a border.
+            # Count the positions of the part in the output at which it would not touch a border.
             places = 1 if size >= LEAST else 0
             for side, length, cyclic in zip(box, self.parts.shape, self.wrap, strict=True):
                 whole = side.start > 0 and side.stop < length
@@ -156,7 +157,7 @@ class _Shown:
         return round(1e5 * total, 2)
 
     def count_contacts(self) -> float:
-        """Return the pairs of neighbours in elements of different colours, in 1000 points."""
+        """Return the number of adjacent points in elements of different colours, without a border, per 1000 points."""
         total = 0
         for axis in range(self.elements.ndim):
             (p, q), (m, n) = (_pair(a, axis) for a in (self.elements, self.inside))
@@ -165,7 +166,7 @@ class _Shown:
         return round(total / self.elements.size * 1e3, 3)
 
     def measure_mixed(self) -> float:
-        """Return the share of parts whose second colour exceeds its share."""
+        """Return the fraction of the parts that contain several colours."""
         from scipy import ndimage
 
         judged = np.flatnonzero(self.sizes >= LEAST) + 1
@@ -180,7 +181,7 @@ class _Shown:
         return round(several / max(len(judged), 1), 4)
 
     def measure_pieces(self, found: Instances, source: SourceMap) -> tuple[float, float]:
-        """Return the share of points in torn pieces, and the crumbs in 100 000 points."""
+        """Return the fraction of the points in torn pieces, and the number of crumbs per 100 000 points."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -191,7 +192,7 @@ class _Shown:
         for axis in range(self.elements.ndim):
             (p, q), (i, j) = (_pair(a, axis) for a in (self.elements, index))
             step = np.diff(source.coordinates, axis=axis)
-            # Continue across the borders of a periodic exemplar.
+            # Distances wrap around the borders, because the exemplar can be periodic.
             sides = np.array(found.labels.shape)
             step = np.linalg.norm(np.minimum(np.abs(step), np.abs(sides - np.abs(step))), axis=-1)
             follow = (p > 0) & (p == q) & (step <= FOLLOW * np.maximum(_pair(reach, axis)[0], 1))
@@ -199,7 +200,7 @@ class _Shown:
         rows, columns = np.concatenate(edges, axis=1)
         graph = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(index.size,) * 2)
         pieces = connected_components(graph, directed=False)[1]
-        # A point represents as much of the exemplar as its frame covers.
+        # Weight each point by the area of the exemplar that its frame covers.
         worth = np.ones(index.size) if frames is None else np.abs(np.linalg.det(frames)).reshape(-1)
         inside = self.elements.reshape(-1) > 0
         sizes = np.bincount(pieces[inside], worth[inside], minlength=pieces.max() + 1)
@@ -219,7 +220,7 @@ class _Shown:
 
 
 def _average_elements(colours: Floats, found: Instances) -> Floats:
-    """Return the mean colour of each element, in standard deviations of the exemplar."""
+    """Return the mean colour of each element, in units of the exemplar's standard deviation."""
     flat = colours.reshape(-1, colours.shape[-1]).astype(np.float64)
     labels = found.labels.reshape(-1)
     counts = np.maximum(np.bincount(labels), 1)
@@ -228,6 +229,6 @@ def _average_elements(colours: Floats, found: Instances) -> Floats:
 
 
 def _pair(array: Array, axis: int) -> tuple[Array, Array]:
-    """Return each point except the last along an axis, and the next one."""
+    """Return two views of an array: all points but the last along an axis, and their next neighbours."""
     n = array.shape[axis]
     return np.take(array, range(n - 1), axis), np.take(array, range(1, n), axis)

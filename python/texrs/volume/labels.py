@@ -1,4 +1,4 @@
-"""Volumes of labels: colours of labels, and the surface of a label."""
+"""Colours for labels, and the surface of a label in a volume."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ __all__ = ["extract_surface", "label_to_color"]
 _GROUND = (233, 230, 222)
 _MOST_COLOURS = 2**16
 _GOLDEN = 0.6180339887498949
-"""Step of hue that never returns to an earlier hue."""
+"""Step of the hue. Multiples of the golden section never repeat a hue."""
 
 
 def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uint8]:
-    """Give each label a colour for display.
+    """Convert labels to colours for display.
 
     Parameters
     ----------
     labels : array_like
-        Bool or integers of at least 0, (H, W) or (D, H, W).
+        Labels as bool or non-negative integers, (H, W) or (D, H, W).
     colours : (K, 3) array_like, optional
-        Colours in uint8, in the order of the labels, which must then be below K. Default: 0 is light, and the others
-        have different colours. A label has the same colour in every volume.
+        Colours in uint8 in the order of the labels, which must be below K. Default: a light colour for 0, and
+        different colours for the others, the same in every volume.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
     Raises
     ------
     InvalidInput
-        If the values are not labels, or a label has no colour.
+        The values are not labels, or a label has no colour.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
     if colours is None:
         table = _make_table(min(largest + 1, _MOST_COLOURS))
         if largest >= len(table):
-            # Very many labels share some colours, but none shares the colour of the background.
+            # If there are very many labels, some share a colour, but never the colour of label 0.
             array = np.where(array < len(table), array, array % (_MOST_COLOURS - 1) + 1)
         return np.ascontiguousarray(table[array.astype(np.intp)])
     given = try_array(colours)
@@ -73,28 +73,28 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
 def extract_surface(
     mask: ArrayLike, *, spacing: Sequence[float] = (1, 1, 1), closed: bool = True
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Extract the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
+    """Extract the surface of a mask as triangles, for `texrs.io.write_surface` (marching cubes).
 
     Parameters
     ----------
     mask : array_like
         Mask of the material, bool or integers, (D, H, W), such as ``labels == 2``.
     spacing : sequence of 3 float
-        Distances between planes, rows and columns.
+        Distances between planes, rows and columns, in any unit. Default: 1 each.
     closed : bool
-        If True, pieces that the border cuts are closed there, so that the surface has an inside.
+        If True, the surface is closed at the borders of the volume.
 
     Returns
     -------
     vertices : (N, 3) float32
-        Corners as x, y, z: columns, rows and planes times their spacing.
+        Vertices (x, y, z): column, row and plane times their spacing.
     faces : (M, 3) int64
-        Three corners for each triangle, counter-clockwise as seen from outside.
+        Indices of the three vertices of each triangle, counter-clockwise as seen from outside.
 
     Raises
     ------
     InvalidInput
-        If it is not a mask of at least 2 voxels a side, or has no surface.
+        The argument is not a mask with at least 2 voxels per side, or has no surface.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def extract_surface(
 
 
 def _make_table(count: int) -> Array:
-    """Return colours with hues by the golden section, and three brightnesses in turn."""
+    """Return colours with hues in steps of the golden section, and with three alternating brightnesses."""
     k = np.arange(count)
     hue = 6 * (k * _GOLDEN % 1)
     value = np.array([0.86, 0.66, 0.48])[k % 3]

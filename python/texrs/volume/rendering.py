@@ -1,4 +1,4 @@
-"""Images of volumes: slices, oblique slices, a block and a turntable."""
+"""Render images of volumes: slices, oblique slices, a solid block, and a turntable animation."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ from texrs.volume._values import as_direction
 __all__ = ["oblique_slice", "render_block", "slices", "turntable"]
 
 _LARGEST = 4096
-"""Maximum side of images of blocks, in pixels."""
+"""Maximum side of an image of a block, in pixels."""
 _MOST = 2**26
-"""Maximum total pixels of a turntable."""
+"""Maximum number of pixels of all frames of a turntable."""
 _MARGIN = 1.04
 _FINE = 3
-"""Rays a pixel, along each side."""
+"""Number of rays per pixel along each side."""
 _BAND = 16
-"""Lines of pixels rendered at a time."""
+"""Number of image rows that are rendered at once."""
 _LIGHT = np.array([0.86, 1.0, 0.72], np.float32)
-"""Brightness of faces across planes, rows and columns. The light comes from above."""
+"""Brightness of the faces perpendicular to planes, rows and columns. The light comes from above."""
 
 
 def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) -> Array:
-    """Return three slices side by side: across the planes, the rows and the columns.
+    """Return an image of three slices side by side: one plane, one slice across the rows and one across the columns.
 
     Parameters
     ----------
     volume : array_like
         Volume of shape (D, H, W) or (D, H, W, C).
     at : sequence of 3 int, optional
-        Plane, row and column of the slices. Negative numbers count from the end. Default: the middle.
+        Plane, row and column of the slices. Negative numbers count from the end. Default: the middle of the volume.
     gap : int
-        Pixels between the slices. These, and the rest next to unequal slices, are white (the largest value).
+        Width of the gaps between the slices, in pixels. Gaps and unused areas are white (the largest value).
 
     Returns
     -------
     ndarray
-        Image in the volume's dtype. The first slice shows rows and columns, the second planes and columns, the third
-        planes and rows.
+        Image in the dtype of the volume. The first slice shows rows and columns, the second planes and columns, and
+        the third planes and rows.
 
     Raises
     ------
     InvalidInput
-        If the volume is invalid, or a place is outside it.
+        The volume is invalid, or a slice is outside it.
 
     Examples
     --------
@@ -90,33 +90,34 @@ def oblique_slice(
     size: int | Sequence[int] | None = None,
     interpolation: Interpolation = "linear",
 ) -> Array:
-    """Return an oblique slice of a volume along any plane.
+    """Return the slice of a volume along an oblique plane.
 
     Parameters
     ----------
     volume : array_like
         Volume of shape (D, H, W) or (D, H, W, C).
     point : sequence of 3 float, optional
-        (plane, row, column) of a point of the slice, in voxels. Default: the middle of the volume.
+        (plane, row, column) of a point of the slice, in voxels. Default: the centre of the volume.
     normal : sequence of 3 float, optional
-        Normal of the slice. The image's columns are as parallel to the volume's columns as possible, or to its rows if
-        the normal is along the columns.
+        Normal (plane, row, column) of the slice. The columns of the image are as parallel as possible to the columns
+        of the volume, or to its rows if the normal points along the columns.
     axes : (2, 3) array_like, optional
-        The steps of the image's rows and columns in voxels, instead of ``normal``.
+        Steps (plane, row, column), in voxels, from one row and from one column of the image to the next. They replace
+        ``normal``. Default: None.
     size : int or (rows, columns), optional
-        Size of the image in pixels, with the point in its middle. Default: the whole slice.
+        Size of the image in pixels, with the point at its centre. Default: large enough for the whole slice.
     interpolation : {"linear", "cubic", "nearest"}
         Interpolation between voxels. Use "nearest" for labels.
 
     Returns
     -------
     ndarray
-        Image in the volume's dtype; 0 outside the volume.
+        Image in the dtype of the volume, with 0 outside the volume.
 
     Raises
     ------
     InvalidInput
-        If the volume, the point or the direction is invalid, or the slice misses the volume.
+        The volume, the point or the direction is invalid, or the slice does not meet the volume.
 
     Examples
     --------
@@ -161,33 +162,33 @@ def render_block(
     elevation: float = 30,
     interpolation: Interpolation = "linear",
 ) -> NDArray[np.uint8]:
-    """Render a volume as a block of its material, seen from its front, its right and above.
+    """Render a volume as a solid block, seen from the front, the right and above.
 
-    The front is plane 0. To its right is the last column, and above it is row 0.
+    The front is plane 0. The face to its right is the last column, and the face above is row 0.
 
     Parameters
     ----------
     volume : array_like
-        Volume of shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey. Only the first 3 of more
-        channels are shown.
+        Volume of shape (D, H, W) or (D, H, W, C). Transparent voxels are shown over mid grey. Of more than 4 channels,
+        only the first 3 are shown.
     size : int
         Longer side of the image in pixels, 16 to 4096. Default: 512.
     azimuth : float
-        Rotation of the view to the right in degrees. If 0, only the front is visible.
+        Angle from which the block is seen, to the right of its front, in degrees. If 0, the right face is not visible.
     elevation : float
-        Rotation of the view upwards in degrees, -90 to 90. Default: 30.
+        Angle from which the block is seen, above its front, in degrees, -90 to 90. Default: 30.
     interpolation : {"linear", "cubic", "nearest"}
         Interpolation between voxels. "nearest" shows each voxel as a square.
 
     Returns
     -------
     ndarray
-        Image of shape (rows, columns, 4), uint8: colours, and alpha 0 outside. Edges are smooth.
+        Image of shape (rows, columns, 4), uint8: antialiased colours, and alpha 0 outside the block.
 
     Raises
     ------
     InvalidInput
-        If the volume or the angles are invalid.
+        The volume or an angle is invalid.
 
     Examples
     --------
@@ -220,41 +221,41 @@ def turntable(
     overwrite: bool = True,
     progress: Progress | bool | None = None,
 ) -> None:
-    """Write an endless animated GIF of a rotating volume.
+    """Write an animated GIF of a rotating volume, in an endless loop.
 
     Parameters
     ----------
     volume : array_like
-        Volume of shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey. Only the first 3 of more
-        channels are shown.
+        Volume of shape (D, H, W) or (D, H, W, C). Transparent voxels are shown over mid grey. Of more than 4 channels,
+        only the first 3 are shown.
     path : path_like
-        File with the suffix .gif. It is written completely or not at all.
+        File with the suffix .gif. If writing fails, an existing file is unchanged.
     frames : int
-        Number of images of a turn, 2 to 360.
+        Number of frames per turn, 2 to 360.
     size : int
-        Side of the image, 16 to 1024 pixels.
+        Side of the image in pixels, 16 to 1024.
     elevation : float
-        Elevation of the view in degrees, -90 to 90.
+        Angle from which the block is seen, above its front, in degrees, -90 to 90.
     seconds : float
-        Duration of a turn, 0.1 to 600 seconds. Default: 4.
+        Duration of a turn in seconds, 0.1 to 600. Default: 4.
     background : sequence of 3 int
-        Colour of the background, 0 to 255 each.
+        Red, green and blue of the background, 0 to 255 each.
     interpolation : {"linear", "cubic", "nearest"}
         Interpolation between voxels. "nearest" shows each voxel as a square.
     overwrite : bool
-        If True, an existing file may be replaced.
+        If True, an existing file is replaced.
     progress : callable or True, optional
-        Called with the name of the stage and its completed share. An exception that it raises stops the work. True
-        shows a bar.
+        Function that is called with the name of the stage and its completed share, 0 to 1. An exception that it raises
+        stops the work. True shows a progress bar.
 
     Raises
     ------
     InvalidInput
-        If the volume is invalid, or a number is out of its range.
+        The volume is invalid, or a number is out of its range.
     LimitExceeded
-        If there are more than 2^26 pixels in total.
+        All frames together have more than 2^26 pixels.
     FileError
-        If the suffix differs, or the file cannot be written.
+        The suffix is not .gif, or the file cannot be written.
 
     Examples
     --------
@@ -277,7 +278,7 @@ def turntable(
     ground = np.array([as_int(b, "background", 0, 255) for b in shade], np.float32)
     colours = guidance(as_image(volume, "volume", axes=3))
     half = np.array(colours.shape[:3]) / 2
-    # Choose the size of a pixel so that the volume fits into the image in every view.
+    # Choose the scale so that the volume fits into the image in every view.
     wide = float(np.hypot(half[0], half[2]))
     tall = abs(cos(radians(above))) * half[1] + abs(sin(radians(above))) * wide
     pixel = 2 * max(wide, float(tall)) * _MARGIN / side
@@ -290,7 +291,7 @@ def turntable(
                 seen = _render(colours, _view(360 * i / count, above), (side, side), pixel, interpolation)
             alpha = seen[..., 3:] / np.float32(255)
             pictures.append(np.rint(seen[..., :3] * alpha + ground * (1 - alpha)).astype(np.uint8))
-        # Use one palette for all images, because changing palettes flicker.
+        # Use one palette for all frames, because different palettes would flicker.
         few = Image.fromarray(np.concatenate(pictures[:: max(1, count // 6)]))
         palette = few.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
         images: list[Any] = []
@@ -307,7 +308,7 @@ def turntable(
 
 
 def check_cube(size: int = 512, azimuth: float = 40, elevation: float = 30) -> tuple[int, float, float]:
-    """Check the options of a block before the volume is read. Raises as `render_block` does."""
+    """Check the options of `render_block` before the volume is read, and raise the same errors."""
     turned = as_float(azimuth, "azimuth", -1e6, 1e6), as_float(elevation, "elevation", -90, 90)
     return as_int(size, "size", 16, _LARGEST), *turned
 
@@ -315,7 +316,7 @@ def check_cube(size: int = 512, azimuth: float = 40, elevation: float = 30) -> t
 def check_turntable(
     frames: int = 24, size: int = 320, elevation: float = 25, seconds: float = 4
 ) -> tuple[int, int, float, float]:
-    """Check the options of a turntable before the volume is read. Raises as `turntable` does."""
+    """Check the options of `turntable` before the volume is read, and raise the same errors."""
     count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
     above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
     if count * side * side > _MOST:
@@ -328,11 +329,11 @@ def check_turntable(
 def _render(
     colours: Floats, view: NDArray[np.float64], sides: tuple[int, int], pixel: float, interpolation: Interpolation
 ) -> NDArray[np.uint8]:
-    """Cast parallel rays at a block in the middle of the image."""
+    """Cast parallel rays at a block in the centre of the image."""
     shape = np.array(colours.shape[:3])
     half, (down, right, forward) = shape / 2, view
     out = np.zeros((*sides, 4), np.uint8)
-    # A ray parallel to a face never meets it.
+    # Avoid division by zero for rays that are parallel to a face and never meet it.
     slope = np.where(np.abs(forward) < 1e-6, 1e-6, forward)
     across = ((np.arange(sides[1] * _FINE) + 0.5) / _FINE - sides[1] / 2) * pixel
     for top in range(0, sides[0], _BAND):
@@ -362,7 +363,7 @@ def _render(
 
 
 def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
-    """Return the directions down, right and away from the viewer, as (plane, row, column)."""
+    """Return the unit vectors down, right and away from the viewer, as (plane, row, column)."""
     a, e = radians(azimuth), radians(elevation)
     return np.array(
         [
@@ -374,7 +375,7 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
 
 
 def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
-    """Return the steps of rows and columns on a plane, (2, 3): the given ones, or unit steps across a normal."""
+    """Return the steps of image rows and columns in voxels, (2, 3), perpendicular to a normal or as given."""
     if (normal is None) == (axes is None):
         raise InvalidInput("normal, axes: must be given one without the other")
     if axes is not None:
@@ -382,7 +383,7 @@ def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
         if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
             raise InvalidInput("axes: must be two directions of three numbers that are not parallel")
         return steps
-    # A normal along an axis gives the steps of an ordinary slice.
+    # A normal along an axis gives the same image as an ordinary slice.
     across = as_direction(normal, "normal")
     n = across / np.linalg.norm(across)
     along = np.eye(3)[2 if abs(n[2]) < 0.9 else 1]
@@ -395,7 +396,7 @@ def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
 def _clip_ray(
     steps: NDArray[np.float64], point: NDArray[np.float64], shape: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the minimum and maximum number of steps from the point within the box."""
+    """Return the minimum and maximum (row, column) steps from the point to the outline of the slice."""
     corners = np.array(list(product((0, 1), repeat=3))) * (shape - 1)
     normal = np.cross(*steps)
     side = (corners - point) @ normal

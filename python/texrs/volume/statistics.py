@@ -1,7 +1,7 @@
-"""Statistics of the materials of an image or a volume: colours, area fractions, and connected pieces.
+"""Statistics of the materials of an image or a volume: colour classes, volume fractions, and connected components.
 
-Values are scaled to [0, 1] by the dtype, or floats beyond this by their own range (`compare` uses one range for both
-arrays).
+Values are scaled to [0, 1] by the range of their dtype. Floats outside [0, 1] are scaled by their own range (in
+`compare`, by that of the exemplar).
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ __all__ = [
 ]
 
 _SAMPLE = 2**15
-"""Number of pixels that classes are computed from."""
+"""Number of pixels from which classes are computed."""
 _RESTARTS, _TURNS = 6, 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Classes:
-    """Colours that represent the materials of a texture, from dark to light.
+    """Colours that represent the materials of a texture, from dark to light, and classify other pixels.
 
     Attributes
     ----------
@@ -58,24 +58,25 @@ class Classes:
     __repr__ = brief
 
     def of(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.uint8]:
-        """Return the class of each pixel or voxel: the nearest centre, or the lower of two equally near ones.
+        """Return the class of each pixel or voxel: the nearest centre, or the lower index of two equally near centres.
 
         Parameters
         ----------
         image : (H, W[, C]) or (D, H, W[, C]) array_like
-            Image with the channels of the exemplar.
+            Image or volume with the channels of the exemplar.
         axes : int, optional
-            2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
+            Number of spatial axes, 2 or 3. Default: from the shape; if there are three axes and the last has up to 4
+            entries, these are channels.
 
         Returns
         -------
         (H, W) or (D, H, W) uint8
-            Indices of `centres`.
+            Index of the nearest centre in `centres`.
 
         Raises
         ------
         InvalidInput
-            If the image has other channels, or is not finite.
+            The number of channels differs, or values are not finite.
 
         Examples
         --------
@@ -93,24 +94,25 @@ class Classes:
         return self._find_nearest(colours)
 
     def shares(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.float64]:
-        """Return the share of each class.
+        """Return the fraction of the pixels or voxels in each class.
 
         Parameters
         ----------
         image : (H, W[, C]) or (D, H, W[, C]) array_like
-            Image with the channels of the exemplar.
+            Image or volume with the channels of the exemplar.
         axes : int, optional
-            2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
+            Number of spatial axes, 2 or 3. Default: from the shape; if there are three axes and the last has up to 4
+            entries, these are channels.
 
         Returns
         -------
         (K,) float64
-            Shares with the sum 1.
+            Fractions, whose sum is 1.
 
         Raises
         ------
         InvalidInput
-            If the image has other channels, or is not finite.
+            The number of channels differs, or values are not finite.
 
         Examples
         --------
@@ -136,18 +138,18 @@ class Classes:
 
 @dataclass(frozen=True, slots=True)
 class ComponentStatistics:
-    """Number and sizes of the connected pieces of a material (see `component_statistics`).
+    """Number and sizes of the connected components of a material (see `component_statistics`).
 
     Attributes
     ----------
     count : int
-        Number of pieces of at least the minimum size.
+        Number of components of at least the minimum size.
     density : float
-        Pieces in 100 000 pixels or voxels, or in 100 000 units of area or volume if a spacing was given.
+        Components per 100 000 pixels or voxels. If a spacing was given: per 100 000 units of area or volume.
     mean, median : float
-        Size in pixels or voxels, or in units of area or volume. NaN without pieces.
+        Size in pixels or voxels, or in units of area or volume if a spacing was given. NaN if there are no components.
     deciles : tuple of float
-        The nine sizes that 10 %, 20 % ... of the pieces do not exceed.
+        The nine sizes that 10 %, 20 %, ... 90 % of the components do not exceed.
 
     Examples
     --------
@@ -171,14 +173,15 @@ class ComponentStatistics:
 
 
 def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
-    """Return the mean of the colour channels. Transparent pixels count as mid grey.
+    """Return the mean of the colour channels at each point. Transparent points are shown over mid grey.
 
     Parameters
     ----------
     image : (H, W[, C]) or (D, H, W[, C]) array_like
         Image or volume, with or without channels.
     axes : int, optional
-        2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
+        Number of spatial axes, 2 or 3. Default: from the shape; if there are three axes and the last has up to 4
+        entries, these are channels.
 
     Returns
     -------
@@ -188,7 +191,7 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
     Raises
     ------
     InvalidInput
-        If it is not an image or a volume of finite numbers.
+        The argument is not an image or a volume, or not finite.
 
     Examples
     --------
@@ -210,19 +213,20 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
     exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
         Image or volume, with or without channels.
     count : int
-        Number of classes, 2 to 16. An exemplar of fewer colours has one class for each colour.
+        Number of classes, 2 to 16. If the exemplar has fewer colours, each colour is a class.
     axes : int, optional
-        2 for an image, 3 for a volume. Default: from the shape: up to 4 along the last axis are channels.
+        Number of spatial axes, 2 or 3. Default: from the shape; if there are three axes and the last has up to 4
+        entries, these are channels.
 
     Returns
     -------
     Classes
-        The colours, which classify any pixel.
+        Class colours, which can classify any image of the same channels.
 
     Raises
     ------
     InvalidInput
-        If it is not an image or a volume of finite numbers, or the count is out of range.
+        The exemplar is not an image or a volume, or not finite, or ``count`` is out of range.
 
     Examples
     --------
@@ -252,28 +256,27 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
 def two_point_correlation(
     mask: ArrayLike, reach: int = 16, *, spacing: Sequence[float] | None = None
 ) -> NDArray[np.float64]:
-    """Return the two-point correlation S2 along each axis: the probability that both ends of a step are in a material.
+    """Return the two-point correlation S2 along each axis: the chance that two points at a distance are in a material.
 
     Parameters
     ----------
     mask : array_like
         Mask of the material, bool, (H, W) or (D, H, W).
     reach : int
-        Longest step in pixels, at least 1. Steps longer than a side give NaN.
+        Longest distance in pixels, at least 1. Distances longer than a side give NaN.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
-        interpolated between steps. Default: the spacing that the file of the volume
-        states, else 1.
+        Distances between samples along each axis, in any unit. Column k is then the value at k times the smallest
+        spacing, by linear interpolation. Default: the spacing that the file of the volume states, else 1.
 
     Returns
     -------
     ndarray
-        Curves of shape (A, reach + 1). Step 0 is the material's share.
+        One curve per axis, of shape (A, reach + 1). The value at distance 0 is the fraction of the material.
 
     Raises
     ------
     InvalidInput
-        If it is not a mask of two or three axes, or reach is below 1.
+        The argument is not a mask of two or three axes, or ``reach`` is below 1.
 
     Examples
     --------
@@ -298,21 +301,20 @@ def lineal_path_function(
     mask : array_like
         Mask of the material, bool, (H, W) or (D, H, W).
     reach : int
-        Longest step in pixels, at least 1. Steps longer than a side give NaN.
+        Longest segment in pixels, at least 1. Segments longer than a side give NaN.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
-        interpolated between steps. Default: the spacing that the file of the volume
-        states, else 1.
+        Distances between samples along each axis, in any unit. Column k is then the value at k times the smallest
+        spacing, by linear interpolation. Default: the spacing that the file of the volume states, else 1.
 
     Returns
     -------
     ndarray
-        Curves of shape (A, reach + 1). Step 0 is the material's share.
+        One curve per axis, of shape (A, reach + 1). The value at length 0 is the fraction of the material.
 
     Raises
     ------
     InvalidInput
-        If it is not a mask of two or three axes, or reach is below 1.
+        The argument is not a mask of two or three axes, or ``reach`` is below 1.
 
     Examples
     --------
@@ -336,27 +338,28 @@ def lineal_path_function(
 def component_statistics(
     mask: ArrayLike, *, least: int = 8, spacing: Sequence[float] | None = None
 ) -> ComponentStatistics:
-    """Return the number and sizes of the connected pieces of a material. Neighbours share a side.
+    """Return the number and sizes of the connected components of a material. Connected points share a side.
 
     Parameters
     ----------
     mask : array_like
         Mask of the material, bool, (H, W) or (D, H, W).
     least : int
-        Minimum size of a piece in pixels or voxels, at least 1. Smaller pieces are grain and are not counted.
+        Minimum size of a component in pixels or voxels, at least 1. Smaller components are treated as noise and not
+        counted.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Sizes and the density are then in its unit. Default: the spacing
-        that the file of the volume states, else 1.
+        Distances between samples along each axis, in any unit. Sizes and density then use this unit. Default: the
+        spacing that the file of the volume states, else 1.
 
     Returns
     -------
     ComponentStatistics
-        Number, density and sizes of the pieces.
+        Number, density and sizes of the components.
 
     Raises
     ------
     InvalidInput
-        If it is not a mask of two or three axes.
+        The argument is not a mask of two or three axes.
 
     Examples
     --------
@@ -388,7 +391,7 @@ def component_statistics(
 def _find_means(
     points: Floats, weights: NDArray[np.float64], k: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], float]:
-    """Return k centres by Lloyd iterations, and their spread. Initial centres are spread by distance."""
+    """Return k cluster centres by Lloyd iterations, and the remaining variance. The initial centres are far apart."""
     p = points.astype(np.float64)
     centres = p[rng.choice(len(p), 1, p=weights / weights.sum())]
     while len(centres) < k:

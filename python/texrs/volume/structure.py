@@ -1,6 +1,6 @@
-"""Statistics of the arrangement of values in an image or a volume: frequency, orientation, artefacts.
+"""Statistics of the spatial structure of an image or a volume: frequency, orientation and artefacts.
 
-Each takes values of one channel, such as a `lightness`, in 2-D or in 3-D.
+All functions take one value per pixel or voxel, such as the `lightness`.
 """
 
 from __future__ import annotations
@@ -29,34 +29,37 @@ __all__ = [
 ]
 
 _BAND = (1 / 30, 0.45)
-"""Frequencies in cycles a voxel. Lower ones are the trend of a slice, and higher ones its grain."""
+"""Frequencies that are used, in cycles per voxel.
+
+Lower frequencies are the trend of a slice, and higher frequencies are noise.
+"""
 
 
 def autocorrelation(
     values: ArrayLike, reach: int = 12, *, spacing: Sequence[float] | None = None
 ) -> NDArray[np.float64]:
-    """Return the correlation of values with those a number of steps further, along each axis.
+    """Return the autocorrelation along each axis: the correlation of values at a distance.
 
     Parameters
     ----------
     values : array_like
-        Values (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as the `lightness`.
     reach : int
-        Longest step in pixels, at least 1. Steps longer than a side give NaN.
+        Longest distance in pixels, at least 1. Distances longer than a side give NaN.
     spacing : sequence of float, optional
-        Distances between samples along each axis. Column k is then a distance of k times the smallest of them,
-        interpolated between steps. Default: the spacing that the file of the volume
-        states, else 1.
+        Distances between samples along each axis, in any unit. Column k is then the value at k times the smallest
+        spacing, by linear interpolation. Default: the spacing that the file of the volume states, else 1.
 
     Returns
     -------
     ndarray
-        Curves of shape (A, reach + 1), 1 at step 0. One minus this is the variogram divided by the variance.
+        One curve per axis, of shape (A, reach + 1), with 1 at distance 0. One minus the curve is the variogram divided
+        by the variance.
 
     Raises
     ------
     InvalidInput
-        If values are not finite numbers of two or three axes, or reach is below 1.
+        The values are not finite, do not have two or three axes, or ``reach`` is below 1.
 
     Examples
     --------
@@ -74,30 +77,32 @@ def autocorrelation(
 
 
 def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = False) -> float:
-    """Return the mean spectral frequency of a texture, in cycles a pixel.
+    """Return the mean spectral frequency of a texture, in cycles per pixel.
 
-    Each axis slice is cut into windows that overlap by half, with a Hann window. Frequencies from 1/30 to 0.45 are
-    weighted by their power. The result is the mean over the slices.
+    Slices across each axis are cut into half-overlapping windows with a Hann weight. Frequencies from 1/30 to 0.45 are
+    averaged with their power as the weight. The result is the mean over all slices.
 
     Parameters
     ----------
     values : array_like
-        Values (H, W) or (D, H, W), such as a `lightness`. An image is its own only slice.
+        Values (H, W) or (D, H, W), such as the `lightness`. An image is treated as one slice.
     window : int, optional
-        Side of the windows, at least 16. Default: 64, or the shortest side. Compared values need the same windows.
+        Side of the windows in pixels, at least 16. Use the same windows for values that you compare. Default: 64, or
+        the shortest side.
     whole : bool
-        If True, use the spectrum of the volume and not of its slices. It does not change when the volume is rotated,
-        but slices show an oblique layer as wider.
+        If True, the spectrum of the whole volume is used instead of slices. It does not change when the volume is
+        rotated, whereas in slices oblique layers look wider.
 
     Returns
     -------
     float
-        Frequency from 1/30 to 0.45. NaN if all values are equal.
+        Frequency from 1/30 to 0.45 cycles per pixel. NaN if all values are equal.
 
     Raises
     ------
     InvalidInput
-        If values are not finite numbers of two or three axes, a side is below 16, or a window is longer than a side.
+        The values are not finite or do not have two or three axes, a side is below 16, or a window is longer than a
+        side.
 
     Examples
     --------
@@ -118,26 +123,26 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
 
 
 def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tuple[NDArray[np.float64], ...]:
-    """Return the mean change from each plane or line to the next along each axis, divided by the median.
+    """Return the mean change between adjacent planes (or lines) along each axis, divided by the median change.
 
-    Values far from 1 at regular places are traces of an algorithm's lattice.
+    Values far from 1 at regular distances reveal the grid of an algorithm.
 
     Parameters
     ----------
     values : array_like
-        Values (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as the `lightness`.
     wrap : bool or one per axis
-        Axes along which the last plane is followed by the first.
+        Axes along which the values are periodic, so that the last plane is adjacent to the first.
 
     Returns
     -------
     tuple of ndarray
-        One number a step for each axis. Number i belongs to the step from plane i to plane i + 1.
+        One array per axis. Entry i is the change from plane i to plane i + 1.
 
     Raises
     ------
     InvalidInput
-        If values are not finite numbers of two or three axes, or wrap is invalid.
+        The values are not finite or do not have two or three axes, or ``wrap`` is invalid.
 
     Examples
     --------
@@ -149,7 +154,7 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
     31
 
     """
-    # Use halves, because the difference of two values may exceed single precision. The ratios are the same.
+    # Halve the values, because the difference of two values can exceed the range of float32. The ratios are the same.
     v = as_values(values) * np.float32(0.5)
     out = []
     for axis, cyclic in enumerate(as_wrap(wrap, axes=v.ndim)):
@@ -162,24 +167,24 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
 
 
 def speckle(values: ArrayLike, threshold: float = 0.35) -> float:
-    """Return the share of voxels or pixels that differ from the median of their neighbourhood, 3 a side.
+    """Return the fraction of points that differ from the median of their 3 x 3 (x 3) neighbourhood.
 
     Parameters
     ----------
     values : array_like
-        Values (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as the `lightness`.
     threshold : float
-        Minimum difference, in the units of the values, at least 0.
+        Difference above which a point counts, in the units of the values, at least 0.
 
     Returns
     -------
     float
-        Share from 0 to 1.
+        Fraction from 0 to 1.
 
     Raises
     ------
     InvalidInput
-        If values are not finite numbers of two or three axes, or the threshold is negative.
+        The values are not finite or do not have two or three axes, or the threshold is negative.
 
     Examples
     --------
@@ -201,26 +206,26 @@ def speckle(values: ArrayLike, threshold: float = 0.35) -> float:
 
 
 def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 256) -> NDArray[np.float64]:
-    """Return the Wasserstein distance of the values of each axis slice to those of the whole exemplar.
+    """Return the Wasserstein distance between the values of each slice and the values of the exemplar.
 
     Parameters
     ----------
     exemplar : array_like
-        Values of the exemplar, (H, W) or (D, H, W), such as a `lightness`.
+        Values of the exemplar, (H, W) or (D, H, W), such as its `lightness`.
     values : array_like
-        Values of the output, (H, W) or (D, H, W).
+        Values of the output, (H, W) or (D, H, W), whose slices are compared.
     quantiles : int
-        Number of quantiles, 2 to 2^16.
+        Number of quantiles at which the distributions are compared, 2 to 2^16.
 
     Returns
     -------
     ndarray
-        One number a slice, slices across the first axis first. An image gives one number.
+        One distance per slice, starting with the slices across the first axis. An image gives one distance.
 
     Raises
     ------
     InvalidInput
-        If values are not finite numbers of two or three axes, or the number of quantiles is out of range.
+        The values are not finite or do not have two or three axes, or the number of quantiles is out of range.
 
     Examples
     --------
@@ -241,25 +246,25 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
 
 
 def texture_normal(values: ArrayLike, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
-    """Return the direction of the largest change of an exemplar, the normal of its layers.
+    """Return the direction in which an exemplar changes most, which is the normal of its layers.
 
     Parameters
     ----------
     values : array_like
-        Values (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as the `lightness`.
     spacing : sequence of float, optional
-        Distances between samples along each axis. The direction is in space. Default: the spacing that the file of the
-        volume states, else 1.
+        Distances between samples along each axis, in any unit, so that the direction is correct in space. Default: the
+        spacing that the file of the volume states, else 1.
 
     Returns
     -------
     (A,) float64
-        Direction of length 1. Its largest entry is positive.
+        Unit vector whose largest component is positive.
 
     Raises
     ------
     InvalidInput
-        If values are not finite numbers of two or three axes.
+        The values are not finite or do not have two or three axes.
 
     Examples
     --------
@@ -287,36 +292,38 @@ def orientation_errors(
     step: int = 1,
     spacing: Sequence[float] | None = None,
 ) -> Floats:
-    """Return the angle between the layers of a texture and the exemplar's layers after a field.
+    """Return the angles between the layers of a texture and their expected direction under a field.
 
-    The actual normal is the main direction of the structure tensor (gradients of a Gaussian of sigma 1, summed under
-    one of sigma 4). The expected one is J^T n, the transformation of normals, with the exemplar's normal n.
+    The actual normal is the main direction of the structure tensor (gradients of a Gaussian of sigma 1 pixel, averaged
+    with a Gaussian of sigma 4). The expected normal is J^T n, where n is the exemplar's normal and J the Jacobian of
+    the field.
 
     Parameters
     ----------
     values : array_like
-        Values (H, W) or (D, H, W), such as a `lightness`.
+        Values (H, W) or (D, H, W), such as the `lightness`.
     field : Field, optional
         Field of the texture. Default: the identity.
     normal : array_like, optional
-        Normal n of the exemplar, (A,). Default: `texture_normal` of the values themselves.
+        Normal n of the exemplar, (A,). Default: `texture_normal` of ``values``.
     margin : int
-        Pixels at the border that are left out, because the structure tensor lacks data there.
+        Width of the border in pixels that is excluded, because the structure tensor is not reliable there.
     step : int
-        Distance in pixels between measured points along each axis.
+        Distance between measured points along each axis, in pixels.
     spacing : sequence of float, optional
-        Distances between samples along each axis. The field, the normal and the angles are in space. Default: the
-        spacing that the file of the volume states, else 1.
+        Distances between samples along each axis, in any unit, so that the field, the normal and the angles are
+        correct in space. Default: the spacing that the file of the volume states, else 1.
 
     Returns
     -------
     ndarray
-        Degrees from 0 to 90, float32, of the shape less two margins, divided by the step.
+        Angles in degrees, 0 to 90, in float32. The shape is the shape of ``values`` without the margins, divided by
+        ``step``.
 
     Raises
     ------
     InvalidInput
-        If the number of axes differs, the normal has no length, or the margin leaves nothing.
+        The number of axes differs, the normal is zero, or the margins leave no points.
 
     Examples
     --------
@@ -341,7 +348,7 @@ def orientation_errors(
     out = np.empty(tensor.shape[: v.ndim], np.float32)
     for i, plane in enumerate(
         tensor
-    ):  # Process a plane at a time: a dense field of a large volume is many times its size.
+    ):  # Process one plane at a time, because a dense field of a large volume needs many times its memory.
         found = np.linalg.eigh(plane)[1][..., -1]
         wanted = n
         if turned is not None:
@@ -371,15 +378,15 @@ def _measure_structure(v: Floats, sigma: float, spacing: Sequence[float] | None)
 
 
 def _average_frequency(arrays: list[Floats], side: int) -> float:
-    """Return the mean over some arrays of the mean frequency of each. NaN if all are constant."""
+    """Return the mean frequency of each array, averaged over the arrays. NaN if all are constant."""
     axes = arrays[0].ndim
     weights, square = np.ones((side,) * axes, np.float32), np.zeros((side,) * axes)
     for a in range(axes):
         line = (slice(None),) + (np.newaxis,) * (axes - 1 - a)
         weights *= np.hanning(side + 2)[1:-1][line].astype(np.float32)
         square += np.fft.fftfreq(side)[line] ** 2
-    # The spectrum of real data is symmetric. Keep half of the last axis, and count each column twice, except the first
-    # and (for even sides) the last.
+    # The spectrum of real values is symmetric. Keep half of the last axis, and count each column twice, except the
+    # first and (for even sides) the last.
     half = side // 2 + 1
     at = np.sqrt(square[..., :half])
     share = np.where((np.arange(half) == 0) | (2 * np.arange(half) == side), 1.0, 2.0)

@@ -1,7 +1,7 @@
-"""Transparent rendering of volumes: colours are accumulated from front to back along parallel rays.
+"""Render transparent volumes: colours are accumulated from front to back along parallel rays.
 
-A transfer function gives the colour of each value, and its opacity. It is applied to the voxels and not between them,
-so that no colour appears that no voxel has. Surfaces, where it changes, are shaded with light from behind the viewer.
+A transfer function gives each voxel a colour and an opacity. The results are interpolated, and not the values, so that
+no new colours appear. Surfaces, where the opacity changes, are shaded with a light from behind the viewer.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from texrs.volume.rendering import _MARGIN, _view, check_cube
 __all__ = ["Stop", "parse_transfer", "render_volume"]
 
 Stop: TypeAlias = tuple[float, "str | Sequence[float] | None", float]
-"""A value, its colour, and its opacity in one voxel."""
+"""Stop of a transfer function: a value, its colour, and the opacity of one voxel."""
 
 _BAND = 32
-"""Lines of pixels rendered at a time."""
+"""Number of image rows that are rendered at once."""
 _AT_ONCE = 16
-"""Steps along rays that are looked up at a time."""
+"""Number of steps along the rays that are sampled at once."""
 _ENOUGH = np.float32(0.002)
-"""Share of the light below which nothing more is visible."""
+"""Fraction of the light below which the voxels behind are no longer visible."""
 _AMBIENT = 0.55
-"""Brightness of surfaces turned away from the light."""
+"""Brightness of surfaces that face away from the light."""
 _LIGHT = (-0.45, -0.35, -0.82)
-"""Direction of the light: down, right and away from the viewer."""
+"""Direction of the light (down, right, away from the viewer)."""
 _LEVELS = 12
-"""Levels of each channel for the search of the background colour."""
+"""Number of levels per channel of the histogram that finds the background colour."""
 _NEAR, _FAR = 0.35, 0.75
-"""Shares of the largest difference from the background: voxels begin to be visible, and are fully visible."""
+"""Fractions of the largest difference from the background: voxels begin to be visible, or are fully visible."""
 _THICK = 8.0
-"""Number of visible voxels, of a hundred along the longest side, that absorb most of the light."""
+"""Number of visible voxels that absorb most of the light, if the longest side has 100 voxels."""
 
 
 def render_volume(
@@ -52,41 +52,42 @@ def render_volume(
     transfer: str | Sequence[Stop] | None = None,
     shading: bool = True,
 ) -> NDArray[np.uint8]:
-    """Render a transparent volume, from the same side as `render_block`.
+    """Render a transparent volume, seen from the same side as in `render_block`.
 
     Parameters
     ----------
     volume : array_like
-        Volume of shape (D, H, W) or (D, H, W, C). Only the first 3 of more channels are shown; a fourth one is
-        transparency.
+        Volume of shape (D, H, W) or (D, H, W, C). A fourth channel is alpha. Of more than 4 channels, only the first 3
+        are shown.
     size : int
         Longer side of the image in pixels, 16 to 4096.
     azimuth : float
-        Rotation of the view to the right in degrees. If 0, only the front is visible.
+        Angle from which the volume is seen, to the right of its front, in degrees. If 0, it is seen from the front.
     elevation : float
-        Rotation of the view upwards in degrees, -90 to 90.
+        Angle from which the volume is seen, above its front, in degrees, -90 to 90.
     transfer : str or sequence of (value, colour, alpha), optional
-        Stops of the transfer function, by rising value. Colour and alpha change linearly between them. The value is
-        the lightness, from 0 to 1 (the full range of integers, or the own range of floats beyond that). The colour is
-        "#rrggbb", three numbers from 0 to 255, or None for the voxel's own. Alpha, from 0 to 1, is the opacity of one
-        voxel. A text has the form ``value:colour:alpha,...``, as in ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. Default:
-        all voxels that differ from the most frequent colour are shown in their own colour.
+        Stops of the transfer function, with increasing values, 1 to 256. Colour and alpha are interpolated linearly
+        between stops. The value is the lightness, 0 to 1: integers are scaled by their full range, and floats outside
+        0 to 1 by their own range. The colour is "#rrggbb", three numbers from 0 to 255, or None for the colour of the
+        voxel. Alpha, 0 to 1, is the opacity of one voxel. As text: ``value:colour:alpha,...``, such as
+        ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. Default: voxels that differ from the most frequent colour are shown in
+        their own colour.
     shading : bool
         If True, surfaces are shaded.
 
     Returns
     -------
     ndarray
-        Image of shape (rows, columns, 4), uint8: colours, and alpha, 0 where nothing is visible.
+        Image of shape (rows, columns, 4), uint8: colours and alpha, with alpha 0 where nothing is visible.
 
     Raises
     ------
     InvalidInput
-        If the volume or the transfer function is invalid.
+        The volume or the transfer function is invalid.
 
     Notes
     -----
-    Front to back as in Levoy [1]_, at every half voxel.
+    Rays are sampled at every half voxel and composited from front to back, as in Levoy [1]_.
 
     References
     ----------
@@ -114,12 +115,12 @@ def render_volume(
 
 
 def parse_transfer(text: str) -> list[Stop]:
-    """Return the stops of a text such as ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``.
+    """Parse a transfer function such as ``0:own:0,0.4:own:0,0.6:#cc3322:0.2`` into its stops.
 
     Raises
     ------
     InvalidInput
-        If the text is invalid.
+        The text is not a transfer function.
 
     Examples
     --------
@@ -141,12 +142,12 @@ def parse_transfer(text: str) -> list[Stop]:
 
 
 def check_transfer(transfer: str | Sequence[Stop] | None) -> NDArray[np.float64] | None:
-    """Check a transfer function before the volume is read. Raises as `render_volume` does."""
+    """Check a transfer function before the volume is read, and raise the same errors as `render_volume`."""
     return None if transfer is None else _as_stops(parse_transfer(transfer) if isinstance(transfer, str) else transfer)
 
 
 def _as_stops(transfer: Sequence[Stop]) -> NDArray[np.float64]:
-    """Return value, alpha, share of the stop's own colour, red, green and blue of each stop, (N, 6)."""
+    """Return (value, alpha, 1 if a colour is given, red, green, blue) of each stop, (N, 6)."""
     flat = getattr(transfer, "ndim", 1) == 0
     if flat or not isinstance(transfer, Sequence | np.ndarray) or not 1 <= len(transfer) <= 256:
         raise InvalidInput(f"transfer: must be 1 to 256 stops (value, colour, alpha), got {str(transfer)[:60]}")
@@ -177,7 +178,7 @@ def _as_colour(colour: object) -> tuple[float, float, float]:
 
 
 def _classify(voxels: NDArray[np.generic], stops: NDArray[np.float64] | None) -> Floats:
-    """Return colours times alpha, and alpha, of each voxel, (D, H, W, 4)."""
+    """Return the premultiplied colours and the alpha of each voxel, (D, H, W, 4)."""
     unit = to_unit(voxels[..., :3] if voxels.shape[-1] > 4 else voxels)
     clear = unit[..., -1] if voxels.shape[-1] in (2, 4) else None
     own = as_rgb(unit[..., :-1] if clear is not None else unit)
@@ -195,10 +196,10 @@ def _classify(voxels: NDArray[np.generic], stops: NDArray[np.float64] | None) ->
 
 
 def _set_apart(own: Floats) -> NDArray[np.float64]:
-    """Return the opacity of each voxel from the difference of its colour from the most frequent one."""
+    """Return opacities that rise with the difference between a voxel's colour and the most frequent colour."""
     flat = own.reshape(-1, 3)
     levels = np.minimum((flat * np.float32(_LEVELS)).astype(np.int64), _LEVELS - 1) @ np.array([_LEVELS**2, _LEVELS, 1])
-    # A colour may be between two levels, so neighbours along each channel count too.
+    # Also count adjacent levels of each channel, because the colour can be at the border of two levels.
     counts = np.bincount(levels, minlength=_LEVELS**3).reshape(_LEVELS, _LEVELS, _LEVELS)
     around = counts.copy()
     for axis in range(3):
@@ -218,28 +219,28 @@ def _set_apart(own: Floats) -> NDArray[np.float64]:
 
 
 def _shade(shown: Floats, view: NDArray[np.float64]) -> None:
-    """Darken colours where opacity rises towards the side away from the light."""
+    """Darken voxels at surfaces that face away from the light."""
     alpha = shown[..., 3]
     slopes = [np.gradient(alpha, axis=k) if alpha.shape[k] > 1 else np.zeros_like(alpha) for k in range(3)]
     light = (np.array(_LIGHT)[:, np.newaxis] * view).sum(axis=0)
     light = light / np.sqrt((light**2).sum())
     steep = np.sqrt(slopes[0] ** 2 + slopes[1] ** 2 + slopes[2] ** 2)
-    # Opacity rises inwards, so the normal has the opposite direction.
+    # The surface normal points outwards, opposite to the gradient of the opacity.
     towards = -(slopes[0] * np.float32(light[0]) + slopes[1] * np.float32(light[1]) + slopes[2] * np.float32(light[2]))
     facing = np.clip(towards / np.maximum(steep, np.float32(1e-6)), 0, 1)
-    # Surfaces to shade exist only where opacity changes clearly.
+    # Shade only where the opacity changes clearly, because there is no surface elsewhere.
     sure = np.clip(steep / max(float(steep.max()) * 0.25, 1e-6), 0, 1)
     bright = 1 - sure * (1 - (np.float32(_AMBIENT) + np.float32(1 - _AMBIENT) * facing))
     shown[..., :3] *= bright[..., np.newaxis]
 
 
 def _look(shown: Floats, view: NDArray[np.float64], sides: tuple[int, int], pixel: float) -> NDArray[np.uint8]:
-    """Accumulate parallel rays from front to back, at every half voxel."""
+    """Accumulate colours along parallel rays from front to back, at every half voxel."""
     from scipy.ndimage import maximum_filter
 
     shape = np.array(shown.shape[:3])
     half, (down, right, forward) = shape / 2, view
-    # Convert opacity to half a voxel: two half voxels let through as much light as one voxel.
+    # Convert the opacity of a voxel to half a voxel, so that two half voxels transmit as much light as one voxel.
     thin = shown.copy()
     kept = 1 - np.sqrt(1 - np.minimum(shown[..., 3], np.float32(1)))
     thin[..., :3] *= np.where(shown[..., 3] > 0, kept / np.maximum(shown[..., 3], np.float32(1e-12)), 0)[
@@ -258,7 +259,8 @@ def _look(shown: Floats, view: NDArray[np.float64], sides: tuple[int, int], pixe
             [np.add.outer(along * down[k], across * right[k]) + (half[k] - 0.5) for k in range(3)], axis=-1
         ).reshape(-1, 3)
         total, light = np.zeros((len(eye), 4), np.float32), np.ones(len(eye), np.float32)
-        # Find where rays enter and leave. A ray parallel to a face never meets it.
+        # Find where rays enter and leave the volume. The lower limit avoids division by zero for rays that are
+        # parallel to a face.
         slope = np.where(np.abs(forward) < 1e-9, 1e-9, forward)
         ends = np.sort(np.stack([(-0.5 - eye) / slope, (shape - 0.5 - eye) / slope]), axis=0)
         enter, leave = ends[0].max(axis=-1), ends[1].min(axis=-1)

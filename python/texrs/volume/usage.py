@@ -1,4 +1,4 @@
-"""Parts of the exemplar that a synthesis uses: how often, and in how large pieces."""
+"""Measure which parts of the exemplar a synthesis uses, how often, and in patches of which size."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ from texrs.volume._values import check_field
 __all__ = ["CellReuse", "cell_reuse", "coherence"]
 
 _CLOSE = 0.6
-"""Maximum deviation in exemplar voxels of two neighbours within one piece."""
+"""Maximum deviation, in exemplar voxels, between the actual and the expected source coordinates of coherent neighbours.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class CellReuse:
-    """Use of the exemplar by a synthesis (see `cell_reuse`).
+    """How a synthesis uses its exemplar (see `cell_reuse`).
 
     Attributes
     ----------
     coherent : float
-        Share of neighbours along the axes within one piece of the exemplar.
+        Fraction of adjacent voxels that are coherent: they were copied as neighbours from the exemplar.
     largest : float
-        Largest connected patch of such neighbours, as a share of the output.
+        Largest connected patch of coherent voxels, as a fraction of the output.
     most_used : float
-        Use of the most used cell of the exemplar, divided by the mean; 1 or more.
+        Use of the most used cell of the exemplar, divided by the mean use; at least 1.
     unused : float
-        Share of the cells that are never used.
+        Fraction of the cells that are never used.
 
     Examples
     --------
@@ -54,26 +55,26 @@ class CellReuse:
 
 
 def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
-    """Return a mask of voxels in one piece with the next along an axis: ``max |S(p + e) - S(p) - J e| < 0.6``.
+    """Return where voxels are coherent with the next voxel along an axis: ``max |S(p + e) - S(p) - J e| < 0.6``.
 
     Parameters
     ----------
     source : SourceMap
         Source map of an image or a volume.
     axis : int
-        Number of the axis, from 0.
+        Index of the axis, from 0.
     field : Field, optional
-        Field that J is taken from. Default: the map's own frames.
+        Field that gives the Jacobian J. Default: the frames of the source map.
 
     Returns
     -------
     ndarray
-        Bool, one shorter than the output along the axis.
+        Bool mask, one shorter than the output along ``axis``.
 
     Raises
     ------
     InvalidInput
-        If the source map or the axis is invalid, or the field has other axes.
+        The source map or the axis is invalid, or the field has another number of axes.
 
     Examples
     --------
@@ -87,7 +88,7 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
     here = tuple(slice(0, -1) if a == along else slice(None) for a in range(source.axes))
     there = tuple(slice(1, None) if a == along else slice(None) for a in range(source.axes))
     out: Bools = source.exemplar[here] == source.exemplar[there]
-    # Process a plane at a time: a dense field of a large volume is many times its size.
+    # Process one plane at a time, because a dense field of a large volume needs many times its memory.
     for i in range(out.shape[0]):
         at = np.float32(0) if along else np.float32(1)
         first = source.coordinates[i][here[1:]]
@@ -98,26 +99,26 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
 
 
 def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) -> CellReuse:
-    """Measure how a synthesis uses its exemplar.
+    """Measure how often a synthesis uses each part of its exemplar, and how large its coherent patches are.
 
     Parameters
     ----------
     source : SourceMap
-        Source map of an image or a volume, from one exemplar or several.
+        Source map of an image or a volume, from one or several exemplars.
     field : Field, optional
-        Field that J is taken from. Default: the map's own frames.
+        Field that gives the Jacobian of coherent neighbours. Default: the frames of the source map.
     cell : int
-        Side of the exemplar's cells, in voxels, at least 1. Cells that the border cuts count by their remaining size.
+        Side of the exemplar's cells in voxels, at least 1. Smaller cells at the border are weighted by their size.
 
     Returns
     -------
     CellReuse
-        Coherence of the output, and use of each part of the exemplar.
+        Coherence of the output, and how evenly the exemplar is used.
 
     Raises
     ------
     InvalidInput
-        If the source map is invalid, or the field has other axes.
+        The source map is invalid, or the field has another number of axes.
 
     Examples
     --------
@@ -140,7 +141,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
 
 
 def _count_cell_use(source: SourceMap, number: int, side: int) -> Floats:
-    """Return the mean number of uses of a voxel in each cell of an exemplar."""
+    """Return how often a voxel is used on average, for each cell of an exemplar."""
     shape = np.array(source.shapes[number])
     cells = -(-shape // side)
     place = np.floor(source.coordinates[source.exemplar == number] + np.float32(0.5)).astype(np.int64)
@@ -154,7 +155,7 @@ def _count_cell_use(source: SourceMap, number: int, side: int) -> Floats:
 
 
 def _find_steps(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...], along: int) -> Floats:
-    """Return J e for the voxels of one plane."""
+    """Return the expected source step J e at the voxels of one plane."""
     if field is not None:
         if field.constant is not None:
             return np.asarray(field.jacobians(np.zeros(source.axes))[:, along])
@@ -170,7 +171,7 @@ def _find_steps(source: SourceMap, field: Field | None, i: int, here: tuple[slic
 
 
 def _check(source: SourceMap, field: Field | None) -> Field | None:
-    """Return the field that J is taken from: the given one, or the map's own if it is a field."""
+    """Return the field that gives the Jacobian: the argument, or the source map's own field, or None."""
     if not isinstance(source, SourceMap):
         raise InvalidInput(f"source: must be a source map, got {type(source).__name__}")
     check_field(field, source.axes)

@@ -1,4 +1,4 @@
-"""Viewer of a volume in a notebook or in its own page, slice by slice."""
+"""View the slices of a volume in a notebook or on an HTML page."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ __all__ = ["Viewer"]
 
 
 class Viewer:
-    """A volume that is shown in a notebook by a slice along each axis, with sliders.
+    """Interactive view of a volume in a notebook, with a slice and a slider for each axis.
 
-    A browser is enough to view it, without a kernel or a network. The page has at most about a megabyte, so large
-    volumes are shown at every second voxel or fewer. Results, exemplars and samples of volumes are shown in this way.
+    The view needs only a browser, without a kernel or a network. The page has at most about 1 MB, so for large volumes
+    only every second voxel or fewer are shown. Notebooks show results, exemplars and samples of volumes in this way.
 
     Parameters
     ----------
     volume : array_like or path_like
-        Volume of shape (D, H, W) or (D, H, W, C). Only the first channel is shown unless there are 3 or 4.
+        Volume of shape (D, H, W) or (D, H, W, C). If there are not 3 or 4 channels, only the first is shown.
     labels : bool
-        If True, the values are labels, and each gets a colour.
+        If True, the values are labels, and each label gets a colour.
 
     Raises
     ------
     InvalidInput
-        If the volume or the labels are invalid.
+        The volume is invalid, or the values are not labels.
 
     Examples
     --------
@@ -54,27 +54,27 @@ class Viewer:
         self._voxels = as_image(label_to_color(given) if as_bool(labels, "labels") else given, "volume", axes=3)
 
     def __repr__(self) -> str:
-        """Return the size, the channels and the dtype."""
+        """Return a description with the size, channels and dtype."""
         return f"<Viewer of {measure(self._voxels, 3)}>"
 
     def _repr_html_(self) -> str:
-        """Show it in a notebook."""
+        """Return the HTML that a notebook shows."""
         return as_page(self._voxels)
 
     def save(self, path: Path, *, overwrite: bool = True) -> None:
-        """Write a page that any browser opens.
+        """Write an HTML page that any browser can open.
 
         Parameters
         ----------
         path : path_like
-            File with the suffix .html. It is written completely or not at all.
+            File with the suffix .html. If writing fails, an existing file is unchanged.
         overwrite : bool
-            If True, an existing file may be replaced.
+            If True, an existing file is replaced.
 
         Raises
         ------
         FileError
-            If the suffix differs, or the file cannot be written.
+            The suffix is not .html, or the file cannot be written.
 
         Examples
         --------
