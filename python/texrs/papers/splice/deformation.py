@@ -1,7 +1,7 @@
-"""Deform the texture so that its elements move to their targets, in `texrs.papers.splice`: section 4.2.
+"""Deform a texture so that its elements move to their targets, in `texrs.papers.splice` (section 4.2).
 
-Disjoint elements move whole, by whole pixels, and the pixels between them are interpolated. A connected figure takes
-the shape of least energy.
+Disjoint elements move by whole pixels without deformation, and displacements are interpolated between them. A
+connected figure gets the shape of least energy.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from texrs.papers.splice.texture_extension import Extension
 __all__ = ["Deformation", "deform", "deform_by_energy", "find_rigid_shifts", "mark_removed"]
 
 SHRINKAGE = 0.9
-"""Share of the way that erased pixels move towards the middle of their element."""
+"""Share of the way to the middle of their element that erased pixels move."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deformation:
-    """The extended texture, deformed.
+    """The extended texture after its deformation.
 
     Attributes
     ----------
     target : (H, W, 2) float64
-        Position in the output of each pixel.
+        Position of each pixel in the output.
     rigid : (H, W) bool
-        Pixels that keep their shape.
+        True for pixels of parts that keep their shape.
     removed : (H, W) bool
-        Pixels that are not drawn.
+        True for pixels that are not drawn.
 
     """
 
@@ -45,19 +45,19 @@ class Deformation:
 
 
 def deform(a: ElementAnalysis, match: Match) -> Deformation:
-    """Move every pixel of the texture as its layout requires."""
+    """Compute where each pixel of the extended texture moves."""
     if a.layout != Layout.DISJOINT:
         return deform_by_energy(a, match)
     extension = match.extension
     shift = interpolate(*_list_constraints(match))
-    # Background next to a shrinking element is stretched over its place. A missing pixel of background would leave a
-    # hole of many pixels.
+    # Leave the background next to a shrinking element in the mesh, so that it is stretched over the element's place.
+    # Each missing pixel of background would leave a hole of many pixels.
     removed = mark_removed(extension, match.assigned, grown=int(extension.originals > 0))
     return Deformation(_add_places(shift, extension.origin), extension.instance > 0, removed)
 
 
 def deform_by_energy(a: ElementAnalysis, match: Match) -> Deformation:
-    """Move every pixel by Eq. 5. The foreground of a net is rigid, and so are the joints between jointed elements."""
+    """Compute where each pixel moves by Eq. 5. The rigid parts are the foreground of a net, or the joints of a wall."""
     extension, jointed = match.extension, a.layout == Layout.JOINTED
     rigid = ~extension.mask if jointed else extension.mask
     pins = np.rint(match.starts).astype(np.intp) - np.array(extension.origin)
@@ -67,7 +67,7 @@ def deform_by_energy(a: ElementAnalysis, match: Match) -> Deformation:
 
 
 def _add_places(shift: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[np.float64]:
-    """Add pixel positions to displacements, in place; the first pixel is at the origin."""
+    """Add pixel positions to displacements, in place. The first pixel is at ``origin``."""
     shift[..., 0] += np.arange(origin[0], origin[0] + shift.shape[0])[:, None]
     shift[..., 1] += np.arange(origin[1], origin[1] + shift.shape[1])
     return shift
@@ -77,10 +77,10 @@ def _add_places(shift: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[
 
 
 def _list_constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
-    """Return the pixels that do not follow the background, and their displacements, (2, H, W).
+    """Return True for pixels with a given displacement, and these displacements, (2, H, W).
 
-    Elements move whole. Erased elements also shrink towards their middle, so that they leave a smaller hole. If an
-    image mainly stays as it is, only requested pixels move.
+    All pixels of an element have the same displacement. Erased elements also shrink towards their middle, so that they
+    leave a smaller hole. If most of the image stays in place, as in an edit, stray pixels are not moved either.
     """
     extension = match.extension
     still = extension.originals > 0
@@ -88,7 +88,7 @@ def _list_constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
     middle = extension.points if still else np.concatenate([extension.points, extension.stray_points])
     shift = np.zeros((2, len(middle) + 1), np.float32)
     shift[:, 1:] = find_rigid_shifts(match, middle).T
-    # Write into the final array at once, because copies of whole images take longer than the computation here.
+    # Write into the final array, because copies of whole images take longer than the computation.
     given = np.empty((2, *number.shape), np.float32)
     for along, place in zip(shift, given, strict=True):
         along.take(number, out=place, mode="clip")
@@ -104,9 +104,9 @@ def _list_constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
 
 
 def find_rigid_shifts(match: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-    """Return the whole-pixel displacement of every element; elements without a target follow their neighbours.
+    """Return each element's displacement in whole pixels. Elements without a target move like their neighbours.
 
-    Further ``points``, which come after those of the extension, also follow their neighbours.
+    If ``points`` has more points than the extension, these also move like their neighbours.
     """
     from scipy.spatial import cKDTree
 
@@ -125,14 +125,14 @@ def find_rigid_shifts(match: Match, points: NDArray[np.float64] | None = None) -
 
 
 def mark_removed(extension: Extension, assigned: NDArray[np.intp], grown: int = 1) -> Bools:
-    """Return erased pixels: elements without a target, and stray pixels, with the pixels around them."""
+    """Return True for erased pixels: elements without a target and stray pixels, with the pixels around them."""
     from scipy.ndimage import maximum_filter
 
     used = np.zeros(len(extension.points) + 1, bool)
     used[assigned + 1] = True
     moved = used.take(extension.instance)
     idle = (extension.instance > 0) & ~moved
-    # If an image mainly stays as it is, only removed elements leave an outline.
+    # In an edit, only removed elements are erased with the pixels around them.
     gone = idle if extension.originals else idle | extension.stray
     wide = maximum_filter(gone.view(np.uint8), 2 * grown + 1).view(bool) if grown else gone
     return np.asarray((wide | extension.stray) & ~moved)

@@ -1,10 +1,10 @@
 """Remove light that varies across an image of separate elements before they move, and restore it afterwards.
 
-A moved pixel keeps the light of its old place: a dark patch of background in a bright corner, a bright element among
-dark ones. If the background's low frequencies vary more than the rest of it, they count as light and not as texture.
-The light is modelled as a sum, such as haze or glare. The contrast of elements therefore stays, and the noise of dark
-corners is not amplified. The share of light on the elements is measured: coins under a haze on the glass behind them
-are as bright as the others.
+A moved pixel keeps the light of its old place. Without a correction, bright corners would have dark patches of
+background, and dark corners bright elements. Low frequencies of the background count as light if they vary more than
+the rest of it. The light is modelled as a sum, as for haze or glare. The contrast of elements therefore does not
+change, and the noise of dark corners is not amplified. The share of the light on the elements is measured, because
+haze on the glass behind coins does not make the coins brighter.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ from texrs.point_sets import spacing
 __all__ = ["Light", "measure_light"]
 
 WIDE = 0.75
-"""Standard deviation of the filter that leaves only light, in spacings."""
+"""Standard deviation of the low-pass filter that separates light from texture, in spacings."""
 UNEVEN = 1.2
-"""Ratio of variation, low frequencies to the rest, above which a background counts as unevenly lit.
+"""Minimum ratio of variation, low frequencies to the rest, of an unevenly lit background.
 
-Rust and stains reach 0.8 and woven cloth 0.3; photographs with a lit side have 1.6 and more.
+The ratio is up to 0.8 for rust and stains, 0.3 for woven cloth, and at least 1.6 for photographs lit from one side.
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
-    """A texture in even light, and the removed light.
+    """A texture without its uneven light, and the removed light.
 
     Attributes
     ----------
     even : (h, w, C) float32
-        The texture in even light, in units of its dtype's range. Transparency is unchanged.
+        The texture in even light, scaled by ``low`` and ``span``. Transparency is unchanged.
     field : (h, w, c) float32
         Light that was removed from the colour channels of the background.
     elements : (h, w) bool
-        Pixels of elements.
+        True for pixels of elements.
     share : float
         Share of the light that was removed from elements, 0 to 1.
     low, span : float
-        Value of the texture that 0 stands for, and the number of its values in one unit.
+        Value of the texture that is 0 in ``even``, and difference to the value that is 1.
 
     """
 
@@ -58,23 +58,23 @@ class Light:
     span: float
 
     def spread(self, size: tuple[int, ...]) -> Floats:
-        """Return the light for an output of any size, stretched from the whole image to the whole output."""
+        """Return the light for an output of any size, by stretching the light of the image over the output."""
         from skimage.transform import resize
 
         shape = (*size, self.field.shape[-1])
         return np.asarray(resize(self.field, shape, order=1, mode="edge", anti_aliasing=False), np.float32)
 
     def put_back(self, even: Array, field: Floats, places: NDArray[np.int32], image: Array) -> Array:
-        """Return an evenly lit image with light added, in the dtype and the range of the texture.
+        """Add light to an evenly lit image, and return it in the dtype and value range of the texture.
 
         Parameters
         ----------
         even : (H, W, C) float32
             The image in even light.
         field : (H, W, c) float32
-            The light.
+            The light on the background at each pixel.
         places : (H, W, 2) int32
-            The texture pixel that each pixel shows.
+            Source pixel in the texture of each pixel.
         image : (h, w) or (h, w, C) array
             The texture.
 
@@ -89,16 +89,16 @@ class Light:
 
 
 def measure_light(a: ElementAnalysis, ground: Bools, elements: Labels) -> Light | None:
-    """Return the light on a texture, measured on its background; None if it is even, or if the values are not colours.
+    """Measure the light on a texture's background; return None if it is even, or if the values are not colours.
 
     Parameters
     ----------
     a : ElementAnalysis
         The texture.
     ground : (h, w) bool
-        Pixels that are neither in an element nor near one.
+        True for pixels of the background that are not near an element.
     elements : (h, w) int32
-        Number of the element of each pixel, counted from 1; 0 elsewhere.
+        Number of the element of each pixel, counted from 1, and 0 for other pixels.
 
     """
     image = as_image(a.image)
@@ -127,12 +127,12 @@ def measure_light(a: ElementAnalysis, ground: Bools, elements: Labels) -> Light 
 
 
 def dim(elements: Bools, share: float) -> Floats:
-    """Return the share of the light that falls on each pixel, (H, W, 1)."""
+    """Return the share of the light that falls on each pixel, (H, W, 1): ``share`` on elements, 1 elsewhere."""
     return np.where(elements, np.float32(share), np.float32(1))[..., np.newaxis]
 
 
 def measure_share(colours: Floats, field: Floats, elements: Labels) -> float:
-    """Return the share of a light that falls on elements: the least-squares slope of their brightness against it."""
+    """Return the share of the light that falls on elements: the least-squares slope of their brightness against it."""
     count = np.bincount(elements.ravel())[1:]
     bright, lit = (
         np.bincount(elements.ravel(), values.mean(axis=-1).ravel())[1:][count > 0] / count[count > 0]

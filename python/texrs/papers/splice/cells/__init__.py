@@ -1,21 +1,22 @@
-"""Splice connected textures by cells: each target cell shows a whole cell of A, and cells are joined by cuts.
+"""Splice connected textures by cells: each target cell is filled with a cell of A, and cells are joined by cuts.
 
 Bending a figure as printed (Liu et al. 2009, Eq. 5) reaches about half of the displacements in a connected texture. It
-shows reflections beyond the image. Here only single cells are bent. The steps, and the module of each step:
+fills places beyond the image with reflections. Here only single cells are bent. The steps, and the module of each
+step:
 
-1. Find the cells of A (`texrs.exemplar.cells`). The target cells are those of B, or the Voronoi cells of B's points if B
-   is not connected (`tessellation`, `continuation`). A strength below 1 interpolates between A's own cells and these
-   (`strength`).
+1. Find the cells of A (`texrs.exemplar.cells`). The target cells are the cells of B, or the Voronoi cells of B's
+   points if B is not connected (`tessellation`, `continuation`). A strength below 1 interpolates between A's own cells
+   and the target cells (`strength`).
 
-2. Choose for each target the most similar cell of A that was shown least (`choice`).
+2. Choose a cell of A for each target. It should have a similar shape, and should not be used often (`choice`).
 
-3. Move its outline to the target's, and its inside with it. The joints keep their width (`outlines`, `charts`).
+3. Bend the cell so that its outline matches the target's. The joints keep their width (`outlines`, `charts`).
 
-4. Join the cells by cuts in a band around their outlines (`joining`).
+4. Join the cells by cuts within a band around their outlines (`joining`).
 
-5. Correct stretched pixels from unstretched ones (`refinement`).
+5. Replace stretched pixels by unstretched ones that fit their neighbours (`refinement`).
 
-The five steps give a source map, and the image is looked up once.
+The result is a source map, so the image is looked up only once.
 """
 
 from __future__ import annotations
@@ -47,10 +48,11 @@ from texrs.synthesis import Synthesis
 __all__ = ["find_entry_cells", "splice_cells"]
 
 FEWEST = 3
-"""Least number of cells that can be shown."""
+"""Minimum number of usable cells of A."""
 HERE = 0.2
-"""Distance from a cell's centre, in cell sizes, within which an output pixel must show it for the cell to count as
-present.
+"""Maximum distance between a cell's centre and the nearest visible pixel of the cell, in cell sizes.
+
+Above it, the cell does not count as present.
 """
 
 _TARGETS: Cache[bytes, Tessellation] = Cache(16)
@@ -75,7 +77,7 @@ def splice_cells(
     seed: int,
     watch: Progress,
 ) -> Synthesis:
-    """Show the cells of A in the tessellation of B.
+    """Synthesise a connected texture: place the cells of A in the tessellation of B.
 
     Parameters
     ----------
@@ -86,22 +88,22 @@ def splice_cells(
     size : (rows, columns)
         Size of the result, in pixels.
     strength : float
-        Share of the way from A's own tessellation, 0, to B's, 1.
+        Fraction of the way from A's own tessellation (0) to B's (1).
     scale : float, optional
-        Scale of B's layout. Default: the scale that gives it the size of A's cells.
+        Scale of B's layout. Default: the scale that gives B's cells the size of A's cells.
     turns : bool, optional
-        If True, cells may be turned. Default: True, unless the image shows which side of A is up.
+        If True, cells may be rotated. Default: True, unless the image shows which side of A is up.
     refine : bool
         If True, stretched pixels are corrected.
     seed : int
-        Number that selects random choices and the noise of the correction.
+        Seed of all random choices, and of the noise of the correction.
     watch : callable
         Function called as ``watch(stage, share)``.
 
     Returns
     -------
     Synthesis
-        Labels of the source map are targets, counted from 1 as in the report's "matches".
+        The result. Labels of its source map are targets, counted from 1 as in the report's "matches".
 
     Raises
     ------
@@ -116,13 +118,13 @@ def splice_cells(
         wanted = interpolate_layouts(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
     chosen = _list_shown(wanted)
     watch("cells", 0.2)
-    # Choose a cell for each target, bend it, and join the cells.
+    # Choose a cell for each target, bend it to the target's shape, and join the cells.
     choices = shortlist(cells, wanted, chosen, turns=may_turn, seed=seed)
     charts = draw_charts(cells, wanted, chosen, choices)
     watch("cells", 0.6)
     joined = join(a.image, cells, charts, size)
     watch("cells", 1.0)
-    # Look up the joined cells, and correct the pixels that a cell stretches.
+    # Compute source positions, and correct the pixels that a cell stretches.
     places, frames = charts.places[joined.pixel], charts.measure_frames(joined.pixel, joined.chart)
     if refine:
         places, frames = refine_charts(a, cells, charts, joined, places, frames, seed, watch)
@@ -162,14 +164,14 @@ def _take_targets(
 
 
 def _list_shown(wanted: Tessellation) -> NDArray[np.intp]:
-    """Return the rows of the targets that extend into the output, from top to bottom."""
+    """Return the indices of the targets that are visible in the output, from top to bottom."""
     m = wanted.margin
     rows = np.unique(wanted.labels[m:-m, m:-m]) - 1
     return np.asarray(rows[np.lexsort((wanted.centre[rows, 1], wanted.centre[rows, 0]))], np.intp)
 
 
 def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.float64]:
-    """Return each shown cell's centre in the output, from the source map; NaN if it is not visible."""
+    """Return the centre of each cell in the output, according to the source map; NaN if it is not visible."""
     shape = joined.chart.shape
     chart = joined.chart.ravel()
     pixel = joined.pixel.ravel()
@@ -186,7 +188,7 @@ def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.flo
 
 
 def _report(cells: Cells, wanted: Tessellation, charts: Charts, joined: Joined) -> dict[str, Any]:
-    """Return the cells that were found, requested and reached, in JSON types."""
+    """Return the report: counts of cells, and the requested and reached place of each, in JSON types."""
     size = joined.chart.shape
     own = cells.centre + (np.array(size) - cells.labels.shape) / 2
     start = None if wanted.start is None else wanted.start[charts.target]

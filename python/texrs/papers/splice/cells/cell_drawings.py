@@ -27,7 +27,7 @@ def draw_cell_stages(
     joined: Joined,
     image: Array,
 ) -> Stages:
-    """Return the stages of a splice by cells."""
+    """Return the stages of a splice by cells, as images that are drawn on access."""
     m = wanted.margin
     targets = wanted.labels[m:-m, m:-m]
     return Stages(
@@ -43,7 +43,7 @@ def draw_cell_stages(
 
 
 def _draw_cells(picture: Picture, cells: Cells) -> Picture:
-    """Draw the outlines of all cells, and a ring in whole ones: green for certain cells, red for others."""
+    """Draw the outlines of all cells, and a ring in each complete cell: green if it is certain, red if not."""
     out = draw_outlines(picture, cells.labels, BLUE)
     for sure, colour in ((True, GREEN), (False, RED)):
         out = mark_points(out, cells.centre[cells.whole & ((cells.certain >= 0.5) == sure)], colour)
@@ -51,7 +51,7 @@ def _draw_cells(picture: Picture, cells: Cells) -> Picture:
 
 
 def _shade(chart: Labels, source: NDArray[np.intp], count: int) -> Picture:
-    """Colour each pixel by its cell of A."""
+    """Draw each pixel in a colour that identifies its cell of A."""
     turn = np.arange(count) * 0.618034 % 1 * 2 * np.pi
     colours = 150 + 90 * np.stack([np.cos(turn), np.cos(turn - 2.1), np.cos(turn + 2.1)], axis=-1)
     picture = colours.astype(np.uint8)[source[chart]]

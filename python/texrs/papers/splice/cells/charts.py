@@ -1,8 +1,8 @@
-"""Charts: the source position in A for each pixel of a target cell and a band around it.
+"""Charts: the source position in A of each pixel of a target cell and of a band around it.
 
-A cell is turned and scaled, its outline is moved to the target's, and its inside follows (`outlines`). This would
-stretch the joints. Therefore source points near the outline, on both sides, slide along the gradient of the distance
-to the source's outline. They stop at the distance that the pixel has from the target's outline, so that joints keep
+A cell is rotated and scaled, its outline is moved to the target's, and its inside follows (`outlines`). This would
+stretch the joints. Therefore source points on both sides of the outline slide along the gradient of the distance to
+the source's outline. Each stops at the distance that its pixel has from the target's outline, so that joints keep
 their width.
 """
 
@@ -24,46 +24,46 @@ from texrs.papers.splice.cells.tessellation import Tessellation
 __all__ = ["Charts", "draw_charts"]
 
 BAND = 0.12
-"""Width of the band around a cell that is drawn also, so that it can be cut against its neighbours, in cell sizes."""
+"""Width of the band around a cell in its chart, in cell sizes. Neighbours overlap in it and are cut there."""
 JOINT = 0.25
-"""Distance from the outline within which source distances equal target distances, in cell sizes."""
+"""Distance from the outline up to which source distances equal target distances, in cell sizes."""
 SMOOTH = 0.09
 """Standard deviation of the Gaussian that smooths distances to outlines, in cell sizes.
 
-Outlines waver within a joint, and the slide would follow them. Both sides are smoothed equally, so that corners meet
-corners.
+Outlines are uneven within a joint, and the source points would follow the unevenness. The distances in source and
+target are smoothed equally, so that corners stay at corners.
 """
 SLIDES, SLIDE = 4, 0.9
-"""Number of steps of the slide of source points, and share of the remaining distance per step."""
+"""Number of steps of the slide of source points, and share of the remaining distance that each step covers."""
 CORE, EDGE, STEEP = 0.8, 1.5, 0.4
-"""Bounds on the depth of source points: a share of the source's greatest depth, a number of pixels, and a factor.
+"""Minimum depth of source points: maximum share of the source's greatest depth, limit in pixels, and slope.
 
-The limit is half a joint plus the number of pixels. A pixel that is deeper in the target is at least this deep in the
-source. The bound grows by the factor per further pixel, up to the share of the greatest depth.
+The limit is added to half the width of a joint. A source point is at least as deep as its pixel in the target, up to
+this limit. Beyond it, the minimum grows by the slope per pixel, up to the share of the greatest depth.
 """
 GRID, KNOT = (6, 20), 3.0
-"""Least and largest number of grid points along each side of a cell's box, and pixels between them.
+"""Minimum and maximum number of grid points along each side of a cell's box, and their distance in pixels.
 
 Displacements are interpolated linearly on this grid.
 """
 GROUP = 128
-"""Number of targets that are drawn at once. More would need intermediate memory for hundreds of images."""
+"""Number of targets whose charts are computed at once. More would need intermediate memory for hundreds of images."""
 MISFIT = 2.0
-"""Weight of the root of an outline's matching cost, relative to the cost of the shortlist."""
+"""Weight of an outline's matching cost (its square root), relative to the cost in the shortlist."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Charts:
-    """Pixels of all target cells, box after box in one row.
+    """Charts of all target cells. The pixels of each cell's box follow those of the previous box in one array.
 
     Attributes
     ----------
     target : (cells,) int
-        Target of each box, as a row of the targets.
+        Index of each box's target.
     source : (cells,) int
-        Cell of A that is shown, as a row of the cells.
+        Index of the cell of A in each box.
     turn, scale : (cells,) float64
-        Turn in degrees and scale factor of the cell before it is bent.
+        Rotation in degrees, and scale factor, of each cell before it is bent.
     first : (cells + 1,) int
         Index of the first pixel of each box.
     corner, sides : (cells, 2) int
@@ -91,7 +91,7 @@ class Charts:
         return slice(int(top), int(top + rows)), slice(int(left), int(left + columns))
 
     def measure_frames(self, pixel: NDArray[np.integer], chart: NDArray[np.integer]) -> Floats:
-        """Return the Jacobians, (..., 2, 2), at pixels of given boxes, by central differences."""
+        """Return the Jacobians (..., 2, 2) of source positions at given pixels of charts, by central differences."""
         number, sides = pixel - self.first[chart], self.sides[chart]
         at = np.divmod(number, sides[..., 1])
         frames = np.zeros((*number.shape, 2, 2), np.float32)
@@ -104,7 +104,7 @@ class Charts:
 
 
 def draw_charts(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist) -> Charts:
-    """Draw the chart of each chosen target, from the best cell of its shortlist by matched outlines."""
+    """Compute the chart of each chosen target from the cell of its shortlist whose outline fits best."""
     unit, band = cells.size, max(2.0, BAND * cells.size)
     groups = [slice(k, k + GROUP) for k in range(0, len(chosen), GROUP)]
     parts = [_choose(cells, wanted, chosen[g], choices.part(g), unit) for g in groups]
@@ -129,13 +129,13 @@ def _draw(
     number: NDArray[np.intp],
     count: int,
 ) -> None:
-    """Compute the source positions of the pixels of some boxes."""
+    """Compute the source positions of the pixels of some charts."""
     sides, corner, source = charts.sides[group], charts.corner[group], charts.source[group]
     pixels = slice(charts.first[group][0], charts.first[group.start + len(sides)])
     which = np.repeat(np.arange(len(sides)), sides.prod(axis=1))
     at = _list_pixels(sides, which)
 
-    # Interpolate the displacement of the outline on a grid over each box, and from there at its pixels.
+    # Interpolate the displacement of the outline on a grid over each box, and from the grid at each pixel.
     goal, middle = wanted.outlines[charts.target[group]], wanted.centre[charts.target[group]]
     step = np.maximum(sides - 1, 1) / (count - 1)
     knots = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), -1).reshape(1, -1, 2)
@@ -145,7 +145,7 @@ def _draw(
     tall = np.ascontiguousarray(grid.reshape(-1, count, 2))
     moved = at + (corner - middle)[which] + gather(tall, knot[None], interpolation="linear")[0]
 
-    # Invert the turn and the scale.
+    # Undo the rotation and the scale, to get positions in A.
     angle = np.radians(charts.turn[group])
     inverse = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / charts.scale[group]
     places = np.einsum("na,abn->nb", moved, inverse[:, :, which]) + cells.centre[source][which]
@@ -156,7 +156,7 @@ def _draw(
 def _choose(
     cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist, unit: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Match the outlines of all cells on the shortlists; return source, turn, scale, and outline of the best cells."""
+    """Match the outlines of all cells on the shortlists; return source, turn, scale and outline of the best cells."""
     count, k = choices.source.shape
     source, turn, scale = (x.reshape(-1) for x in (choices.source, choices.turn, choices.scale))
     angle = np.radians(turn)
@@ -175,7 +175,7 @@ def _choose(
 def _measure_depths(
     wanted: Tessellation, chosen: NDArray[np.intp], band: float, smooth: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Return the box of each target in the output, and the depth of its pixels inside the target."""
+    """Return each target's first pixel, box corner and sides, and the depth of its pixels inside the target."""
     from scipy.ndimage import find_objects
 
     boxes, pad = find_objects(wanted.labels), int(np.ceil(band)) + 2
@@ -195,7 +195,7 @@ def _measure_depths(
 
 
 def _list_pixels(sides: NDArray[np.intp], which: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the position of each pixel in its box, for boxes in one row."""
+    """Return the row and column of each pixel in its box, for consecutive boxes."""
     first = np.concatenate([[0], np.cumsum(sides.prod(axis=1))])
     number = np.arange(len(which)) - first[which]
     return np.stack(np.divmod(number, sides[which, 1]), axis=-1).astype(np.float64)
@@ -204,7 +204,7 @@ def _list_pixels(sides: NDArray[np.intp], which: NDArray[np.intp]) -> NDArray[np
 def _slide(
     cells: Cells, fields: Fields, kind: NDArray[np.intp], depth: Floats, places: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Slide source points near outlines to the depth that the pixels have inside the target."""
+    """Slide source points near outlines to the depth that their pixels have inside the target."""
     unit = cells.size
     reach = JOINT * unit
     joint = min(reach, 0.5 * cells.joint_width + EDGE)
@@ -215,7 +215,7 @@ def _slide(
     def measure(at: Floats, kind: NDArray[np.intp]) -> Floats:
         return np.asarray(gather(fields.values, at[None], kind[None].astype(np.uint16))[0], np.float32)
 
-    # Near the outline, use the target's depth. Farther inside, keep the own depth, but never in the joint.
+    # Use the target's depth near the outline. Further inside, keep the source's own depth, but stay out of the joint.
     inside, before = depth[kept], measure(at, kind)[:, 0]
     weight = np.clip(1.3 - np.abs(inside) / reach, 0, 1)
     weight = weight * weight * (3 - 2 * weight)
@@ -239,9 +239,9 @@ class Fields(NamedTuple):
     Attributes
     ----------
     values : list of (h, w, 3) float32
-        Signed distance to the outline of each cell, and its two slopes.
+        Signed distance to the outline of each cell, and its two derivatives.
     corner : (n, 2) float64
-        Position of the first pixel of each field.
+        Position in A of the first pixel of each field.
     deepest : (n,) float32
         Greatest distance in each field.
 
@@ -253,13 +253,13 @@ class Fields(NamedTuple):
 
 
 def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: float) -> Fields:
-    """Return signed distances to the outlines of some cells."""
+    """Return signed distances to the outlines of some cells, with their gradients."""
     from scipy.ndimage import find_objects
 
     boxes = find_objects(cells.labels)
     fields, corners = [], []
     for row in shown.tolist():
-        # Treat a cell at the border as if it continued there, because its joint is unknown.
+        # Treat a cell at the border as if it ended there, because its joint is unknown.
         signed = _measure_depth(cells.labels, row + 1, boxes[row], pad, smooth)
         fields.append(np.ascontiguousarray(np.stack([signed, *np.gradient(signed)], axis=-1), np.float32))
         corners.append([s.start - pad for s in boxes[row]])
@@ -268,7 +268,7 @@ def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: flo
 
 
 def _measure_depth(labels: Labels, number: int, box: tuple[slice, ...], pad: int, smooth: float) -> NDArray[np.float64]:
-    """Return the smoothed signed distance to the outline of one label, over its box and a margin."""
+    """Return the smoothed signed distance to the outline of one label, over its box and a margin; positive inside."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     inside = np.pad(labels[box] == number, pad)

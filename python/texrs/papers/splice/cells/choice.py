@@ -1,4 +1,4 @@
-"""Choose the cell of A for each target cell: one that needs little bending and was shown rarely."""
+"""Choose a cell of A for each target cell: it should need little bending and not be used often."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ from texrs.papers.splice.cells.tessellation import Tessellation
 __all__ = ["TURNS", "Shortlist", "shortlist"]
 
 RAYS = 72
-"""Number of rays of the radial profiles that compare shapes: one every five degrees."""
+"""Number of rays of the radial profiles that describe shapes: one ray every five degrees."""
 TURNS = (0, 30, -30, 60, -60, 90, 180)
-"""Turns of a cell in degrees, if turning is permitted; whole steps of the rays."""
+"""Tried rotations of a cell in degrees, multiples of the angle between rays; only 0 if cells may not be rotated."""
 TURN, SIZE, USE, BESIDE, NOISE = 0.06, 0.25, 0.05, 0.15, 0.02
-"""Costs, in root mean square differences of profiles of unit area.
+"""Costs that are added to the root mean square difference of two profiles of unit area.
 
-The first four are for a quarter turn, a size ratio of e, each earlier use of a cell, and use next to itself. The last
-is the largest random cost.
+TURN is the cost of a rotation by 90 degrees, and SIZE the cost of a size ratio of e. USE is the cost of each earlier
+use of a cell, and BESIDE the cost of a use next to itself. NOISE is the maximum of a random cost.
 """
 SMALLEST, LARGEST = 0.6, 1.7
-"""Least and largest scale factor of a cell. The remaining difference is bent."""
+"""Minimum and maximum scale factor of a cell. A remaining difference in size is reached by bending."""
 BEST = 3
-"""Number of cells per target whose outlines are matched in full."""
+"""Number of candidate cells per target whose outlines are matched."""
 SMALL = 0.25
-"""Share of the median area below which a cell is not shown."""
+"""Minimum area of a usable cell, as a share of the median area."""
 TRUSTED = 0.5
-"""Certainty below which a cell is not shown, if there are enough cells of higher certainty."""
+"""Minimum certainty of a usable cell, if there are enough cells above it."""
 GROUP = 256
-"""Number of targets that are compared at once."""
+"""Number of targets that are compared at once, to limit memory."""
 ENOUGH = 6
-"""Least number of cells to choose from, before less certain ones are left out."""
+"""Number of complete and certain cells that is enough to leave out less certain cells."""
 FEW = 3
-"""Least number of whole cells of any certainty, before cells that the border cuts are left out."""
+"""Number of complete cells, of any certainty, that is enough to leave out cells that the border cuts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shortlist:
-    """Candidate cells for each target, the best first.
+    """Candidate cells for each target, in the order of their costs.
 
     Attributes
     ----------
     source : (targets, k) int
-        Rows of the cells of A.
+        Indices of the candidates in the cells of A.
     turn : (targets, k) float64
-        Turn of each candidate in degrees, from the axis of columns towards the axis of rows.
+        Rotation of each candidate in degrees, from the axis of columns towards the axis of rows.
     scale : (targets, k) float64
         Scale factor of each candidate.
     cost : (targets, k) float64
@@ -63,12 +63,12 @@ class Shortlist:
     cost: NDArray[np.float64]
 
     def part(self, rows: slice) -> Shortlist:
-        """Return the shortlists of some of the targets."""
+        """Return the candidates of some of the targets."""
         return Shortlist(self.source[rows], self.turn[rows], self.scale[rows], self.cost[rows])
 
 
 def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, turns: bool, seed: int) -> Shortlist:
-    """Compare the shapes of cells and targets, one target after the other, upper rows first.
+    """Compare the shapes of cells and targets, and return the best cells for each target.
 
     Parameters
     ----------
@@ -77,11 +77,11 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
     wanted : Tessellation
         Target cells.
     chosen : (targets,) int
-        Rows of the targets, in the order of their choices.
+        Indices of the targets. Earlier ones get their cells first.
     turns : bool
-        If True, cells may be turned.
+        If True, cells may be rotated.
     seed : int
-        Number that selects between cells that fit nearly equally well.
+        Seed of the choice between cells that fit nearly equally well.
 
     """
     usable = list_usable(cells)
@@ -98,8 +98,8 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
     used = np.zeros(len(usable))
     taken = np.full(len(wanted.area), -1)
     beside = list_neighbours(wanted)
-    # Limit the shortlist if there are few cells. Otherwise all would be on each list, and the cell that bends best
-    # would be everywhere.
+    # Shorten the list if there are few cells. Otherwise every list would contain all cells, and the cell that is
+    # easiest to bend would be used everywhere.
     k = min(BEST, max(1, len(usable) // 2))
     source = np.zeros((len(chosen), k), np.intp)
     turn, cost = np.zeros((2, len(chosen), k))
@@ -119,10 +119,10 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
 def _compare(
     theirs: NDArray[np.float64], turned: NDArray[np.float64], angles: NDArray[np.intp]
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return the difference between each target's profile and each cell's, at the best turn, and this turn."""
+    """Return the difference between each target's and each cell's profile at the best rotation, and its index."""
     flat = turned.reshape(-1, RAYS)
     own = (theirs**2).mean(axis=1)[:, None]
-    # Similar cells must tie exactly. Matrix products differ in the last bit by processor and position.
+    # Round, because similar cells must tie exactly. Matrix products differ in the last bit by processor and position.
     square = (own + (flat**2).mean(axis=1) - 2 * theirs @ flat.T / RAYS).round(9)
     cost = np.sqrt(np.maximum(square, 0) / own).reshape(len(theirs), *turned.shape[:2]) + TURN * np.abs(angles) / 90
     which = cost.argmin(axis=2)
@@ -130,11 +130,11 @@ def _compare(
 
 
 def list_usable(cells: Cells) -> NDArray[np.intp]:
-    """Return the rows of cells that may be shown: whole and certain ones, or others if these are few."""
+    """Return the indices of usable cells: complete and certain ones, or others if these are few."""
     usual = cells.size**2
     fair = cells.area >= SMALL * usual
     certain = cells.certain >= TRUSTED
-    # Cells that the border cuts lack a joint there, which looks worse than a repetition.
+    # Prefer complete cells. Cells that the border cuts lack a joint there, which looks worse than a repetition.
     for allowed, enough in ((cells.whole & certain, ENOUGH), (cells.whole, FEW), (cells.area >= 0.6 * usual, 1)):
         rows = np.flatnonzero(fair & allowed)
         if len(rows) >= enough:
@@ -143,7 +143,7 @@ def list_usable(cells: Cells) -> NDArray[np.intp]:
 
 
 def list_neighbours(wanted: Tessellation) -> list[NDArray[np.intp]]:
-    """Return the rows of the targets next to each target."""
+    """Return the indices of the neighbours of each target."""
     flat = wanted.labels.ravel().astype(np.int64) - 1
     one, other = (flat[side] for side in list_borders(wanted.labels))
     both = np.unique(np.concatenate([one << 32 | other, other << 32 | one]))

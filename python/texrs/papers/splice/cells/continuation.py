@@ -1,9 +1,9 @@
 """Continue the cells of a texture beyond its image.
 
-Cells on a lattice continue on it, and a texture that wraps repeats. For other textures the joints are drawn, and the
-drawing is grown by quilting, because reflected cells look like a kaleidoscope. Known cells, which were not detected,
-stay in place if they cover the output, and cells at the border are completed by reflection. Only cells are continued,
-not the image.
+If the cells are on a lattice, the lattice is continued. If the texture wraps, it is repeated. For other textures a
+drawing of the joints is grown by quilting, because reflected cells look like a kaleidoscope. Cells that the user gave
+as labels stay in place if they cover the output, and cells at the border are completed by reflection. Only cells are
+continued, not the image.
 """
 
 from __future__ import annotations
@@ -26,31 +26,33 @@ __all__ = ["continue_cells"]
 Points = NDArray[np.float64]
 
 NEARLY = 0.75
-"""Share of the median area above which a cell that the border cuts counts as whole."""
+"""Minimum area of a cell that the border cuts to count as complete, as a share of the median area."""
 DRAWN, LARGE = (16.0, 28.0), 320.0
-"""Least and largest width of a cell in the drawing of the joints, in pixels, and side of the drawing beyond which the
-width shrinks.
+"""Minimum and maximum width of a cell in the drawing of the joints, in pixels.
+
+Side of the drawing in pixels above which cells are drawn smaller.
 """
 LINE = 0.17
-"""Distance from an outline that the drawing of the joints covers, in cell sizes."""
+"""Width of the ramp next to an outline in the drawing of the joints, in cell sizes."""
 SEEN, HINTED, COVERED = 0.3, 0.05, 0.35
-"""Share of a cell that one patch must show to place the cell first, or at all.
+"""Minimum share of a cell that is visible in one patch: to be placed at once, and to be placed later if it is complete.
 
-Share that other cells may cover.
+The last number is the maximum share of a placed cell that other cells cover.
 """
 TRIALS, FINE = 2, 0.05
-"""Maximum number of quilts, and share of torn cells below which a quilt is taken at once."""
+"""Maximum number of quilts, and share of torn cells below which a quilt is accepted without another trial."""
 SOLID, HUGE = 0.8, 3.0
-"""Solidity below which a cell of a quilt counts as torn, and area above which it does, in squared sizes."""
+"""Solidity below which a cell of a quilt counts as torn, and area above which it counts as merged, in squared sizes."""
 CLOSED, LEAST, ROOM = 0.8, 0.08, 0.25
-"""Height in the drawing above which a pixel is inside a cell.
+"""Value in the drawing above which a pixel is inside a cell.
 
-Least area of such a cell, and least free area between cells for one more, in squared sizes.
+The second number is the minimum area of an enclosed cell, the third the minimum area of a gap that becomes a cell.
+Both are in squared cell sizes.
 """
 BESIDE = 0.5
 """Distance beyond the image up to which cells at the border are completed by reflection, in cell sizes."""
 PATCH, OVERLAP = 4.0, 1.2
-"""Side of a patch of the drawing, and overlap of two patches, in cell sizes."""
+"""Side of the patches of the drawing, and overlap of two patches, in cell sizes."""
 
 
 def continue_cells(
@@ -61,7 +63,7 @@ def continue_cells(
     seed: int,
     seen: tuple[float, float] | None = None,
 ) -> tuple[NDArray[np.float64], float, str]:
-    """Return the outlines of the cells around the centre of a texture.
+    """Return the outlines of the cells around the centre of a texture, continued beyond its image if needed.
 
     Parameters
     ----------
@@ -72,23 +74,24 @@ def continue_cells(
     far : (float, float)
         Distance from the centre up to which cells are needed, along rows and columns, in cell sizes.
     seed : int
-        Number that selects cells that no rule determines.
+        Seed of the quilt, for cells that are neither on a lattice nor repeated.
     seen : (float, float), optional
-        Distance from the centre up to which cells are visible, for cells that should stay in place.
+        Distance from the centre up to which cells are visible, in cell sizes. If given, cells stay in place if
+        possible.
 
     Returns
     -------
     outlines : (n, P, 2) float64
-        Outlines relative to the centre, in cell sizes.
+        Outlines relative to the centre of the image, in cell sizes.
     scale : float
-        Size of a pixel of the texture in these units.
+        Size of a pixel of the texture, in cell sizes.
     continued : str
         How the cells continue: "" if the texture is large enough, else "lattice", "wrap" or "quilted".
 
     Raises
     ------
     InvalidInput
-        Fewer than three cells are whole.
+        The texture has fewer than three complete cells.
 
     """
     usable = np.flatnonzero(cells.whole | (cells.area >= NEARLY * cells.size**2))
@@ -115,15 +118,16 @@ def continue_cells(
 
 
 def _copy(cells: Cells, of: NDArray[np.intp], places: Points, mirrored: Bools, centre: Points) -> NDArray[np.float64]:
-    """Return copies of outlines at other places, relative to a centre."""
+    """Return copies of outlines at other places, relative to a centre, mirrored if requested."""
     signs = np.where(mirrored, -1.0, 1.0)[:, None]
     return (cells.outlines[of] - cells.centre[of][:, None]) * signs + places[:, None] - centre
 
 
 def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
-    """Return label images whose border cells continue by reflection over a margin, at most the image's size.
+    """Return the outlines of an image's cells, where cut cells are completed by reflection over a margin.
 
-    Nearly whole cells do not continue, because other cells are next to them.
+    The margin is at most as wide as the image. Nearly complete cells are not continued, because other cells are next
+    to them.
     """
     cut = cells.area < NEARLY * cells.size**2
     margin = [int(np.clip(np.ceil(b), 0, n)) for b, n in zip(beyond, cells.labels.shape, strict=True)]
@@ -133,7 +137,7 @@ def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
         at.append(np.where(turn == 0, place, side - 1 - place))
         turns.append(turn)
     labels = cells.labels[at[0][:, None], at[1][None]]
-    # A continued cell keeps its number there; reflections of other cells get new numbers.
+    # A continued cell keeps its number in the reflection. Reflections of other cells get new numbers.
     goes_on = np.concatenate([[False], cut])[labels]
     near, inside = np.zeros(labels.shape, np.int64), np.where(cells.joints > 0.5, 0, cells.labels)
     for axis, turn in enumerate(turns):
@@ -149,10 +153,11 @@ def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
 
 
 def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float64]:
-    """Quilt a drawing of the joints, and return the cells that it shows.
+    """Quilt a drawing of the joints, and return the outlines of the cells in it.
 
-    Seams cut cells and merge others. Therefore the quilt is read in two ways, and the reading with fewer torn cells is
-    used. One reading is the areas that the lines enclose, the other is the cells that are mostly visible, each whole.
+    Seams of the quilt cut some cells and merge others. Therefore cells are read from the quilt in two ways, and the
+    result with fewer torn cells is used. The first way labels the areas that the lines enclose. The second way places
+    each complete cell that is mostly visible.
     """
     unit = float(np.clip(LARGE / (2 * max(far)), *DRAWN))
     size = (round(2 * far[0] * unit), round(2 * far[1] * unit))
@@ -171,7 +176,7 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
         )
         drawn = grown.render(drawing, interpolation="nearest")
         whole = _stamp(cells, grown.coordinates, np.array(drawing.shape) / cells.labels.shape, drawn)
-        # Keep the reading of the quilt with the fewest torn cells.
+        # Keep the labels with the fewest torn cells.
         for labels in (_enclose(drawn, unit), whole):
             torn = _measure_torn(labels, unit)
             if torn < least:
@@ -199,7 +204,7 @@ def _enclose(drawn: Floats, unit: float) -> Labels:
 
 
 def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> Labels:
-    """Label the cells that are mostly visible in a quilt, each whole, and the free areas between them.
+    """Label the cells that are mostly visible in a quilt, each completed, and the free areas between them.
 
     Parameters
     ----------
@@ -208,7 +213,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
     coordinates : (H, W, 2) float32
         Source positions of the quilt in the drawing.
     factor : (2,) float64
-        Pixels of the drawing per pixel of the texture.
+        Pixels of the drawing per pixel of the texture, along each axis.
     drawn : (H, W) float32
         The quilted drawing.
 
@@ -227,7 +232,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
     share = count / (cells.area[of] * factor.prod())
     found, covered = [], np.zeros(shape, bool)
     turn = np.where(cells.whole[of], np.where(share >= SEEN, 0, 1), 2)
-    # Place whole cells first, those that are most visible before others.
+    # Place complete cells first, and of these the most visible ones first.
     for k in np.lexsort((of, -share, turn)).tolist():
         if share[k] < (SEEN, HINTED, SEEN)[turn[k]]:
             continue
@@ -238,7 +243,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
             found.append(outline)
     stamped = paint(np.array(found).reshape(-1, cells.outlines.shape[1], 2), shape)
     usual = cells.size**2 * factor.prod()
-    # Large free areas are cells also. The rest is given to the nearest cell.
+    # Large free areas also become cells. Other free pixels belong to the nearest cell.
     pieces, _ = label((drawn > CLOSED) & ~covered)
     room = renumber(pieces.astype(np.int32), np.bincount(pieces.ravel()) >= ROOM * usual)
     labels = np.where((room > 0) & (stamped == 0), room + len(found), stamped)
@@ -249,7 +254,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
 
 
 def _measure_torn(labels: Labels, unit: float) -> float:
-    """Return the share of the area in cells that seams merged or dented."""
+    """Return the share of the area whose cells have dents, or were merged by seams."""
     shapes = Shapes.of(labels)
     area, solid = shapes.area[1:], shapes.measure_solidity()[1:]
     if not len(area):
@@ -259,7 +264,7 @@ def _measure_torn(labels: Labels, unit: float) -> float:
 
 
 def _draw(cells: Cells, unit: float) -> Floats:
-    """Draw the distance to outlines at a fixed size of cells: 0 on them and 1 inside from a small depth on."""
+    """Draw the distance to outlines in cells of ``unit`` pixels: 0 at an outline, rising to 1 inside the cells."""
     from scipy.ndimage import distance_transform_edt
     from skimage.transform import resize
 

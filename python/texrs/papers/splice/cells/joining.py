@@ -1,4 +1,4 @@
-"""Join cells: each is cut into the earlier ones, in a band around its outline, where the seam is least visible."""
+"""Join cells: each is cut into the earlier ones where the seam is least visible, in a band around its outline."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from texrs.papers.splice.cells.charts import BAND, Charts
 __all__ = ["Joined", "join"]
 
 COLOUR, DEPTH = 1.0, 30.0
-"""Weights of a seam's cost: for the colours on both sides, in standard deviations, and for the depth inside a cell."""
+"""Weights of a seam's cost: for colour differences, in standard deviations, and for the depth inside a cell."""
 STEEP, DEEP = 4.0, 6.0
-"""Depth at one joint's width from the middle of a joint, and largest depth."""
+"""Depth at one joint's width from the middle of a joint, and maximum depth."""
 CORE = 0.5
-"""Depth inside the outline beyond which a cell keeps its pixels, in bands."""
+"""Depth inside the outline beyond which a cell keeps its pixels, in widths of the band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joined:
-    """Chart and pixel that each output pixel shows.
+    """Source of each output pixel: a chart, and a pixel of this chart.
 
     Attributes
     ----------
     pixel : (H, W) uint32
-        Number of the pixel in the row of all charts.
+        Index of the pixel in the array of all charts' pixels.
     chart : (H, W) int32
-        Number of the pixel's chart.
+        Index of the pixel's chart.
 
     """
 
@@ -43,7 +43,7 @@ class Joined:
 
 
 def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> Joined:
-    """Cut the charts into the output, one after the other."""
+    """Cut the charts into the output, one after the other, along the cheapest seams."""
     from scipy.ndimage import distance_transform_edt
 
     colours = guidance(as_image(image))
@@ -51,10 +51,10 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
     far = distance_transform_edt(~mark_outlines(cells.labels)).astype(np.float32)
     looked = gather(np.dstack([colours, far]), charts.places[None], interpolation="linear")[0]
     band = max(2.0, BAND * cells.size)
-    # The cheapest place of a seam is a joint.
+    # Add the depth inside a cell to the cost, so that seams run along joints.
     inside = np.clip(STEEP * (looked[:, -1] / (0.5 * cells.joint_width + 0.5) - 1), 0, DEEP)
     samples = Samples(np.ascontiguousarray(looked[:, :-1]), np.ascontiguousarray(inside), (COLOUR, DEPTH))
-    # A cell has no joint where the border cuts it, so the neighbour's joint is shown there.
+    # A cell has no joint where the border of A cuts it, so the neighbour's joint is used there.
     limits = np.array(cells.labels.shape) - 1
     within = 0.5 * cells.joint_width + 1
     bare: Bools = np.asarray((np.minimum(charts.places, limits - charts.places) < within).any(axis=-1))
@@ -80,7 +80,7 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
 
 
 def _fill(pixel: NDArray[np.uint32], charts: Charts) -> None:
-    """Fill pixels without a chart from the chart whose outline is nearest."""
+    """Fill pixels that no chart covers from the chart whose outline is nearest."""
     if not (pixel == FREE).any():
         return
     best = np.full(pixel.shape, -np.inf, np.float32)

@@ -1,7 +1,7 @@
-"""Correct stretched pixels of charts: they take pixels that fit their neighbours from A at its own size.
+"""Replace stretched pixels of charts by pixels of A that are not stretched and fit their neighbours.
 
-The corrector is the same as for the background between separate elements (`texrs.papers.splice.refine`). Joints and
-unstretched pixels stay, and pixels of joints do not enter a cell.
+The background between separate elements is refined in the same way (`texrs.papers.splice.refine`). Joints and
+unstretched pixels do not change, and pixels of joints are not used inside a cell.
 """
 
 from __future__ import annotations
@@ -24,31 +24,33 @@ from texrs.papers.splice.refine import Draft, Refinement, correct_draft
 __all__ = ["refine_charts"]
 
 STRETCH = 1.35
-"""Output pixels per pixel of A above which pixels are corrected."""
+"""Stretch above which pixels are corrected, in output pixels per pixel of A."""
 EDGE = 2.0
-"""Width of the border next to a joint that stays like the joint, in pixels.
+"""Width of the border next to a joint that is not corrected, in pixels.
 
-Joints are lines, which the corrector would fray.
+Joints are lines, which the correction would fray.
 """
 SMALLEST = 24.0
-"""Size of a cell, in pixels, below which its windows contain more joint than cell."""
+"""Minimum size of cells for a correction, in pixels. Windows in smaller cells contain more joint than cell."""
 GRAIN, FINE = 0.24, 2.0
-"""Least share of the variance inside cells that must be finer than a number of pixels.
+"""Minimum share of fine detail in the variance inside cells.
+
+Standard deviation of the filter that removes it, in pixels.
 
 Smooth cells, and cells with a single figure such as a honeycomb's bottom, look better stretched than corrected.
 """
 LEAST = 0.01
-"""Share of the output below which nothing is corrected."""
+"""Minimum share of stretched output pixels for a correction."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurnedRefinement(Refinement):
-    """Refinement whose pixels use A turned, as in their charts."""
+    """Refinement that rotates samples of A like their charts."""
 
     turned: Floats
 
     def frames(self, region: Region, spacing: int) -> NDArray[np.int16]:
-        """Return the Jacobian of each pixel: the turn of its chart."""
+        """Return the Jacobian of each pixel: the rotation of its chart."""
         turned = np.rint(self.turned[::spacing, ::spacing] * ONE)
         return np.ascontiguousarray(turned.reshape(region.points, 2, 2), np.int16)
 
@@ -63,7 +65,7 @@ def refine_charts(
     seed: int,
     progress: Progress,
 ) -> tuple[Floats, Floats]:
-    """Return positions and Jacobians, corrected where charts stretch A."""
+    """Return source positions and Jacobians, corrected where charts stretch A."""
     if cells.size < SMALLEST or _measure_grain(a, cells) < GRAIN:
         return places, frames
     stretch = 1 / np.maximum(_measure_least(frames), 1e-3)
@@ -91,7 +93,7 @@ def _measure_least(frames: Floats) -> Floats:
 
 
 def _measure_grain(a: ElementAnalysis, cells: Cells) -> float:
-    """Return the share of fine grain in the variance of lightness inside cells."""
+    """Return the share of detail finer than `FINE` pixels in the variance of lightness inside cells."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     light = guidance(as_image(a.image)).mean(axis=-1)

@@ -1,7 +1,7 @@
-"""Interpolate between A's own tessellation and the requested one.
+"""Interpolate between A's own tessellation and the target tessellation if the strength is below 1.
 
-Cells of both are matched one to one at the least total squared distance, like elements (Eq. 4). Each outline moves a
-share of its way. Cells without a partner shrink away, or grow.
+Cells of both tessellations are matched one to one at the least total squared distance, like elements (Eq. 4). Each
+outline moves a share of its way. Cells without a partner shrink or grow.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ __all__ = ["interpolate_layouts", "take_own_cells"]
 def take_own_cells(
     cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], margin: int, *, seed: int
 ) -> Tessellation:
-    """Return A's own cells around the centre of the output; beyond its image the labels are reflected.
+    """Return A's own cells around the centre of the output, with reflected labels beyond A's image.
 
-    If the output is larger than the image, they continue like those of any layout (`take_cells`).
+    If the output is larger than the image, the cells continue like those of any layout (`take_cells`).
     """
     shape = cells.labels.shape
     if any(n > m for n, m in zip(size, shape, strict=True)):
@@ -45,14 +45,14 @@ def take_own_cells(
 
 
 def interpolate_layouts(own: Tessellation, wanted: Tessellation, strength: float) -> Tessellation:
-    """Move the cells of one tessellation a share of their way to those of another.
+    """Move the cells of one tessellation a share of the way to the cells of another.
 
     Parameters
     ----------
     own, wanted : Tessellation
-        Tessellations of one size and margin.
+        Tessellations of the same size and margin.
     strength : float
-        Share of the way, 0 to 1.
+        Share of the way, from 0 (``own``) to 1 (``wanted``).
 
     """
     if strength <= 0:

@@ -1,7 +1,8 @@
-"""Build the target cells: the tessellation that the cells of one texture take from another.
+"""Build the target cells: the tessellation of one texture, which the cells of another will fill.
 
-A connected texture provides its own cells, any other the Voronoi cells of its points. Both are scaled to the size of
-A's cells, and continue beyond their image (`continuation`). Only cells are continued, not the image.
+The target cells are the cells of a connected texture, or the Voronoi cells of another texture's points. They are
+scaled to the size of A's cells, and continue beyond their image (`continuation`). Only cells are continued, not the
+image.
 """
 
 from __future__ import annotations
@@ -24,21 +25,21 @@ __all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
 Points = NDArray[np.float64]
 
 MARGIN = 1.0
-"""Margin around the output with target cells, in cell sizes, so that cells at its border are whole."""
+"""Width of the margin around the output with target cells, in cell sizes, so that cells at the border are complete."""
 SAMPLES = 640
-"""Maximum number of samples along each axis that measure the areas of Voronoi cells."""
+"""Maximum number of samples along each axis for measuring the areas of Voronoi cells."""
 SLIVER = 0.2
-"""Share of the median area below which a target cell is merged into its neighbours."""
+"""Minimum area of a target cell, as a share of the median area. Smaller cells are merged into their neighbours."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tessellation:
-    """Requested cells.
+    """Target cells in the output and a margin around it.
 
     Attributes
     ----------
     labels : (H, W) int32
-        Target cell of each pixel, from 1, in the output and a margin around it.
+        Target cell of each pixel in the output and the margin, counted from 1.
     margin : int
         Width of the margin on each side, in pixels.
     outlines : (n, P, 2) float64
@@ -50,9 +51,10 @@ class Tessellation:
     scale : float
         Scale factor of the layout.
     continued : str
-        How the layout continues beyond its image: "lattice", "wrap", "quilted", "reflected", or "" if it need not.
+        How the layout continues beyond its image: "lattice", "wrap", "quilted" (grown from patches), "reflected", or
+        "" if it does not continue.
     start : (n, 2) float64, optional
-        Origin of each cell among A's own, if it moves only a share of its way.
+        Origin of each cell among A's own cells, if the strength is below 1.
 
     """
 
@@ -81,14 +83,14 @@ def take_cells(
     margin: int | None = None,
     exact: bool = False,
 ) -> Tessellation:
-    """Return the cells of a connected texture, scaled to a median size of ``unit`` pixels.
+    """Return the cells of a connected texture as target cells, with a median size of ``unit`` pixels.
 
-    ``exact`` cells are known, not detected. The margin is in pixels, by default `MARGIN` cell sizes.
+    Set ``exact`` for cells that the user gave as labels. The margin is in pixels. Default: `MARGIN` cell sizes.
 
     Raises
     ------
     InvalidInput
-        Fewer than three cells are whole.
+        The texture has fewer than three complete cells.
 
     """
     margin = int(np.ceil(MARGIN * unit)) if margin is None else margin
@@ -109,13 +111,13 @@ def take_points(
     scale: float | None = None,
     centre: Points | None = None,
 ) -> Tessellation:
-    """Return the Voronoi cells of a texture's points, scaled to a median size of ``unit`` pixels or by ``scale``.
+    """Return the Voronoi cells of points as target cells, with a median size of ``unit`` pixels or scaled by ``scale``.
 
-    The middle of the points, or ``centre``, is at the centre of the output.
+    The middle of the points, or ``centre`` if it is given, is at the centre of the output.
     """
     from scipy.spatial import cKDTree
 
-    # Use the continued layout, so that cells at its border are like the others.
+    # Use the continued layout, so that cells at the image's border are like the others.
     low, high = layout.points.min(axis=0), layout.points.max(axis=0)
     around, _ = layout.cover(low - 2 * layout.scale, high + 2 * layout.scale)
     step = max(layout.scale / 16, float((high - low).max()) / SAMPLES)
@@ -123,7 +125,7 @@ def take_points(
     owner = cKDTree(around).query(grid.reshape(-1, 2))[1]
     inner = ((around >= low) & (around <= high)).all(axis=1)
     counts = np.bincount(owner, minlength=len(around))[inner]
-    # Points on one line have no cells between them.
+    # Use the spacing instead if all points are on one line, which has no cells between points.
     area = float(np.median(counts[counts > 0])) * step**2 if counts.any() else layout.scale**2
     factor = unit / float(np.sqrt(area)) if scale is None else scale
     # Assume that no cell extends further from its point than the width of a typical cell.
@@ -142,7 +144,7 @@ def take_points(
 
 
 def finish_cells(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:
-    """Keep one connected piece of each cell that is large enough, fill the rest from neighbours, and trace outlines."""
+    """Merge small pieces of cells into their neighbours, number the remaining cells and trace their outlines."""
     from scipy.ndimage import distance_transform_edt
     from skimage.measure import label
 
