@@ -1,6 +1,6 @@
-"""Kernels on plain arrays, one module each: checked and documented wrappers of the compiled code.
+"""Kernels on plain arrays, with one module each. They check their arguments and call the compiled code.
 
-Each kernel is a standard term of the literature and does not depend on the papers that use it.
+Each kernel is a standard algorithm of the literature. No kernel depends on the papers that use it.
 """
 
 from texrs.kernels import (

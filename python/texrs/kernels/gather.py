@@ -29,36 +29,37 @@ def gather(
     interpolation: Interpolation = "linear",
     wrap: bool | Sequence[bool] = False,
 ) -> Array:
-    """Return samples of exemplars at coordinates.
+    """Return samples of exemplars at given coordinates.
 
-    A coordinate that falls on a sample returns this sample, bit for bit, for every interpolation. ``"cubic"``
-    (Catmull-Rom [1]_) is clipped to the range of its taps, so it neither rings nor leaves the range of the data.
+    If a coordinate is exactly at a sample, every interpolation returns this sample bit for bit. ``"cubic"``
+    (Catmull-Rom [1]_) is clipped to the range of the samples that it interpolates, so it does not overshoot.
 
     Parameters
     ----------
     exemplars : (h, w[, C]) or (d, h, w[, C]) array_like, or a list or tuple of them
-        Bool, integers, or floats of 16, 32 or 64 bit, finite at the coordinates. Several exemplars must agree in dtype
-        and channels, but not in size.
+        Exemplars of bool, integers, or floats of 16, 32 or 64 bits, finite at the coordinates. Several exemplars must
+        have the same dtype and number of channels, but can differ in size.
     coordinates : (..., 2) or (..., 3) array_like
-        (row, column) or (plane, row, column), in samples, as float32. Sample centres are at the integers. Must be
-        finite.
+        Finite coordinates (row, column) or (plane, row, column) in samples, converted to float32. The centres of
+        samples have integer coordinates.
     which : (...) array_like of int, optional
-        Index of the exemplar of each pixel, from 0. Default: the first exemplar for all.
+        Index of the exemplar for each pixel, from 0. Default: 0 everywhere.
     interpolation : {"nearest", "linear", "cubic"}
-        Interpolation between samples. Integers are rounded to the nearest. Integers beyond 2^53 are not interpolated:
-        the nearest sample is used. Default: "nearest".
+        Interpolation between samples. Interpolated integers are rounded. Integers beyond 2^53 are not interpolated,
+        and the nearest sample is used. Default: "nearest".
     wrap : bool or one per axis
-        Axes along which the exemplars are periodic. Along the other axes the edge repeats.
+        Axes along which the exemplars are periodic. Along other axes, the samples at the border are repeated.
 
     Returns
     -------
     (..., [C]) ndarray
-        Samples in the dtype of the exemplars, with channels if they have a channel axis.
+        Samples in the dtype of the exemplars, with a channel axis if the exemplars have one.
 
     Raises
     ------
     InvalidInput
-        If coordinates or samples are not finite, an index is beyond the exemplars, or the exemplars do not agree.
+        Coordinates or samples are not finite, an index is not that of an exemplar, or exemplars differ in dtype or
+        channels.
 
     References
     ----------
@@ -98,10 +99,10 @@ def gather(
         [_to_kernel(e, how) for e in images], as_wrap(wrap, axes=axes), index.reshape(-1), points.reshape(-1, axes), how
     )
     if out.dtype.kind == "f" and not np.isfinite(out).all():
-        # Check the result instead of the exemplar: a few pixels are read faster than the whole of a large exemplar.
+        # Check the result instead of the exemplar, because it is faster to read a few pixels than a large exemplar.
         for image in images:
             check_finite(image, "exemplars")
-    # Return the dtype of the exemplars, which the kernel may not support.
+    # Convert back to the dtype of the exemplars, because the kernel may not support it.
     if dtype == np.bool_ or out.dtype == np.uint32:
         out = out.view(dtype)
     elif dtype != out.dtype:
@@ -111,13 +112,13 @@ def gather(
 
 
 def _find_exact(interpolation: str, images: Sequence[Array], points: Floats) -> str:
-    """Return the interpolation for 64-bit integers: nearest if float64 cannot represent all of them."""
+    """Return "nearest" for 64-bit integers that float64 cannot represent, else the given interpolation."""
     large = any(int(e.min()) < -EXACT or int(e.max()) > EXACT for e in images)
     return "nearest" if large or (points == np.rint(points)).all() else interpolation
 
 
 def _to_kernel(array: Array, interpolation: str) -> Array:
-    """Return the values in a dtype that the kernel accepts."""
+    """Return the values in a dtype that the kernel supports."""
     if array.dtype == np.bool_:
         return array.view(np.uint8)
     if array.dtype.kind in "ui" and array.itemsize == 8:

@@ -1,4 +1,4 @@
-"""Fill holes with patches of exemplars: the best match, joined to the known pixels by a minimum cut."""
+"""Fill holes with patches of exemplars. Each patch is a good match, joined to the known pixels by a minimum cut."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ def __dir__() -> list[str]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inpainting:
-    """An image without holes, and the sources of its new pixels.
+    """Image without holes, and the source of each new pixel.
 
     Attributes
     ----------
     colours : (H, W, C) float32
-        The filled image.
+        Filled image.
     label : (H, W) int32
-        Patch of each pixel, counted from 0 in the order of pasting; -1 for pixels that were kept.
+        Index of the patch that each pixel comes from, in the order of pasting; -1 for known pixels that were not
+        replaced.
     source : (patches,) int
-        Exemplar of each patch.
+        Index of the exemplar of each patch.
     coordinates : (H, W, 2) float32
-        Source coordinates in that exemplar, (row, column); 0 for pixels that were kept.
+        Source coordinates (row, column) in that exemplar; 0 for known pixels that were not replaced.
 
     Examples
     --------
@@ -72,57 +73,60 @@ def inpaint(
     shown: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Inpainting:
-    """Fill the unknown pixels of an image from the hole boundary inwards, patch by patch.
+    """Fill the unknown pixels of an image patch by patch, from the boundary of the hole inwards.
 
-    Each step searches good matches of the known pixels in a window on the boundary [1]_. Matches that would repeat or
-    mirror their surroundings are dropped. The three best are joined to the known pixels by a minimum cut [2]_, and the
-    cheapest is pasted.
+    Each step takes a window on the boundary of the hole, and searches the exemplars for good matches of its known
+    pixels [1]_. Matches that would repeat or mirror their surroundings are rejected. The three best matches are joined
+    to the known pixels by a minimum cut [2]_, and the match with the cheapest cut is pasted.
 
     Parameters
     ----------
     colours : (H, W, C) array_like
-        The image, of any real dtype, read as float32 in the units of the exemplars. Unknown pixels may have any value.
+        Image of any real dtype, converted to float32, with the same scale of values as the exemplars. Unknown pixels
+        can have any value.
     known : (H, W) array_like of bool
-        False in the holes.
+        Mask of the known pixels, False in the holes.
     index : PatchIndex
-        Index of the exemplars that patches are taken from, with C channels.
+        Index of the exemplars from which patches are copied. They must have C channels.
     patch_size : int or (rows, columns)
-        Size of a patch in pixels, from 1 to the size of the image, of an exemplar and of ``index.max_patch``.
+        Size of a patch in pixels, from 1 to the minimum of the image size, the largest exemplar and
+        ``index.max_patch``.
     keep : (H, W) array_like of bool, optional
-        Known pixels that no patch may replace. Default: seams may run through all known pixels.
+        Known pixels that patches must not replace. Default: no pixels, so seams can run through all known pixels.
     count : int
-        Number of matches to consider, 1 to 1000.
+        Maximum number of matches to compare, 1 to 1000.
     separation : int
         Minimum distance between matches in one exemplar, in pixels, 0 to 2^31.
     ratio : float
         Maximum cost of a match, as a multiple of the best one, 1 to 1e9.
     wrap : bool or (rows, columns)
-        Axes along which the image is periodic.
+        Axes along which the image is periodic. One value for both axes, or one for each.
     seed : int
-        Seed, 0 to 2^64 - 1. It chooses patches if no pixel is known.
+        Random seed, 0 to 2^64 - 1. It is only used if no pixel is known, to choose patches.
     paper : bool
-        If True, fill as Shen, Jin, Mao and Feng (2006) state it. Holes are filled in scan order, with windows centred
-        on them instead of those with the best share of known pixels. All known pixels have one weight, instead of more
-        next to the hole. The exact best matches are all cut, with plain cut costs. With ``count=1`` this is their
-        completion.
+        If True, follow Shen, Jin, Mao and Feng (2006) literally. Holes are then filled in scan order, and windows are
+        centred on unknown pixels instead of the place with most known pixels. All known pixels have the same weight,
+        instead of a higher weight near the hole. The exact best matches are compared, by plain cut costs. With
+        ``count=1`` this is their completion.
     shown : int, optional
-        Index of the image in ``index`` that the image itself shows in place, if any. The surroundings of a hole are
-        then not repeated or mirrored in it. Patches avoid each other in any case, and mirror images in ``index`` are
-        recognised.
+        Index in ``index`` of the exemplar that is this image itself, if there is one. Surroundings of a hole are then
+        not copied or mirrored into it from there. In any case, patches do not repeat their neighbours, and mirror
+        images in ``index`` are recognised.
     progress : callable, optional
-        Called with the filled share of the holes, 0 to 1. An exception that it raises stops the work.
+        Function that is called with the filled fraction of the holes, 0 to 1. An exception that it raises stops the
+        work.
 
     Returns
     -------
     Inpainting
-        The filled image and its sources.
+        Filled image, and the source of each new pixel.
 
     Raises
     ------
     InvalidInput
-        If shapes do not agree, a patch does not fit, or values are not finite or out of range.
+        Shapes differ, a patch does not fit, or values are not finite or out of range.
     Cancelled
-        If the work was stopped.
+        The work was stopped.
 
     References
     ----------
@@ -146,7 +150,7 @@ def inpaint(
         raise InvalidInput(f"index: must be a PatchIndex, got {type(index).__name__}")
     picture = as_array(colours, "colours", np.float32, ("rows", "columns", "channels"))
     mask = as_mask(known, "known", picture.shape[:2])
-    # This takes a quarter of the time of `np.where`, which spreads the mask over the channels.
+    # A copy takes 25 % of the time of `np.where`, which would expand the mask over the channels.
     picture = picture.copy()
     picture[~mask] = 0
     if not np.isfinite(picture).all():
@@ -172,7 +176,7 @@ def inpaint(
         as_progress(progress),
     )
     coordinates = np.zeros((*mask.shape, 2), np.float32)
-    # This takes a tenth of the time of `np.nonzero`, which processes each axis separately.
+    # This takes 10 % of the time of `np.nonzero`, which processes each axis separately.
     new = np.unravel_index(np.flatnonzero(label >= 0), label.shape)
     of = patches[label[new]]
     for axis, (at, length) in enumerate(zip(new, mask.shape, strict=True)):

@@ -1,4 +1,4 @@
-"""Mean-shift filtering, which flattens textures and keeps the edges between regions."""
+"""Mean-shift filtering, which smooths textures and preserves the edges between regions."""
 
 from __future__ import annotations
 
@@ -30,43 +30,44 @@ def mean_shift(
     wrap: bool | tuple[bool, bool] = False,
     progress: Progress | None = None,
 ) -> Array:
-    """Filter an image by mean shift: each pixel becomes the mode of its density.
+    """Filter an image by mean shift: replace each pixel by the local mode of colours around it.
 
-    Each pixel moves to the mean position and colour of a square window until it stays. Only pixels whose colours
-    are within a range of its own count (Comaniciu and Meer [1]_, flat kernels). The result is close to that of
-    ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. It supports any dtype and any number of channels, and does not
-    depend on the number of threads or the processor.
+    Each pixel starts at its position and colour, and moves repeatedly to the mean of the pixels in a square window
+    around it. Only pixels whose colour differs by at most ``range`` count (Comaniciu and Meer [1]_, flat kernels). The
+    result is close to ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. In addition, all real dtypes and numbers of
+    channels are supported, and the result does not depend on the number of threads or the processor.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype except 64-bit integers, with values up to 1e15.
+        Image of any real dtype except 64-bit integers, with absolute values up to 1e15.
     radius : int
-        Half the side of the window in pixels, without the middle; 0 to 1024.
+        Radius of the window in pixels, 0 to 1024. Its side is ``2 * radius + 1``.
     range : float
-        Radius of the ball of colours, in the units of the image; 0 to 1e15.
+        Maximum colour difference in the units of the image, 0 to 1e15.
     max_iterations : int
-        Maximum number of steps of a pixel, 0 to 2^31 - 1. Five, as in OpenCV, are enough for most pixels.
+        Maximum number of steps per pixel, 0 to 2^31 - 1. For most pixels, five steps are enough, as in OpenCV.
     tolerance : float, optional
-        Maximum colour change, 0 to 1e15, of a pixel that has arrived. Its rounded position must also stay. Default: a
-        constant position is enough, as in OpenCV. A twentieth of the range continues until the colour is at its mode
-        too, at about twice the cost.
+        Maximum colour change, 0 to 1e15, at which a pixel stops, if its rounded position also does not change. A value
+        of 0.05 times ``range`` continues until the colour has converged too, which takes about twice the time.
+        Default: only the position counts, as in OpenCV.
     wrap : bool or (bool, bool)
-        Axes along which the image is periodic.
+        Axes along which the image is periodic. One value for both axes, or one for each.
     progress : callable, optional
-        Called with the name of the stage and its completed share. An exception that it raises stops the work.
+        Function that is called with the name of the stage and its completed share, 0 to 1. An exception that it raises
+        stops the work.
 
     Returns
     -------
     ndarray
-        Filtered image, with the shape and dtype of the image. Integers are rounded.
+        Filtered image with the same shape and dtype. Integers are rounded.
 
     Raises
     ------
     InvalidInput
-        If the image is not an image or not finite, or another argument is out of range.
+        The argument is not an image, is not finite, or another argument is out of range.
     Cancelled
-        If the work was stopped.
+        The work was stopped.
 
     References
     ----------
@@ -75,7 +76,7 @@ def mean_shift(
 
     Examples
     --------
-    Noise disappears, and the step between two regions stays:
+    The noise disappears, and the step between the two regions remains:
 
     >>> import numpy as np
     >>> image = np.full((16, 16), 50.0)

@@ -1,4 +1,4 @@
-"""Normalised cross-correlation: the similarity of a template to each window of an image."""
+"""Normalised cross-correlation: the similarity of a template to every window of an image."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ def __dir__() -> list[str]:
 
 
 class Correlation:
-    """An image prepared for comparison with many templates of any brightness and contrast.
+    """Image that is prepared for comparison with many templates, independently of brightness and contrast.
 
-    Each channel is compared separately. Numerators are products of spectra, and the mean and variance of the windows
-    come from running sums [1]_. The time therefore hardly depends on the size of a template.
+    Each channel is compared separately. Numerators are computed as products of spectra, and the mean and variance of
+    windows from running sums [1]_. The time therefore hardly depends on the size of a template.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype except 64-bit integers; finite.
+        Finite image of any real dtype except 64-bit integers.
 
     Raises
     ------
     InvalidInput
-        If it is not an image, or has values beyond the range of float32.
+        The argument is not an image, or its values exceed the range of float32.
 
     References
     ----------
@@ -49,7 +49,7 @@ class Correlation:
 
     def __init__(self, image: object) -> None:
         planes = _as_planes(image, "image")
-        #: Rows, columns and channels of the image.
+        # : Number of rows, columns and channels of the image.
         self.shape: tuple[int, int, int] = (planes.shape[1], planes.shape[2], planes.shape[0])
         self._inner = _rust.Correlation(planes)
 
@@ -62,18 +62,19 @@ class Correlation:
         Parameters
         ----------
         template : (h, w) or (h, w, C) array_like
-            Any real dtype except 64-bit integers; finite. It has the channels of the image and is not larger.
+            Finite template of any real dtype except 64-bit integers. It must have the channels of the image, and must
+            not be larger.
 
         Returns
         -------
         (H - h + 1, W - w + 1, C) float32
-            Correlation coefficient of each window and channel, -1 to 1, stored at the first pixel of the window. It is 0
-            if the window or the template is constant. Values are rounded to 20 fractional bits.
+            Correlation coefficient, -1 to 1, of each window and channel, at the window's first pixel. It is 0 if the
+            window or the template is constant. Values are rounded to 20 fractional bits.
 
         Raises
         ------
         InvalidInput
-            If it is not an image, is larger than the image, or has other channels.
+            The template is not an image, is larger than the image, or has other channels.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""Exact best matches of a masked, weighted patch over all positions of one or several images."""
+"""Exact search for the best matches of a masked, weighted patch over all positions of one or several images."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _MOST = 2**31 - 1
 
 @dataclass(frozen=True, slots=True, order=True)
 class Match:
-    """A position and its cost. Matches sort by cost, then by position.
+    """Position of a match and its cost. Matches are sorted by cost, then by position.
 
     Attributes
     ----------
@@ -63,31 +63,31 @@ class Match:
 
 
 class PatchIndex:
-    """An index of images for the search of many patches.
+    """Index of images in which many patches can be searched for.
 
-    The cost of a position is ``sum(weight * (patch - window) ** 2)`` over the pixels and channels. All positions are
-    filtered by Fourier correlation as in Kwatra et al. [1]_. Positions that could be the minimum within the error
-    bound of the filter are scored again in float64. Results are therefore exact, and the same for any number of
-    threads and any processor. Ties go to the lowest (exemplar, row, column).
+    The cost of a position is ``sum(weight * (patch - window) ** 2)`` over the pixels and channels. Approximate costs
+    of all positions are computed by Fourier correlation, as in Kwatra et al. [1]_. Positions that could be the
+    minimum, given the error of the approximation, are then computed exactly in float64. Results are therefore exact,
+    and the same for any number of threads and any processor. Of equal costs, the lowest (exemplar, row, column) is
+    first.
 
     Parameters
     ----------
     images : (H, W) or (H, W, C) array_like, or a list or tuple of them
-        One image, or several that agree in channels but not in size. Any real dtype except 64-bit integers. They are
-        compared as float32, in the given units.
+        One image, or several images with the same number of channels, of any size. Any real dtype except 64-bit
+        integers. They are converted to float32 and compared in their units.
     allowed : (H, W) array_like of bool, or a list or tuple of them, optional
-        Mask of the positions (top-left corners of patches) that may be used. One mask for a single image. For several
-        images one mask each, where None allows all positions.
+        Mask of the positions (top-left corners of patches) that can be used. For several images, one mask for each, or
+        None to allow all its positions. Default: all positions.
     max_patch : int or (rows, columns), optional
-        Size of the largest patch to search for, in pixels. Smaller values need less work. Default: 64, or the largest
-        that fits into the images.
+        Size of the largest patch to search for, in pixels. Smaller sizes need less time. Default: 64, or the largest
+        size that fits into the images.
 
     Raises
     ------
     InvalidInput
-        If images are missing, values are beyond the range of float32, different numbers of channels, or a mask
-        that does
-        not fit its image.
+        There are no images, values exceed the range of float32, numbers of channels differ, or a mask does not have
+        the size of its image.
 
     References
     ----------
@@ -102,7 +102,7 @@ class PatchIndex:
     >>> index.best(image[20:36, 50:66])
     [Match(cost=0.0, exemplar=0, row=20, column=50)]
 
-    Pixels without weight are ignored:
+    Pixels with weight 0 are ignored:
 
     >>> patch = image[20:36, 50:66].astype(float)
     >>> known = np.ones((16, 16))
@@ -133,26 +133,27 @@ class PatchIndex:
         return f"PatchIndex(shapes={self.shapes}, max_patch={self.max_patch})"
 
     def again(self, *, allowed: object = None, max_patch: int | tuple[int, int] | None = None) -> PatchIndex:
-        """Return an index of the same images for another patch size or other allowed positions.
+        """Return an index of the same images with another maximum patch size or other allowed positions.
 
-        Data that depend on the images only are computed once and shared.
+        Data that depend only on the images are computed once and shared.
 
         Parameters
         ----------
         allowed : (H, W) array_like of bool, or a list or tuple of them, optional
-            Mask of the positions that may be used. Default: all positions.
+            Mask of the positions that can be used. Default: all positions.
         max_patch : int or (rows, columns), optional
-            Size of the largest patch to search for, in pixels. Default: 64, or the largest that fits into the images.
+            Size of the largest patch to search for, in pixels. Default: 64, or the largest size that fits into the
+            images.
 
         Returns
         -------
         PatchIndex
-            Index that returns the same matches as a new one.
+            Index with the same results as a newly created one.
 
         Raises
         ------
         InvalidInput
-            If a mask does not fit its image.
+            A mask does not have the size of its image.
 
         Examples
         --------
@@ -170,7 +171,7 @@ class PatchIndex:
 
     @property
     def max_patch(self) -> tuple[int, int]:
-        """Rows and columns of the largest patch that can be searched for, in pixels."""
+        """Number of rows and columns of the largest patch that can be searched for."""
         rows, columns = self._index.max_patch
         return rows, columns
 
@@ -179,33 +180,35 @@ class PatchIndex:
     ) -> list[Match]:
         """Return the best positions of a patch.
 
-        The search is greedy: the best position, then the best one that is far enough from it, and so on.
+        The search is greedy: the first match is the best position, the second is the best position far enough from the
+        first, and so on.
 
         Parameters
         ----------
         patch : (p, q) or (p, q, C) array_like
-            Any real dtype, in the units of the images. Pixels of zero weight may have any value, including NaN.
+            Patch of any real dtype, in the units of the images. Pixels of weight 0 can have any value, including NaN.
         weight : (p, q) array_like, optional
-            Weight of each pixel, at least 0; bool is allowed. It is zero where the patch is unknown. Default: 1
-            everywhere. If all weights are zero, every position costs nothing and the first ones are returned.
+            Weight of each pixel, at least 0, or a bool mask. Use 0 for unknown pixels. If all weights are 0, every
+            position costs 0 and the first positions are returned. Default: 1 everywhere.
         count : int
             Maximum number of matches, 1 to 2^31 - 1.
         separation : int
-            Minimum distance between matches in one image, in pixels along rows or columns; 0 to 2^31 - 1.
+            Minimum distance between matches in one image, in pixels, 0 to 2^31 - 1. Matches are far enough apart if
+            their rows or their columns differ by this.
         ratio : float
-            Maximum cost of a match, as a multiple of the least cost; at least 1, infinity is allowed.
+            Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed.
 
         Returns
         -------
         list of Match
-            Matches by rising cost. There are fewer than ``count`` if separation, ratio or the allowed positions
-            exclude the rest.
+            Matches in the order of increasing cost. There are fewer than ``count`` if separation, ratio or the allowed
+            positions exclude the others.
 
         Raises
         ------
         InvalidInput
-            If the patch fits into no image or is larger than ``max_patch``, a weight is negative, or another argument
-            is out of range.
+            The patch does not fit into any image or is larger than ``max_patch``, a weight is negative, or another
+            argument is out of range.
 
         Examples
         --------
@@ -229,34 +232,34 @@ class PatchIndex:
         separation: int = 4,
         ratio: float = math.inf,
     ) -> list[Match]:
-        """Return the best of some positions.
+        """Return the best of some given positions.
 
         Parameters
         ----------
         patch : (p, q) or (p, q, C) array_like
-            Any real dtype, in the units of the images. Pixels of zero weight may have any value, including NaN.
+            Patch of any real dtype, in the units of the images. Pixels of weight 0 can have any value, including NaN.
         weight : (p, q) array_like, optional
-            Weight of each pixel, at least 0; bool is allowed. It is zero where the patch is unknown. Default: 1
-            everywhere.
+            Weight of each pixel, at least 0, or a bool mask. Use 0 for unknown pixels. Default: 1 everywhere.
         candidates : iterable of (exemplar, row, column)
-            Positions to compare, as integers. The masks ``allowed`` are ignored.
+            Integer positions to compare. The masks ``allowed`` are ignored.
         count : int
             Maximum number of matches, 1 to 2^31 - 1.
         separation : int
-            Minimum distance between matches in one image, in pixels along rows or columns; 0 to 2^31 - 1.
+            Minimum distance between matches in one image, in pixels, 0 to 2^31 - 1. Matches are far enough apart if
+            their rows or their columns differ by this.
         ratio : float
-            Maximum cost of a match, as a multiple of the least cost; at least 1, infinity is allowed.
+            Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed.
 
         Returns
         -------
         list of Match
-            Matches by rising cost. There are fewer than ``count`` if separation, ratio or the candidates exclude the
-            rest.
+            Matches in the order of increasing cost. There are fewer than ``count`` if separation, ratio or the
+            candidates exclude the others.
 
         Raises
         ------
         InvalidInput
-            If the patch at a candidate is not inside its image, or an argument is invalid for `best`.
+            The patch at a candidate is not inside its image, or an argument is invalid for `best`.
 
         Examples
         --------
@@ -269,7 +272,8 @@ class PatchIndex:
         samples, weights = self._as_query(patch, weight)
         most = (len(self.shapes) - 1, _MOST, _MOST)
         positions: Any = [
-            # Check the type first: it costs a tenth of the full check, and there may be many candidates.
+            # Check the type first, because there can be many candidates, and this takes 10 % of the time of the full
+            # check.
             tuple(
                 n if type(n) is int and 0 <= n <= high else as_int(n, "candidates", 0, high)
                 for n, high in zip(as_tuple(place, "candidates", 3, "(exemplar, row, column) each"), most, strict=True)
@@ -281,28 +285,27 @@ class PatchIndex:
         return [Match(*m) for m in found]
 
     def cost_map(self, patch: object, weight: object = None, *, exemplar: int = 0) -> Floats:
-        """Return the costs of all positions in one image.
+        """Return the costs of all positions in one image as a map.
 
         Parameters
         ----------
         patch : (p, q) or (p, q, C) array_like
-            Any real dtype, in the units of the images. Pixels of zero weight may have any value, including NaN.
+            Patch of any real dtype, in the units of the images. Pixels of weight 0 can have any value, including NaN.
         weight : (p, q) array_like, optional
-            Weight of each pixel, at least 0; bool is allowed. It is zero where the patch is unknown. Default: 1
-            everywhere.
+            Weight of each pixel, at least 0, or a bool mask. Use 0 for unknown pixels. Default: 1 everywhere.
         exemplar : int
             Index of the image, from 0.
 
         Returns
         -------
         (H - p + 1, W - q + 1) float32
-            Costs from the filter, with an error of about 1e-5 of the typical cost. Infinite where not allowed. `best`
-            and `best_among` return exact costs.
+            Approximate costs, with an error of about 1e-5 of the typical cost. Positions that are not allowed have
+            infinity. `best` and `best_among` return exact costs.
 
         Raises
         ------
         InvalidInput
-            If the image does not exist or is smaller than the patch, or an argument is invalid for `best`.
+            The image does not exist or is smaller than the patch, or an argument is invalid for `best`.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""The screened Poisson equation: images from their gradients, and seamless cloning."""
+"""Solve the screened Poisson equation: reconstruct images from gradients, and clone without visible seams."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def __dir__() -> list[str]:
 
 
 Boundary: TypeAlias = Literal["dirichlet", "periodic", "free"]
-"""Condition at the ends of an axis: the outermost pixels are fixed, the axis is periodic, or the ends are free."""
+"""Condition at the two ends of an axis: fixed border pixels, a periodic axis, or free border pixels."""
 
 _BOUNDARIES = ("dirichlet", "periodic", "free")
 
@@ -35,42 +35,43 @@ def solve(
     mask: object = None,
     progress: Callable[[float], object] | None = None,
 ) -> Floats:
-    """Solve for the image with given gradients that stays near a given image.
+    """Compute the image that has given gradients and is close to a given image.
 
     The result minimises ``sum((v[q] - v[p] - g[p, q]) ** 2) + screening * sum((v - image) ** 2)`` over pairs of
-    neighbours p, q [1]_ [2]_. A whole rectangle is solved directly. Pixels under a mask are solved by conjugate
-    gradients with a multigrid preconditioner. Both work in float32, within a small part of a grey level.
+    neighbours p, q [1]_ [2]_. Without a mask, a direct method is used. With a mask, conjugate gradients with a
+    multigrid preconditioner are used. Both compute in float32, with an error of a small fraction of a grey level.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        The values to stay near, and the values of all fixed pixels. Any real dtype except 64-bit integers; finite.
+        Finite image of any real dtype except 64-bit integers. The result is close to it, and fixed pixels have its
+        values.
     gradient_rows, gradient_columns : array_like
-        Requested differences from each pixel to the one in the next row, and to the one in the next column, in the
-        image's shape. The last row and the last column count on periodic axes only.
+        Requested difference of each pixel to the next row and to the next column, in the shape of the image. The last
+        row and the last column are only used if the axis is periodic.
     screening : float
-        Weight of the image compared with the differences, at least 0. If 0, this is the Poisson equation. Colours drift
-        over about ``screening ** -0.5`` pixels.
+        Weight of the image compared with the gradients, at least 0. With 0 this is the Poisson equation. Changes of
+        colour fade over about ``screening ** -0.5`` pixels.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
-        The outermost pixels keep their values, the axis is periodic, or the ends are free. One value for both axes, or
-        one for the rows' and one for the columns' axis.
+        Condition at the ends of the axes: the border pixels keep their values, the axis is periodic, or the border is
+        free. One value for both axes, or a pair for the row axis and the column axis.
     mask : (H, W) array_like of bool, optional
-        Pixels to solve. All others keep their values. Default: all pixels.
+        Pixels to compute. All other pixels keep their values. Default: all pixels.
     progress : callable, optional
-        Called with the completed share, 0 to 1. An exception that it raises stops the work.
+        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work.
 
     Returns
     -------
     ndarray
-        Solution in float32, of the image's shape, neither rounded nor clipped. If no pixel is fixed and ``screening``
-        is 0, its mean is the mean of the image.
+        Solution in float32, in the shape of the image, neither rounded nor clipped. If no pixel is fixed and
+        ``screening`` is 0, it has the mean of the image.
 
     Raises
     ------
     InvalidInput
-        If shapes differ, values are not finite, the screening is negative, or a boundary is unknown.
+        Shapes differ, values are not finite, ``screening`` is negative, or a boundary is unknown.
     Cancelled
-        If the work was stopped.
+        The work was stopped.
 
     References
     ----------
@@ -81,7 +82,7 @@ def solve(
 
     Examples
     --------
-    A step in the middle of an image disappears if the requested difference is 0 there:
+    A step in the middle of an image disappears if the requested difference there is 0:
 
     >>> import numpy as np
     >>> image = np.zeros((8, 8))
@@ -117,29 +118,30 @@ def spread(
 ) -> None:
     """Solve ``(L + screening) v = flow`` in place.
 
-    L is the Laplacian, the sum of the differences of a pixel to its neighbours. v is the result of `solve` minus its
-    image. Use this function for corrections of large images, where one array less matters.
+    L is the negative Laplacian: the sum of the differences of a pixel to its neighbours. The solution v is the result
+    of `solve` minus its image. This function saves the memory of one array, which matters for large images.
 
     Parameters
     ----------
     flow : (H, W, C) ndarray of float32
-        Requested divergence; contiguous, writeable and finite. It becomes the solution, which is 0 at fixed pixels.
+        Requested divergence, contiguous, writeable and finite. It is overwritten with the solution, which is 0 at
+        fixed pixels.
     screening : float
-        Weight of the image, at least 0. If 0, this is the Poisson equation.
+        Weight of the image compared with the gradients, at least 0. With 0 this is the Poisson equation.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
-        The outermost pixels are 0, the axis is periodic, or the ends are free. One value for both axes, or one for the
-        rows' and one for the columns' axis.
+        Condition at the ends of the axes: the border pixels are 0, the axis is periodic, or the border is free. One
+        value for both axes, or a pair for the row axis and the column axis.
     mask : (H, W) array_like of bool, optional
-        Pixels to solve. All others are 0. Default: all pixels.
+        Pixels to compute. All other pixels are 0. Default: all pixels.
     progress : callable, optional
-        Called with the completed share, 0 to 1. An exception that it raises stops the work.
+        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work.
 
     Raises
     ------
     InvalidInput
-        If the array is of another kind, or an option is invalid for `solve`.
+        The array is not float32, contiguous, writeable and finite, or another argument is invalid for `solve`.
     Cancelled
-        If the work was stopped. ``flow`` then holds no useful values.
+        The work was stopped. The values of ``flow`` are then undefined.
 
     Examples
     --------
@@ -171,38 +173,38 @@ def blend(
     mixed: bool = False,
     wrap: bool | tuple[bool, bool] = False,
 ) -> Array:
-    """Clone a part of another image into an image without a visible seam.
+    """Clone a part of one image into another image without a visible seam.
 
-    Under the mask the result has the gradients of the source. Elsewhere it has the values of the target.
+    Inside the mask the result has the gradients of the source, and outside the values of the target.
 
     Parameters
     ----------
     source, target : (H, W) or (H, W, C) array_like
-        Two images of the same shape, in register. Any real dtype except 64-bit integers; finite.
+        Two aligned, finite images of the same shape, of any real dtype except 64-bit integers.
     mask : (H, W) array_like of bool
-        Pixels to take from the source.
+        Pixels to copy from the source.
     screening : float
-        Weight of the source's own values compared with its gradients, at least 0. If 0, the colours adapt
-        completely to the target; if 1, they hardly change. Default: 0.
+        Weight of the colours of the source compared with its gradients, at least 0. With 0, the colours adapt
+        completely to the target. With 1, they hardly change. Default: 0.
     mixed : bool
-        If True, use the larger of the two differences at each pair of pixels. The texture of the target is
-        then visible in flat parts of the source.
+        If True, use the larger of the gradients of source and target at each pair of pixels. The texture of the target
+        is then visible in smooth parts of the source.
     wrap : bool or (bool, bool)
-        Axes along which the images are periodic.
+        Axes along which the images are periodic. One value for both axes, or one for each.
 
     Returns
     -------
     ndarray
-        Image with the shape, dtype and range of the target. Integers are rounded.
+        Image with the shape and dtype of the target. Integers are rounded and clipped.
 
     Raises
     ------
     InvalidInput
-        If shapes differ, values are not finite, or the screening is negative.
+        Shapes differ, values are not finite, or ``screening`` is negative.
 
     Examples
     --------
-    The texture of one image with the light of another:
+    The texture of one image with the light of another image:
 
     >>> import numpy as np
     >>> stripes = np.tile(np.uint8([20, 40]), (16, 8))
@@ -223,9 +225,10 @@ def blend(
         raise InvalidInput(f"source: must have the target's shape {shape}, got {source.shape}")
     inside, weight = as_mask(mask, "mask", onto.shape[:2]), _as_weight(screening)
     values, other = (_as_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
-    # With v = source + c the requested differences of c are 0, except where the target shows through.
+    # Solve for the correction c = v - source, whose requested gradients are 0, except where ``mixed`` uses the
+    # target's.
     if inside.all() and weight == 0:
-        # Only the mean of the target remains.
+        # If every pixel is copied, the target only determines the mean.
         correction = np.empty(onto.shape, np.float32)
         correction[...] = values.mean((0, 1)) - other.mean((0, 1))
     else:
@@ -242,7 +245,7 @@ def blend(
 
 
 def _subtract_outside(values: Array, other: Array, inside: Bools) -> Floats:
-    """Return the differences of two images outside a mask, and 0 under it."""
+    """Return the difference of two images outside a mask, and 0 inside."""
     result = np.empty(values.shape, np.float32)
     for band in _divide_rows(len(values)):
         part = result[band]
@@ -253,16 +256,16 @@ def _subtract_outside(values: Array, other: Array, inside: Bools) -> Floats:
 
 
 def _mix_gradients(values: Array, other: Array, axis: int) -> Floats:
-    """Return the excess of the target's differences over the source's, where the target's are larger."""
+    """Return the target's gradients minus the source's where the target's are larger, and 0 elsewhere."""
     floats = (v.astype(np.float32) for v in (other, values))
     wanted, present = (np.roll(v, -1, axis) - v for v in floats)
     return np.where(np.abs(present) > np.abs(wanted), present - wanted, np.float32(0))
 
 
 def _write_into(onto: Array, solved: Floats, inside: Bools) -> None:
-    """Write the solution into the target under the mask, in the target's dtype."""
+    """Write the sum of source and correction into the target inside the mask, in the target's dtype."""
     if onto.dtype.kind in "ui" and onto.dtype.itemsize <= 2:
-        # Outside the mask the sum of source and correction equals the target exactly.
+        # Outside the mask, the sum of source and correction equals the target exactly.
         info = np.iinfo(onto.dtype)
         onto[...] = np.clip(np.rint(solved, out=solved), info.min, info.max, out=solved)
     elif onto.dtype == np.bool_:
@@ -278,12 +281,12 @@ def _write_into(onto: Array, solved: Floats, inside: Bools) -> None:
 
 
 def _divide_rows(rows: int) -> Iterator[slice]:
-    """Return ranges of rows whose intermediate results fit into the cache."""
+    """Return ranges of rows so small that intermediate results fit into the processor's cache."""
     return (slice(first, first + 32) for first in range(0, rows, 32))
 
 
 def _as_numbers(array: Array, name: str) -> Array:
-    """Return values within the range of float32. Only float64 is converted."""
+    """Check that values are within the range of float32, and convert float64 to float32."""
     return _as_floats(array, name) if array.dtype == np.float64 else array
 
 

@@ -1,4 +1,4 @@
-"""Grey-scale reconstruction: an image without its small domes."""
+"""Grey-scale reconstruction by dilation, which can remove small domes from an image."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ def __dir__() -> list[str]:
 
 
 def reconstruct(seed: object, mask: object, *, wrap: bool | tuple[bool, bool] = False) -> Floats:
-    """Return the largest image below a mask that a seed reaches.
+    """Return the reconstruction by dilation of a mask image from a seed image.
 
-    The seed is dilated by one pixel over its eight neighbours, and limited by the mask, again and again until nothing
-    changes (Vincent [1]_). The result is that of ``skimage.morphology.reconstruction``.
+    The seed is dilated by one pixel (eight neighbours) and limited by the mask, repeatedly until it no longer changes
+    (Vincent [1]_). The result equals that of ``skimage.morphology.reconstruction``.
 
     Parameters
     ----------
     seed, mask : (H, W) array_like
-        Any real dtype, read in single precision. Seed values above the mask count as the mask.
+        Images of any real dtype, converted to float32. Seed values above the mask are lowered to the mask.
     wrap : bool or (bool, bool)
-        Axes along which the images are periodic.
+        Axes along which the images are periodic. One value for both axes, or one for each.
 
     Returns
     -------
     (H, W) float32
-        The reconstruction, nowhere above the mask.
+        Reconstruction, which is at most the mask everywhere.
 
     Raises
     ------
     InvalidInput
-        If the arrays have different shapes, or values that are not numbers.
+        The shapes differ, or values are NaN.
     Cancelled
-        If the work was stopped.
+        The work was stopped.
 
     References
     ----------
@@ -47,7 +47,7 @@ def reconstruct(seed: object, mask: object, *, wrap: bool | tuple[bool, bool] = 
 
     Examples
     --------
-    The lower one of two hills rises above its foot by less than one, and disappears:
+    The lower of two hills is less than 1 high, so it disappears:
 
     >>> import numpy as np
     >>> hills = np.array([[0.0, 5.0, 2.0, 2.5, 0.0]])

@@ -1,4 +1,4 @@
-"""Regions of one colour, by the graph-based merge."""
+"""Segment an image into regions of similar colour by graph-based merging."""
 
 from __future__ import annotations
 
@@ -29,43 +29,45 @@ def felzenszwalb(
     wrap: bool | tuple[bool, bool] = False,
     progress: Progress | None = None,
 ) -> Labels:
-    """Segment an image into regions of one colour.
+    """Segment an image into regions of similar colour.
 
-    Pixels are joined with their eight neighbours, those with the smallest colour difference first. Two regions are
-    joined if the step between them is less than the tolerance of both. The tolerance is the largest step that a region
-    was joined over, plus the scale divided by its area (Felzenszwalb and Huttenlocher [1]_). The regions are those of
-    ``skimage.segmentation.felzenszwalb``, with the same numbers if no two steps are equal. Equal steps are joined in
-    the order of their pixels, on any processor and for any number of threads.
+    Adjacent pixels (eight neighbours) are merged in the order of their colour difference. Two regions are merged if
+    the difference at their border is at most the tolerance of both. The tolerance of a region is the largest
+    difference inside it, plus ``scale`` divided by its area (Felzenszwalb and Huttenlocher [1]_). The regions are the
+    same as those of ``skimage.segmentation.felzenszwalb``, with the same numbers if no two differences are equal.
+    Equal differences are processed in the order of their pixels, so the result does not depend on the processor or the
+    number of threads.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype except 64-bit integers, with values up to 1e15. Fewer than 2^30 pixels.
+        Image of any real dtype except 64-bit integers, with absolute values up to 1e15 and fewer than 2^30 pixels.
     scale : float
-        Tolerance of a single pixel, in the units of the image, 0 to 1e15. Larger values give larger regions. The scale
-        of scikit-image is 255 times this, if the image is in 0 to 1.
+        Tolerance of a single pixel, in the units of the image, 0 to 1e15. Larger values give larger regions. For
+        images from 0 to 1, scikit-image's ``scale`` is 255 times this value.
     blur : float
-        Standard deviation of the Gaussian that smooths the image first, in pixels, 0 to 64.
+        Standard deviation, in pixels, of the Gaussian with which the image is smoothed first, 0 to 64.
     least : int
-        Minimum area of a region in pixels. Smaller regions are joined with the most similar neighbour.
+        Minimum area of a region in pixels. Smaller regions are merged with the most similar neighbour.
     wrap : bool or (bool, bool)
-        Axes along which the image is periodic.
+        Axes along which the image is periodic. One value for both axes, or one for each.
     progress : callable, optional
-        Called with the name of the stage and its completed share. An exception that it raises stops the work.
+        Function that is called with the name of the stage and its completed share, 0 to 1. An exception that it raises
+        stops the work.
 
     Returns
     -------
     (H, W) int32
-        Region of each pixel, from 0, in the order of the first pixels.
+        Index of the region of each pixel, from 0. Regions are numbered in the order of their first pixels.
 
     Raises
     ------
     InvalidInput
-        If the image is not an image or not finite, or another argument is out of range.
+        The argument is not an image, is not finite, or another argument is out of range.
     LimitExceeded
-        If there are more pixels than edge numbers allow.
+        The image has 2^30 pixels or more.
     Cancelled
-        If the work was stopped.
+        The work was stopped.
 
     References
     ----------
@@ -74,7 +76,7 @@ def felzenszwalb(
 
     Examples
     --------
-    Two halves with noise:
+    Two halves with noise give two regions:
 
     >>> import numpy as np
     >>> image = np.full((16, 16), 50.0)

@@ -27,14 +27,14 @@ Cost: TypeAlias = Literal["gradient", "paper"]
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Choice between two images at each pixel.
+    """Result of `cut` and `cut_strip`: the choice between image A and image B at each pixel.
 
     Attributes
     ----------
     mask : (H, W) or (D, H, W) bool
-        True for pixels of B. Other pixels are of A if A covers them, else of neither.
+        True for pixels of B. Pixels with False are of A, if A covers them.
     value : float
-        Sum of the costs of the seam's edges inside the overlap, including old seams that stay; at least 0.
+        Sum of the costs along the seam inside the overlap, including old seams that remain; at least 0.
     edges : int
         Number of pairs of neighbours in the overlap that the seam separates.
 
@@ -54,21 +54,21 @@ class Cut:
 
 @dataclass(frozen=True, slots=True)
 class OldSeams:
-    """Costs of seams that A already contains: in each field an array of the canvas' shape for each axis.
+    """Costs of seams that A already contains. Each field has one array of the shape of the canvas for each axis.
 
-    Entry ``p`` of an axis belongs to the pair of ``p`` and its next pixel ``q`` along this axis. Let ``M(p, q, S, T)``
-    be the cost of a seam between ``p`` from ``S`` and ``q`` from ``T``. Let A show source ``S`` at ``p`` and ``T`` at
-    ``q``.
+    Entry ``p`` of an axis is for the pair of ``p`` and the next pixel ``q`` along this axis. A contains source ``S``
+    at ``p`` and source ``T`` at ``q``. ``M(p, q, S, T)`` is the cost of a seam between ``p`` from ``S`` and ``q`` from
+    ``T``.
 
     Attributes
     ----------
     kept : sequence of array_like
-        ``M(p, q, S, T)``, at least 0, the cost if both keep A. 0 without an old seam: the pair then has its
+        Cost ``M(p, q, S, T)``, at least 0, if both pixels keep A. Use 0 if there is no old seam. The pair then has its
         ordinary cost.
     ab : sequence of array_like
-        ``M(p, q, S, B)``, at least 0, the cost if ``p`` keeps A and ``q`` takes B.
+        Cost ``M(p, q, S, B)``, at least 0, if ``p`` keeps A and ``q`` takes B.
     ba : sequence of array_like
-        ``M(p, q, B, T)``, at least 0, the cost if ``p`` takes B and ``q`` keeps A.
+        Cost ``M(p, q, B, T)``, at least 0, if ``p`` takes B and ``q`` keeps A.
 
     Examples
     --------
@@ -87,14 +87,14 @@ class OldSeams:
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """Binary labels of minimum energy.
+    """Result of `binary_labels`: labels of minimum energy.
 
     Attributes
     ----------
     mask : (H, W) or (D, H, W) bool
-        The labels. Among equally good labels, those with the fewest True.
+        Labels. Of several optimal solutions, the labels with the fewest True.
     energy : float
-        Sum of the costs of all points and pairs, in their units.
+        Sum of the costs of all points and pairs, in the units of the costs.
 
     Examples
     --------
@@ -125,51 +125,52 @@ def cut(
 ) -> Cut:
     """Find the least visible seam between two overlapping images, by an exact minimum cut [1]_.
 
-    Pixels that only one image covers take this image. Pixels of a core inside the overlap are hard constraints:
-    they take
-    its image. Next, pixels adjacent to one that only A covers take A, then pixels adjacent to one that only B covers
-    take B. The others are chosen so that the total cost of all pairs of neighbours that the seam separates is minimal.
-    If several choices are minimal, as few pixels as possible take B. If no pixel is constrained to B, none takes B.
+    Pixels that only one image covers take that image. The cores are hard constraints: their pixels take the image of
+    the core. Next, neighbours of pixels that only A covers take A, and then neighbours of pixels that only B covers
+    take B. The other pixels are chosen so that the sum of the costs of all separated pairs of neighbours is minimal.
+    Of several optimal solutions, the one with the fewest pixels of B is returned. If no pixel is constrained to B, no
+    pixel takes B.
 
     Parameters
     ----------
     a, b : array_like
-        The existing and the added image, on one canvas: (H, W) or (H, W, C). Volumes (D, H, W[, C]) have masks of
-        three axes. Any dtype; both are scaled to [0, 1] together. Finite everywhere.
+        Existing and new image on a common canvas, (H, W) or (H, W, C), or volumes (D, H, W[, C]) with masks of three
+        axes. They can have any dtype, must be finite everywhere, and are scaled to [0, 1] together.
     mask_a, mask_b : (H, W) or (D, H, W) array_like of bool
-        Pixels that each image covers.
+        Masks of the pixels that A and B cover.
     core_a, core_b : array_like of bool, optional
-        Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must cover its core.
-        Default: none.
+        Masks of pixels that must keep A or take B. Each core must be inside the mask of its image. Default: none.
     penalty : float or array_like of float, optional
-        Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean
-        of its two penalties. This keeps seams out of elements that should stay whole.
+        Penalty of each pixel, at least 0. The cost of a pair is multiplied by one plus the mean penalty of its two
+        pixels. Penalties keep seams out of elements that should stay whole.
     old : OldSeams, optional
-        Seams that A already contains, which can then be covered. An old seam that costs more than its two replacements
-        together counts as their sum. This only happens with a cost that breaks the triangle inequality.
+        Costs of seams that A already contains, which B can cover. If an old seam costs more than the two seams that
+        replace it, this sum is used instead. That only occurs with a cost that violates the triangle inequality.
+        Default: None.
     cost : {"gradient", "paper"}
         Cost of separating neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed over channels.
-        "gradient": the same over ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``, which hides seams along edges. Both plus
-        1e-4, so that ties go to the shorter seam.
+        "gradient": this value divided by ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``, which hides seams along edges. Both
+        add 1e-4, so that the shorter of two equal seams is chosen.
     wrap : bool or sequence of bool
-        Axes along which the canvas is periodic.
+        Axes along which the canvas is periodic. One value for all axes, or one for each.
 
     Returns
     -------
     Cut
-        Mask, value and number of edges.
+        Mask of B, cost of the seam, and number of separated pairs.
 
     Raises
     ------
     InvalidInput
-        If shapes differ, values are not finite, penalties are negative, a core is outside its image, or cores share a
-        pixel.
+        Shapes differ, values are not finite, penalties are negative, a core is outside its image, or the cores
+        overlap.
 
     Notes
     -----
-    Costs are rounded to multiples of 2^-16, or coarser if the largest exceeds 2^10. Time grows with the bounding box of the
-    overlap. One connected core of B on a plane may be surrounded by pixels constrained to A. The seam is then a shortest
-    closed path on the dual of the grid [2]_. It is the same seam, found several times faster than by maximum flow.
+    Costs are rounded to multiples of 2^-16, or of a larger power of two if the largest cost exceeds 2^10. The time
+    grows with the bounding box of the overlap. If a single connected core of B in an image is surrounded by pixels
+    constrained to A, the seam is found as a shortest closed path on the dual of the grid [2]_. The result is the same
+    as by maximum flow, but several times faster.
 
     References
     ----------
@@ -224,36 +225,37 @@ def cut_strip(
     penalty: ArrayLike | None = None,
     cost: Cost = "gradient",
 ) -> Cut:
-    """Find the least visible seam from border to border of two images that overlap completely.
+    """Find the least visible seam, from border to border, between two images that overlap completely.
 
-    The first line along ``axis`` takes A, and the last one takes B. The seam may turn back, because it is the
+    The first line along ``axis`` takes A, and the last line takes B. The seam can also run backwards, because it is an
     exact minimum cut. It is found as a shortest path on the dual of the grid, hundreds of times faster than by maximum
     flow [1]_.
 
     Parameters
     ----------
     a, b : (H, W) or (H, W, C) array_like
-        Images of one shape. Any real dtype; both are scaled to [0, 1] together. Finite.
+        Images of the same shape, finite and of any real dtype. They are scaled to [0, 1] together.
     axis : {0, 1}
-        Axis that the seam crosses: 1 for A at the left and B at the right, 0 for A above B.
+        Axis that the seam crosses: 1 for A on the left and B on the right, 0 for A above B. Default: 1.
     cyclic : bool
-        If True, the other axis is periodic and the seam closes on itself [2]_. A seam of an opened axis need not
-        close.
+        If True, the other axis is periodic and the seam is closed [2]_. If False, the ends of the seam are
+        independent. Default: False.
     penalty : float or (H, W) array_like of float, optional
-        Penalty of each pixel, at least 0. The cost of a pair is multiplied by one plus the mean of its two penalties.
+        Penalty of each pixel, at least 0. The cost of a pair is multiplied by one plus the mean penalty of its two
+        pixels.
     cost : {"gradient", "paper"}
         Cost of separating neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed over channels.
-        "gradient": the same over ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``.
+        "gradient": this value divided by ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``.
 
     Returns
     -------
     Cut
-        Mask (True for pixels of B), value and number of edges.
+        Mask of B, cost of the seam, and number of separated pairs.
 
     Raises
     ------
     InvalidInput
-        If shapes differ, there are fewer than two pixels along ``axis``, values are not finite, or penalties are
+        Shapes differ, there are fewer than two pixels along ``axis``, values are not finite, or penalties are
         negative.
 
     References
@@ -284,12 +286,12 @@ def cut_strip(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strip:
-    """Two images of one shape that overlap completely, for `cut_strips`.
+    """Pair of images of the same shape that overlap completely, for `cut_strips`.
 
     Attributes
     ----------
     a, b : (H, W, C) array_like
-        Numbers within about [0, 1]. They are not rescaled before costs are computed. Finite.
+        Finite images with values of about 0 to 1, because costs are computed without rescaling.
     axis : {0, 1}
         Axis that the seam crosses.
     penalty : float or (H, W) array_like of float, optional
@@ -311,26 +313,26 @@ class Strip:
 
 
 def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "gradient") -> list[Cut]:
-    """Find the seams of many strips in parallel, each as by `cut_strip`.
+    """Find the seams of many strips in parallel, with the same results as `cut_strip`.
 
     Parameters
     ----------
     strips : sequence of Strip
-        Strips of any shapes.
+        Strips, which can differ in shape.
     cyclic : bool
-        If True, the axis along the seam is periodic in all strips.
+        If True, all seams are closed, because the axis along the seam is periodic.
     cost : {"gradient", "paper"}
         Cost of separating neighbours in all strips (see `cut_strip`).
 
     Returns
     -------
     list of Cut
-        One cut for each strip.
+        Cut of each strip, in their order.
 
     Raises
     ------
     InvalidInput
-        If an entry is not a strip, or is invalid for `cut_strip`.
+        An entry is not a `Strip`, or is invalid for `cut_strip`.
 
     Examples
     --------
@@ -362,34 +364,35 @@ def binary_labels(
     *,
     wrap: bool | Sequence[bool] = False,
 ) -> Labels:
-    """Label the points of a grid True or False at the minimum total cost [1]_.
+    """Label each point of a grid True or False so that the total cost is minimal [1]_.
 
     Parameters
     ----------
     unary : (H, W, 2) or (D, H, W, 2) array_like of float
-        Cost of False and cost of True at each point. Infinity forbids a label.
+        Costs of the labels False and True at each point. Infinity forbids a label.
     pairwise : float or sequence
-        Cost of neighbours with different labels, at least 0: one number for all, or one entry for each axis.
-        An entry is a number, or an array of the grid's shape, where the entry of ``p`` is for ``p`` and the next
-        point. It may also be a tuple of two arrays: False before True, and True before False.
+        Cost of neighbours with different labels, at least 0: a single number, or a sequence with one entry for each
+        axis. An entry is a number, or an array of the grid's shape, whose value at ``p`` is for the pair of ``p`` and
+        the next point. An entry can also be a tuple of two arrays: for False followed by True, and for True followed
+        by False.
     wrap : bool or sequence of bool
-        Axes along which the grid is periodic.
+        Axes along which the grid is periodic. One value for all axes, or one for each.
 
     Returns
     -------
     Labels
-        The labels and their energy.
+        Labels and their energy.
 
     Raises
     ------
     InvalidInput
-        If shapes do not fit, pairwise costs are negative or infinite, values are NaN, or both labels are forbidden at
-        a point.
+        Shapes do not fit, pairwise costs are negative or infinite, values are NaN, or both labels of a point are
+        forbidden.
 
     Notes
     -----
-    Costs are float32, rounded to multiples of a power of two. It is chosen so that the largest pairwise cost is 2^25
-    to 2^26 multiples.
+    Costs are rounded to multiples of a power of two. It is chosen so that the largest pairwise cost is 2^25 to 2^26
+    multiples.
 
     References
     ----------
@@ -399,7 +402,7 @@ def binary_labels(
 
     Examples
     --------
-    A line of noisy values becomes two pieces:
+    A line of noisy values is divided into two segments:
 
     >>> import numpy as np
     >>> from texrs.kernels import seam
@@ -427,7 +430,7 @@ def binary_labels(
 
 
 def _as_pair(a: object, b: object, axes: int) -> tuple[Floats, Floats]:
-    """Return two images of one shape, scaled to [0, 1] together."""
+    """Return two images of the same shape, scaled to [0, 1] by their common range."""
     first, second = as_image(a, "a", axes=axes), as_image(b, "b", axes=axes)
     if first.shape != second.shape:
         raise InvalidInput(f"b: must have the shape of a, {first.shape}, got {second.shape}")
@@ -446,7 +449,7 @@ def _bring_to_unit(image: Array) -> Floats:
 
 
 def _as_floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
-    """Return an array of floats. A single number is broadcast."""
+    """Return an array of floats of the given shape. A single number is broadcast."""
     if isinstance(value, Real):
         most = float(np.finfo(np.float32).max)
         return np.full(shape, as_float(value, name, -most, most), np.float32)

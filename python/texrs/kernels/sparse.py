@@ -1,4 +1,4 @@
-"""Symmetric positive definite systems: factored once, solved many times."""
+"""Factor sparse symmetric positive definite matrices once, and solve many linear systems with them."""
 
 from __future__ import annotations
 
@@ -20,30 +20,31 @@ def __dir__() -> list[str]:
 
 
 LIMIT = 4 << 30
-"""Maximum bytes of a factor, unless the caller gives a limit."""
+"""Default for the maximum size of a factor in bytes."""
 
 
 class Cholesky:
-    """Factor of a sparse symmetric positive definite matrix.
+    """Cholesky factor of a sparse symmetric positive definite matrix.
 
-    Unknowns are ordered by nested dissection. Grids in row order are recognised, and are split along rows, across rows
-    and diagonally; meshes and other graphs along the levels of a search. Factors of grids are the fastest. Trees and
-    chains take longer than by minimum degree. All computation is in double precision, because deformation energies are
-    too ill-conditioned for less. The bytes are the same for any number of threads and on any x86-64 processor.
+    Unknowns are ordered by nested dissection. Grids in row order are recognised, and are split along rows, columns and
+    diagonals. Meshes and other graphs are split along the levels of a breadth-first search. Grids are factored
+    fastest. Trees and chains take longer than with the minimum degree order. All computations are in double precision,
+    because deformation energies are too ill-conditioned for single precision. The bytes are the same for any number of
+    threads and on any x86-64 processor.
 
     Parameters
     ----------
     matrix : (n, n) scipy.sparse matrix or array_like
-        Any real dtype; finite. Only the lower triangle is read; the diagonal must be present.
+        Finite matrix of any real dtype, including its diagonal. Only the lower triangle is read.
     limit : int
-        Maximum bytes of the factor and the work on it, 1 to 2^62.
+        Maximum number of bytes of the factor and its working memory, 1 to 2^62.
 
     Raises
     ------
     InvalidInput
-        If it is not a matrix of numbers, or is not square, not finite, or not positive definite.
+        The matrix is not numeric, not square, not finite, or not positive definite.
     LimitExceeded
-        If the factor would take more than ``limit``.
+        The factor would need more than ``limit`` bytes.
 
     Examples
     --------
@@ -62,26 +63,26 @@ class Cholesky:
 
     @classmethod
     def several(cls, matrices: Sequence[Any], *, limit: int = LIMIT) -> list[Cholesky]:
-        """Factor several matrices in parallel. Each factor is the same as by itself.
+        """Factor several matrices in parallel, with the same results as one by one.
 
         Parameters
         ----------
         matrices : sequence of (n, n) scipy.sparse matrices or array_like
-            Matrices as for the class. Their sizes may differ.
+            Matrices as for `Cholesky`. They can differ in size.
         limit : int
-            Maximum bytes of each factor and the work on it, 1 to 2^62.
+            Maximum number of bytes of each factor and its working memory, 1 to 2^62.
 
         Returns
         -------
         list of Cholesky
-            One factor for each matrix, in their order.
+            Factor of each matrix, in their order.
 
         Raises
         ------
         InvalidInput
-            If a matrix is not square, not finite, or not positive definite.
+            A matrix is not square, not finite, or not positive definite.
         LimitExceeded
-            If a factor would take more than ``limit``.
+            A factor would need more than ``limit`` bytes.
 
         Examples
         --------
@@ -105,11 +106,11 @@ class Cholesky:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the factor."""
+        """Size of the factor in bytes."""
         return 8 * self._inner.entries
 
     def solve(self, sides: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Return the solutions for one or several right-hand sides.
+        """Solve the linear system for one or several right-hand sides.
 
         Parameters
         ----------
@@ -119,12 +120,12 @@ class Cholesky:
         Returns
         -------
         ndarray
-            Solutions in float64, of the same shape.
+            Solutions in float64, in the shape of ``sides``.
 
         Raises
         ------
         InvalidInput
-            If they are not numbers, or have another length.
+            The right-hand sides are not numbers, or their length differs from the matrix.
 
         Examples
         --------
@@ -143,7 +144,7 @@ class Cholesky:
 def _list_entries(
     matrix: Any, name: str = "matrix"
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
-    """Return the entries column by column, with rising rows."""
+    """Return the entries of a matrix by column, with increasing rows."""
     from scipy.sparse import csc_array, issparse
 
     if not issparse(matrix):
@@ -155,7 +156,7 @@ def _list_entries(
     check_memory(8 * matrix.shape[0], name)
     columns = csc_array(matrix)
     if not columns.has_canonical_format:
-        # Do not sort the caller's own matrix.
+        # Copy the matrix before sorting, because it belongs to the caller.
         columns = columns.copy()
         columns.sum_duplicates()
     if max(columns.nnz, columns.shape[0]) >= 1 << 31:

@@ -1,4 +1,4 @@
-"""Warps of images by moved points: the source coordinates of each output pixel."""
+"""Warp images according to moved points: compute the source coordinates of each output pixel."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ def __dir__() -> list[str]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Warp:
-    """A warped mesh.
+    """Result of `mesh`.
 
     Attributes
     ----------
     coordinates : (rows, columns, 2) float32
-        Source coordinates of each pixel, (row, column). A hole has the source pixel at the same position.
+        Source coordinates (row, column) of each pixel. Holes have their own position as source coordinates.
     covered : (rows, columns) bool
-        Mask of the pixels that a triangle covers. The others are holes.
+        Mask of the pixels that a triangle covers. The other pixels are holes.
     triangles, flipped, flipped_heavy : int
-        Numbers of triangles: drawn; turned over or flattened; turned over with three weighted corners.
+        Number of triangles that were drawn, of triangles that are turned over or have no area, and of turned-over
+        triangles whose three corners have a weight.
 
     Examples
     --------
@@ -58,37 +59,38 @@ def mesh(
     size: int | Sequence[int] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Warp:
-    """Warp an image whose pixels all move: draw its dense mesh and return the source of each output pixel.
+    """Warp an image in which every pixel moves: return the source coordinates of each output pixel.
 
-    Each cell has two triangles, with barycentric interpolation. If several overlap, the one whose corners have the
-    largest weight is visible. Among equal ones, it is one that is not turned over, then the first.
+    Each cell of four pixels is drawn as two triangles, with barycentric interpolation. If several triangles cover a
+    pixel, the triangle whose corners have the largest weight is visible. Of equal weights, triangles that are not
+    turned over have priority, then the first triangle.
 
     Parameters
     ----------
     target : (H, W, 2) array_like
-        New position of each pixel, (row, column) in pixels; any real dtype, finite. H and W are at least 2.
+        New position (row, column) of each pixel, in pixels. Any real dtype, finite. H and W are at least 2.
     weight : (H, W) array_like of bool or int, optional
-        Weight of each pixel, 0 to 254: larger weights are in front. Default: 0 everywhere.
+        Weight of each pixel, 0 to 254. Pixels with larger weights cover the others. Default: 0 everywhere.
     void : (H, W) array_like of bool, optional
         Pixels whose triangles are not drawn. Default: none.
     size : int or (rows, columns), optional
         Size of the output, up to 2^28 pixels. Default: the size of the image.
     progress : callable, optional
-        Called with the completed share, 0 to 1. An exception that it raises stops the work.
+        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work.
 
     Returns
     -------
     Warp
-        The coordinates, the covered pixels, and the number of triangles that are turned over.
+        Source coordinates, mask of covered pixels, and numbers of triangles.
 
     Raises
     ------
     InvalidInput
-        If arrays have other shapes, targets are not finite, or weights are out of range.
+        Shapes differ, targets are not finite, or weights are out of range.
     LimitExceeded
-        If the output has more than 2^28 pixels.
+        The output has more than 2^28 pixels.
     Cancelled
-        If the work was stopped.
+        The work was stopped.
 
     Examples
     --------
@@ -119,16 +121,17 @@ def mesh(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """A warped triangulation.
+    """Result of `from_points`.
 
     Attributes
     ----------
     coordinates : (rows, columns, 2) float32
-        Source coordinates of each pixel, (row, column). Pixels outside all triangles keep their position.
+        Source coordinates (row, column) of each pixel. Pixels outside all triangles have their own position as source
+        coordinates.
     triangle : (rows, columns) uint32
-        Triangle of each pixel, counted from 1; 0 outside all triangles.
+        Number of the triangle that contains each pixel, from 1; 0 outside all triangles.
     frames : (triangles + 1, 2, 2) float32
-        Jacobian of the coordinates in each triangle. The first is the identity.
+        Jacobian of the source coordinates in each triangle. Entry 0, for pixels outside, is the identity.
 
     Examples
     --------
@@ -149,32 +152,32 @@ class Triangles:
 def from_points(
     source: ArrayLike, target: ArrayLike, shape: int | Sequence[int], *, size: int | Sequence[int] | None = None
 ) -> Triangles:
-    """Warp an image by some moved points: return the source of each output pixel.
+    """Warp an image according to some moved points: return the source coordinates of each output pixel.
 
-    The Delaunay triangles of the source points are drawn at the new positions of their corners.
+    The source points are triangulated (Delaunay), and each triangle is drawn at the new positions of its corners.
 
     Parameters
     ----------
     source, target : (n, 2) array_like
-        Positions of the points in the image, and their new positions; (row, column) in pixels. Any real dtype, finite;
-        at least three points.
+        Positions (row, column) of the points in the image, and their new positions, in pixels. At least three finite
+        points of any real dtype.
     shape : int or (rows, columns)
-        Size of the image, in pixels.
+        Size of the image in pixels.
     size : int or (rows, columns), optional
         Size of the output, up to 2^28 pixels. Default: the size of the image.
 
     Returns
     -------
     Triangles
-        The coordinates, and the triangle and the Jacobian of each pixel.
+        Source coordinates, and the triangle and Jacobian of each pixel.
 
     Raises
     ------
     InvalidInput
-        If there are fewer than three points, all are on one line, two are at one position, or coordinates are not
+        There are fewer than three points, all points are on one line, two points coincide, or coordinates are not
         finite.
     LimitExceeded
-        If the image or the output has more than 2^28 pixels.
+        The image or the output has more than 2^28 pixels.
 
     Examples
     --------
@@ -193,8 +196,8 @@ def from_points(
     frames = np.zeros((len(corners) + 1, 2, 2), np.float32)
     frames[0] = np.eye(2)
     edges = [(p[:, 1:] - p[:, :1]).transpose(0, 2, 1) for p in (before, after)]
-    sound = np.abs(np.linalg.det(edges[1])) > 1e-9  # Other triangles are not drawn.
-    # Sum two products by hand, because the last bits of inverses and matrix products depend on the processor.
+    sound = np.abs(np.linalg.det(edges[1])) > 1e-9  # Triangles without area are not drawn.
+    # Compute inverse and product explicitly, because the last bits of the library functions depend on the processor.
     (a, b), (c, d) = np.moveaxis(edges[1][sound], 0, -1)
     inverse = np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), -1, 0)
     drawn = edges[0][sound]
@@ -204,7 +207,7 @@ def from_points(
 
 
 def _fill_holes(places: Floats, covered: Bools, shape: Sequence[int]) -> Floats:
-    """Set pixels outside all triangles to their own position, in place."""
+    """Set the coordinates of pixels outside all triangles to their own position, in place."""
     holes = ~covered
     if holes.any():
         places[holes] = np.minimum(np.argwhere(holes), np.array(shape) - 1)
