@@ -525,7 +525,7 @@ def test_words_after_a_name_say_how_a_mask_is_read(here: Path, capsys: Capture) 
     assert "../unseen.png" in json.loads(str(io.read_metadata("other/o.png").made))["inputs"]
     assert main(["rerun", "other/o.png"]) == 0
     assert main([*f"{view} no.png".split(), "--ground", "seen.png:grow=much"]) == 2
-    assert "--grow: needs a number, as in grow=2; got 'much'" in capsys.readouterr().err
+    assert "--grow: must be a number, as in grow=2; got 'much'" in capsys.readouterr().err
     for command in ("scale-map in.png -o s.npy --mask", "analyse in.png -o e.npz --mask"):
         assert main([*command.split(), "unseen.png:invert,grow=-99"]) == 2
         assert "marks nothing" in capsys.readouterr().err

@@ -90,7 +90,7 @@ def remove(
     Synthesis
         The photograph without the object, in its dtype and with its channels. Only the mask, its margin and its
         boundary change. The source map refers to the photograph. The stages are ``"known"``, ``"ground"`` (each plane
-        in its own shade), ``"patches"`` and ``"before_blending"``. The report contains the planes that were followed,
+        in its own shade), ``"patches"`` and ``"before_blending"``. The report contains the planes that were used,
         and ``"filled"``, the filled share of the image with the margin, 0 to 1.
 
         Stages:
@@ -124,7 +124,7 @@ def remove(
     Warns
     -----
     UserWarning
-        If a plane is found with a confidence below 0.4. It is not followed: give corners or angles.
+        If a plane is found with a confidence below 0.4. It is not used; give corners or angles.
 
     Examples
     --------

@@ -80,7 +80,8 @@ def apply(
 
     See Also
     --------
-    texrs.SourceMap.render : Only the look-up. texrs.blend : Only the seam correction, with any strength.
+    texrs.SourceMap.render : Only the look-up.
+    texrs.blend : Only the seam correction, with any strength.
 
     Examples
     --------
