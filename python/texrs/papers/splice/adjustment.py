@@ -1,6 +1,6 @@
-"""Adjust targets to the elements that move there.
+"""Adjust targets to the elements that move to them.
 
-The paper does not describe this. Disjoint elements need room, and neighbours in a connected figure need similar
+The paper does not describe this step. Disjoint elements need room, and neighbours in a connected figure need similar
 displacements. Long joints need straight rows.
 """
 
@@ -23,18 +23,19 @@ __all__ = ["adjust_targets", "crop_extension", "limit_strain", "separate_targets
 Points = NDArray[np.float64]
 
 ROW = 0.25
-"""Largest distance between rows that are merged into one, in spacings."""
+"""Maximum distance between rows that are merged into one, in spacings."""
 STRAIN = {Layout.CONNECTED: 0.45, Layout.JOINTED: 0.3}
-"""Largest difference of displacement between neighbours in a connected figure, in sides of an element's box.
+"""Maximum difference in displacement between neighbours of a connected figure, in sides of an element's box.
 
 Nets are more flexible than walls.
 """
 
 
 def adjust_targets(a: ElementAnalysis, match: Match, *, snap: bool, part: bool = False) -> Match:
-    """Give disjoint elements room; snap elements of connected figures to rows on request, and limit their strain.
+    """Push disjoint elements apart; for connected figures, limit their strain, and straighten rows if ``snap`` is True.
 
-    If elements go only a ``part`` of their way, or to their own layout, touching disjoint elements may still touch.
+    If ``part`` is True, disjoint elements that touch in the texture may still touch. It is used for a strength below
+    1, and for elements in their own layout.
     """
     if a.layout == Layout.DISJOINT:
         return separate_targets(a, match, starts=match.starts if part else None)
@@ -42,7 +43,7 @@ def adjust_targets(a: ElementAnalysis, match: Match, *, snap: bool, part: bool =
 
 
 def straighten_rows(match: Match) -> Match:
-    """Move targets to common rows if their rows are close to each other."""
+    """Move targets of nearly the same row onto one line."""
     points = match.targets
     order = np.argsort(points[:, 0], kind="stable")
     rows = points[order, 0]
@@ -56,10 +57,10 @@ def straighten_rows(match: Match) -> Match:
 def separate_targets(
     a: ElementAnalysis, match: Match, *, rounds: int = 12, room: float = 1.0, starts: Points | None = None
 ) -> Match:
-    """Push targets apart if their disjoint elements would overlap.
+    """Push targets apart if disjoint elements would overlap there.
 
-    Elements are treated as convex. Each pair is pushed along the line between its targets, up to its distance at its
-    ``starts``, if these are given. ``starts`` is NaN for elements without a start.
+    Elements are treated as convex. Each pair is pushed along the line between its targets. If ``starts`` are given, no
+    pair is pushed further apart than its distance there. ``starts`` is NaN for elements without a start.
     """
     from scipy.spatial import cKDTree
 
@@ -91,7 +92,7 @@ def separate_targets(
 
 @remember(16)
 def _measure_reach(a: ElementAnalysis, count: int = 32) -> Points:
-    """Return how far each element extends from its centre in ``count`` directions, (n, count), in pixels."""
+    """Return the extent of each element from its centre in ``count`` directions, (n, count), in pixels."""
     parts = split_foreground(a)
     angles = 2 * math.pi * np.arange(count) / count
     rays = np.stack([np.sin(angles), np.cos(angles)])
@@ -107,10 +108,10 @@ def _measure_reach(a: ElementAnalysis, count: int = 32) -> Points:
 
 
 def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Match:
-    """Limit the difference in displacement between neighbours of a connected figure to a share of an element.
+    """Limit the difference in displacement between neighbours of a connected figure.
 
-    Each pair of neighbours above the limit is brought together, each by half of the excess. This is repeated until all
-    pairs are within the limit, or the rounds are over.
+    If a pair of neighbours exceeds the limit, each of them moves by half of the excess. This is repeated until all
+    pairs are within the limit, or ``rounds`` are over.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -119,7 +120,7 @@ def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Matc
         return match
     try:
         corners = Delaunay(start).simplices
-    except QhullError:  # all points are on a line
+    except QhullError:  # All points are on a line.
         return match
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
     first, second = np.unique(edges, axis=0).T
@@ -139,9 +140,10 @@ def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Matc
 
 
 def crop_extension(a: ElementAnalysis, match: Match, size: tuple[int, int]) -> Match:
-    """Remove the parts of the extended texture that cannot enter the output.
+    """Remove the parts of the extended texture that are not visible in the output.
 
-    The remaining width is one of a few, so that the next layout can reuse the factors of its system.
+    The remaining width is rounded up to multiples of half a spacing, so that the next layout can reuse the factors of
+    its system.
     """
     extension = match.extension
     unit = max(2.0, spacing(a.points) / 2)

@@ -1,4 +1,4 @@
-"""Find the pixels of a warp that stay unchanged: T_AB0 of section 4.3."""
+"""Find the source pixels of a warped texture, and the pixels that the refinement must not change (section 4.3)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Labels = NDArray[np.uint32]
 
 
 def draft_pixels(a: ElementAnalysis, match: Match, warp: BackwardWarp, *, whole: bool) -> tuple[Draft, Labels]:
-    """Convert a warp to texture pixels: those that stay, and the target of each pixel that moved ``whole``, or 0."""
+    """Return the source pixels of a warp, and the target of each pixel of an element that moved undeformed, or 0."""
     extension, known = match.extension, warp.known
     at = warp.place[..., 0] * extension.mask.shape[1] + warp.place[..., 1]
     places, mirrored = (v.reshape(-1, 2).take(at, axis=0) for v in (extension.pixel, extension.mirrored))
     stays = _mark_copied(places, mirrored, known)
     step = match.shift[0]
     if extension.originals and (match.shift == step).all():
-        # The image moves as a whole. Its own pixels stay, whichever pixels come next to them.
+        # If the image moves as a whole, its own pixels stay, whichever pixels are next to them.
         rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
         stays |= known & (places[..., 0] == rows - step[0]) & (places[..., 1] == columns - step[1])
     if whole and a.layout == Layout.DISJOINT:
@@ -43,9 +43,9 @@ def draft_pixels(a: ElementAnalysis, match: Match, warp: BackwardWarp, *, whole:
 
 
 def _label_elements(match: Match, warp: BackwardWarp, at: NDArray[np.intp]) -> tuple[Labels, Bools]:
-    """Return the target of each element pixel, counted from 1, and pixels that the mesh stretches.
+    """Return the target of each element pixel, counted from 1, and True for pixels that the mesh stretches.
 
-    Stretched outlines are not elements. Rigid pixels are exactly at the target of their element.
+    Stretched outlines do not belong to elements, whose pixels are exactly at the element's target.
     """
     extension, known = match.extension, warp.known
     goal = np.zeros(len(extension.points) + 1, np.uint32)
@@ -65,7 +65,7 @@ def _label_elements(match: Match, warp: BackwardWarp, at: NDArray[np.intp]) -> t
 def _add_cut(
     match: Match, parts: Foreground, places: NDArray[np.int32], label: Labels, known: Bools, mirrored: Bools
 ) -> None:
-    """Add elements that the border cuts. They stay in place and are not part of the mesh."""
+    """Add elements that the border cuts. They stay in place and are not in the mesh."""
     element = match.extension.element[match.assigned]
     number = np.zeros(len(parts.points) + 1, np.uint32)
     for k in np.flatnonzero(~parts.whole[element]).tolist():
@@ -78,7 +78,7 @@ def _add_cut(
 
 
 def _mark_copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
-    """Return the pixels that the warp copies whole, which need no refinement."""
+    """Return True for pixels that the warp copies together with their neighbours, which need no refinement."""
     from scipy.ndimage import maximum_filter
 
     broken = np.zeros(known.shape, bool)

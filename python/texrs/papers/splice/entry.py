@@ -1,4 +1,4 @@
-"""Check the input of `texrs.papers.splice`: analysed textures are checked, images are analysed."""
+"""Check the input of `texrs.papers.splice`, and analyse images."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ Making: TypeAlias = Callable[Concatenate[ElementAnalysis, P], T]
 FEWEST = 3
 SHORTEST = 16
 CACHES: list[Cache[bytes, Any]] = []
-"""All caches of results for analysed textures."""
+"""All caches that `remember` created."""
 
 
 def as_elements(value: object, name: str, progress: Progress) -> ElementAnalysis:
-    """Check an analysed texture, or analyse an image."""
+    """Return an analysed texture after checking it. An image is analysed first."""
     if not isinstance(value, ElementAnalysis):
         given = as_ndarray(value, name)
         as_image(given, name, minimum=SHORTEST)
         try:
             found = analyse(given, progress=progress)
-            # Keep the original shape of the image.
+            # Keep the given shape of the image, (H, W) or (H, W, C).
             return check_entry(replace(found, image=given), name)
         except LimitExceeded:
             raise
@@ -45,7 +45,7 @@ def as_elements(value: object, name: str, progress: Progress) -> ElementAnalysis
 
 
 def check_entry(entry: ElementAnalysis, name: str) -> ElementAnalysis:
-    """Check that the parts of an analysed texture match; return it with its points as 64-bit floats."""
+    """Check that the parts of an analysed texture match; return it with points in double precision."""
     image = as_image(entry.image, f"{name}.image", minimum=SHORTEST)
     shape = image.shape[:2]
     mask = np.asarray(entry.mask)
@@ -73,16 +73,17 @@ def check_entry(entry: ElementAnalysis, name: str) -> ElementAnalysis:
 def remember(
     count: int, *, seen: bool = False, size: Callable[[Any], int] | None = None
 ) -> Callable[[Making[P, T]], Making[P, T]]:
-    """Cache the last results of a function, by the analysed textures and its other arguments.
+    """Decorate a function of an analysed texture so that its last results are cached.
 
     Parameters
     ----------
     count : int
-        Maximum number, or total size, of cached results.
+        Maximum number of cached results, or their maximum total ``size``.
     seen : bool
-        If True, the key also contains the image, and the box of an element. Default: False.
+        If True, the key also contains the image, and the box of an element, for functions that read them. Default:
+        False.
     size : callable, optional
-        Function that returns the size of a result. Default: each result counts 1.
+        Function that returns the size of a result. Default: each result has size 1.
 
     """
 

@@ -1,8 +1,8 @@
-"""Build the background between separate elements for a splice, without warping or averaging.
+"""Build the background between separate elements for a splice, without warping it.
 
-The texture's background is completed where its elements are, and grown by the stitcher if the result is larger. Each
-element is then cut into it with its matte: the surroundings that all elements share, such as shadows and highlights.
-All steps use even light (`light`).
+The texture's background is completed where its elements are. If the result is larger, the background is grown from
+patches. Each element is then cut into it with its matte, which contains the surroundings that all elements share, such
+as shadows and highlights. All steps use the texture without its uneven light (`shading`).
 """
 
 from __future__ import annotations
@@ -33,48 +33,48 @@ from texrs.point_sets import spacing
 __all__ = ["ENOUGH", "Scene", "cut_in", "lay_ground", "survey"]
 
 BESIDE = 3
-"""Width in pixels of the surroundings that are always cut in with an element."""
+"""Width of the surroundings that are always cut in with an element, in pixels."""
 LOCAL = 12.0
-"""Standard deviation in pixels of the filter for the local mean of the background."""
+"""Standard deviation of the filter for the local mean of the background, in pixels."""
 UNLIKE = 1.1
-"""Least difference of a matte from the background, averaged over all elements, in standard deviations of the
-background.
+"""Minimum difference of a matte from the background, averaged over all elements.
+
+Unit: standard deviations of the background.
 """
 SEEN = 0.3
-"""Least share of the elements that must show a pixel of the matte."""
+"""Minimum share of the elements that show a pixel of the matte."""
 GROWN = 3
-"""Width in pixels of the surroundings of a matte that are cut in with it."""
+"""Width of the border around a matte that is cut in with it, in pixels."""
 ROOM = 0.35
-"""Distance from an element's box up to which its matte is searched, as a share of the spacing."""
+"""Distance from an element's box up to which a matte is searched, as a share of the spacing."""
 LEAST = 0.02
-"""Least share of background in the texture, for mattes to be found."""
+"""Minimum share of background in a texture whose mattes are measured."""
 ENOUGH = 0.15
-"""Least share of the texture without elements and mattes. Otherwise a background is not built.
+"""Minimum share of the texture outside of elements and mattes that a new background needs.
 
-With less, the background's features repeat visibly.
+With a smaller share, features of the background repeat visibly.
 """
 KEPT, PIXEL, GROUNDS = 1 << 27, 64, 2
-"""Maximum bytes of cached textures, bytes for each pixel of one, and maximum number of completed backgrounds of each.
-"""
+"""Maximum size of the texture cache in bytes, bytes per pixel, and maximum number of backgrounds per texture."""
 CANDIDATES = 4
-"""Number of places that are tried for each patch of the background."""
+"""Number of source places that are tried for each patch of the background."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A texture of separate elements, with the owner of each pixel.
+    """A texture of separate elements, divided into elements and background.
 
     Attributes
     ----------
     a : ElementAnalysis
-        The texture, in even light.
+        The texture without its uneven light.
     light : Light or None
         The removed light; None if the light was even.
     own : (h, w) int32
-        Number of the element that a pixel belongs to, counted from 1. The pixel is in the element, in its matte or
-        next to it. 0 is background, and -1 is foreground without an element (scraps).
+        Number of the element of each pixel, counted from 1. An element includes its matte and the pixels next to it.
+        Background is 0, and foreground without an element is -1.
     certain : (h, w) bool
-        Pixels that are certainly in a matte.
+        True for pixels of mattes, without the border around them.
     grounds : Cache
         Completed backgrounds of the texture, by seed.
 
@@ -89,9 +89,9 @@ class Scene:
 
 @remember(KEPT, seen=True, size=lambda scene: min(scene.own.size * PIXEL, KEPT))
 def survey(a: ElementAnalysis, *, narrow: bool = False) -> Scene:
-    """Separate elements with their mattes from the background, and remove the light.
+    """Divide a texture into elements with their mattes and background, and remove uneven light.
 
-    With ``narrow``, elements have no mattes if these would leave too little background.
+    If ``narrow`` is True, mattes are left out if they would leave too little background.
     """
     parts = split_foreground(a)
     own, certain = find_owners(guidance(as_image(a.image)), a, parts)
@@ -105,7 +105,7 @@ def survey(a: ElementAnalysis, *, narrow: bool = False) -> Scene:
 def lay_ground(
     scene: Scene, match: Match, draft: Draft, label: NDArray[np.uint32], seed: int, watch: Progress
 ) -> Draft | None:
-    """Return the source pixels of a splice with its elements placed as in a draft, on a background of their own.
+    """Return the source pixels of a splice with its elements on a completed background.
 
     Parameters
     ----------
@@ -114,18 +114,18 @@ def lay_ground(
     match : Match
         Places of the elements.
     draft : Draft
-        Pixels of the placed elements.
+        Source pixels of the placed elements.
     label : (H, W) uint32
-        The target of each pixel of an element, counted from 1; 0 elsewhere.
+        The target of each pixel of an element, counted from 1, and 0 for other pixels.
     seed : int
-        Number that selects the patches of the background.
+        Seed of the choice of background patches.
     watch : callable
         Function called as ``watch(stage, share)``.
 
     Returns
     -------
     Draft or None
-        None if the texture shows too little of its background, or moves as a whole.
+        The draft with its background, or None if the texture shows too little of its background, or moves as a whole.
 
     """
     sized = label.shape == scene.own.shape
@@ -148,13 +148,13 @@ def lay_ground(
 
 
 def keep_still(scene: Scene, places: NDArray[np.int32], label: NDArray[np.uint32], element: NDArray[np.intp]) -> None:
-    """Keep elements that do not move with all their surroundings; if none moves, keep scraps as well."""
+    """Keep all surroundings of elements that do not move; if none moves, also keep foreground without an element."""
     here = np.moveaxis(np.indices(label.shape, np.int32), 0, -1)
     moved = np.zeros(int(label.max()) + 1, bool)
     moved[label[(places != here).any(axis=-1) & (label > 0)]] = True
     stays = np.zeros(int(scene.own.max()) + 2, bool)
     stays[element[(label > 0) & ~moved[label]] + 1] = True
-    # The last entry is for scraps.
+    # The last entry is for foreground without an element.
     stays[-1] = not moved.any()
     still = stays[scene.own] & (scene.own != 0) & ~moved[label]
     places[still] = here[still]
@@ -170,7 +170,7 @@ def cut_in(
     mirrored: Bools | None = None,
     room: Bools | None = None,
 ) -> NDArray[np.int32]:
-    """Cut elements into a background, each with its matte; a shadow stays whole.
+    """Cut elements into a background, each with its matte, along the cheapest seam.
 
     Parameters
     ----------
@@ -181,13 +181,13 @@ def cut_in(
     places : (H, W, 2) int32
         Source pixels of the elements.
     label : (H, W) uint32
-        Pixels of an element that will be cut in; 0 elsewhere.
+        Numbers above 0 for pixels of elements that must be cut in, and 0 for other pixels.
     element : (H, W) int
-        Number of the texture's element at each pixel.
+        Index of the texture's element at each pixel.
     mirrored : (H, W, 2) bool, optional
-        Axes along which the pixel is mirrored. Default: none.
+        True for each axis along which a pixel is mirrored. Default: no pixel.
     room : (H, W) bool, optional
-        Pixels where a matte may be. Default: everywhere.
+        True for pixels that surroundings may cover. Default: all pixels.
 
     """
     carried, offered = carry_mattes(places, label, element, scene.own, mirrored)
@@ -197,16 +197,17 @@ def cut_in(
     here, there = (guide[p[..., 0], p[..., 1]] for p in (ground, carried))
     elements = label > 0
     everywhere = np.ones(label.shape, bool)
-    # Cuts run around a shadow, because its matte is a hard constraint.
+    # Keep mattes such as shadows complete: they are a hard constraint, so the seam runs around them.
     core = elements | (offered & scene.certain[carried[..., 0], carried[..., 1]])
     taken = cut(here, there, everywhere, offered | elements, core_b=core, cost="paper").mask | elements
     return np.where(taken[..., np.newaxis], carried, ground).astype(np.int32)
 
 
 def find_owners(guide: Floats, a: ElementAnalysis, parts: Foreground) -> tuple[NDArray[np.int32], Bools]:
-    """Return the element of each texture pixel, counted from 1, and the pixels that are certain.
+    """Return the element of each texture pixel, counted from 1, and True for pixels of mattes.
 
-    A pixel belongs to an element if it is inside, in its matte, or next to these. Background is 0, and scraps are -1.
+    A pixel belongs to an element if it is in the element, in its matte, or close to one of these. Background is 0, and
+    foreground without an element is -1.
     """
     from scipy.ndimage import binary_dilation, distance_transform_edt
 
@@ -224,7 +225,7 @@ def find_owners(guide: Floats, a: ElementAnalysis, parts: Foreground) -> tuple[N
 
 
 def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Floats) -> Bools:
-    """Return a square mask of surroundings that all elements share and that differ from the background."""
+    """Return the matte: a square mask of surroundings that all elements share and that differ from the background."""
     from scipy.ndimage import label
 
     sure = away > BESIDE
@@ -239,9 +240,9 @@ def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Fl
     apart = guide - usual
     deviation = float(np.sqrt((apart[sure] ** 2).mean())) + 1 / 255
     padded = np.pad(apart, ((reach, reach), (reach, reach), (0, 0)))
-    # Ignore pixels of other elements.
+    # Mark the pixels of other elements, to ignore them.
     owner = np.pad(parts.region, reach, constant_values=-1)
-    # Average the difference from the local background over all whole elements.
+    # Average the difference from the local background over all complete elements.
     total, count = np.zeros((*none.shape, guide.shape[-1])), np.zeros(none.shape)
     for number, (row, column) in zip(np.flatnonzero(parts.whole) + 1, middles.tolist(), strict=True):
         window = (slice(row, row + len(none)), slice(column, column + len(none)))
@@ -257,7 +258,7 @@ def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Fl
 
 
 def complete_ground(a: ElementAnalysis, own: NDArray[np.int32], seed: int, watch: Progress) -> NDArray[np.int32] | None:
-    """Return the source pixels of the completed background, where patches of background fill elements and mattes."""
+    """Return the source pixels of the background, completed by patches, or None if too little is visible."""
     hole = own != 0
     if (~hole).mean() < ENOUGH:
         return None
@@ -271,10 +272,9 @@ def complete_ground(a: ElementAnalysis, own: NDArray[np.int32], seed: int, watch
 def grow_ground(
     a: ElementAnalysis, bare: NDArray[np.int32], size: tuple[int, ...], seed: int, watch: Progress
 ) -> NDArray[np.int32]:
-    """Return the source pixels of a background of any size, from the completed background or patches of it.
+    """Return the source pixels of a background of any size, made from the completed background.
 
-    If the completed background is large enough, its middle is used. Patches are avoided then, because the smoothest
-    would fit best.
+    If the completed background is large enough, its middle is used. Otherwise patches of it are stitched together.
     """
     if all(n <= m for n, m in zip(size, bare.shape, strict=False)):
         first = [(m - n) // 2 for n, m in zip(size, bare.shape, strict=False)]
@@ -304,7 +304,7 @@ def carry_mattes(
     own: NDArray[np.int32],
     mirrored: Bools | None,
 ) -> tuple[NDArray[np.int32], Bools]:
-    """Return the source pixels of elements and their surroundings, and the pixels that belong to a matte."""
+    """Return the source pixels of elements and their surroundings, and True for pixels of the surroundings."""
     from scipy.ndimage import distance_transform_edt
 
     near = distance_transform_edt(label == 0, return_distances=False, return_indices=True)

@@ -1,9 +1,9 @@
-"""Extend the layout of points beyond their image by sowing, because repeated reflections are visible.
+"""Continue the arrangement of points beyond their image by sowing, because repeated reflections are visible.
 
-Nothing is sown if a lattice continues, or the border is near. Otherwise the points are drawn as discs, and the drawing
-is grown by quilting, whose cuts avoid the discs. The points are then read from it. Points of the image itself stay.
-Elements are sown in the same way, each next to its neighbours in the image. Elements that the border cuts are not
-sown.
+Nothing is sown if a lattice continues, or if the requested box is near the image. Otherwise the points are drawn as
+discs, and the drawing is grown by quilting, which avoids cuts through discs. The points are then read from the grown
+drawing. Points of the image itself do not change. Elements are sown in the same way, so that their neighbours are
+neighbours in the image as well. Elements that the border cuts are not sown.
 """
 
 from __future__ import annotations
@@ -28,35 +28,32 @@ Reals = NDArray[np.float64]
 NEAR = 1.5
 """Distance beyond the image up to which a layout is reflected, in spacings."""
 FEWEST = 6
-"""Least number of points that define an arrangement."""
+"""Minimum number of points that define an arrangement."""
 DRAWN, LARGE = (6.0, 12.0), 640.0
-"""Least and largest distance of points in the drawing, in pixels, and side of the drawing beyond which the distance
-shrinks.
+"""Minimum and maximum spacing in the drawing, in pixels. Side of the drawing in pixels above which the spacing shrinks.
 """
 DISC = 0.45
 """Radius of a disc, in spacings."""
 PATCH, SMALLEST, OVERLAP = 3.5, 1.0, 0.36
-"""Side of a patch in spacings (at most half an image), least side that contains an arrangement, and overlap as a share
-of the side.
+"""Side of a patch in spacings (at most half an image), minimum side in spacings, and overlap as a share of the side.
 """
 CLOSE = (0.7, 1.04)
-"""Least and largest distance between elements of different patches, as a share of the sum of their radii."""
+"""Minimum and maximum of the least distance between elements, as a share of the sum of their radii."""
 ROUGH, TIGHT, ROUNDS = 0.7, 0.92, 12
-"""Shares of that distance: least distance of sown elements before and after they are pushed apart.
+"""Minimum distance of sown elements before and after they are pushed apart, as a share of the least distance.
 
-Number of pushes.
+The third number is the number of rounds of pushing.
 """
 FINE = 6.0
-"""Number of positions per spacing when gaps are searched."""
+"""Number of tested positions per spacing in the search for gaps."""
 AWAY, ALIKE = 4.0, 6
-"""Distance in spacings up to which an element should not repeat. Number of similar-sized elements that may replace it.
-"""
+"""Distance within which an element should not repeat, in spacings, and number of elements that may replace it."""
 APART = 0.8
-"""Least distance of points from different patches, as a share of the usual nearest distance."""
+"""Minimum distance of points from different patches, as a share of the usual nearest distance."""
 
 
 class Sown(NamedTuple):
-    """Points (n, 2) of an extended arrangement and their originals; the image's points come first."""
+    """Points (n, 2) of a continued arrangement, the image's points first, and the index of each point's original."""
 
     points: Points
     of: NDArray[np.intp]
@@ -78,13 +75,14 @@ def continue_points(
     Parameters
     ----------
     layout : PointLayout
-        Points of an image, and how they could be reflected.
+        Points of an image, with their lattice or reflections.
     shape : (rows, columns)
         Shape of the image.
     low, high : (2,) float64
         First and last corner of the box.
     around : (low, high), optional
-        Larger box that is sown instead, and then reused for several boxes inside it. Default: the box.
+        First and last corner of a larger box that is sown instead, so that several boxes inside it can reuse the
+        result. Default: the box.
 
     """
     points, how = layout.cover(low, high)
@@ -101,25 +99,25 @@ def continue_points(
 def sow_elements(
     layout: PointLayout, shape: tuple[int, ...], whole: Bools, radius: Reals, low: Points, high: Points
 ) -> Sown | None:
-    """Return the elements of an extended image in a box, or None if sowing is not needed.
+    """Return the elements of a continued arrangement in a box, or None if reflections are not visible there.
 
     Parameters
     ----------
     layout : PointLayout
-        All elements of the image.
+        All elements of the image, with their lattice or reflections.
     shape : (rows, columns)
         Shape of the image.
     whole : (n,) bool
         True for elements that the border does not cut. Only these are sown.
     radius : (n,) float64
-        Radius of each element in pixels. Elements do not overlap, unless they do so in the image.
+        Radius of each element in pixels. Sown elements do not overlap, unless elements overlap in the image.
     low, high : (2,) float64
         First and last corner of the box.
 
     """
     if layout.cover(low, high)[1] != "reflected" or not _is_far(layout, shape, low, high):
         return None
-    # Exclude the margin where elements may be cut, because it does not show how dense they are.
+    # Exclude the margin where elements can be cut, because it does not show how dense they are.
     margin = float(np.median(radius[whole])) if whole.any() else 0.0
     ends = np.full(2, margin), np.array(shape) - 1 - margin
     own, large = layout.points[whole], radius[whole]
@@ -135,7 +133,7 @@ def sow_elements(
 
 
 def _is_far(layout: PointLayout, shape: tuple[int, ...], low: Points, high: Points) -> bool:
-    """Return whether a box extends so far beyond the image that a reflection is visible."""
+    """Return True if a box extends so far beyond the image that a reflection would be visible."""
     return bool(np.maximum(-low, high - (np.array(shape) - 1)).max() > NEAR * layout.scale)
 
 
@@ -147,7 +145,7 @@ def _sow_once(
     high: Points,
     radius: Reals | None,
 ) -> Sown | None:
-    """Sow points of an image by their arrangement between the ``ends``; return None if this area is too small."""
+    """Sow points by their arrangement between the ``ends`` of an image; return None if this area is too small."""
     unit = float(np.clip(LARGE * scale / (high - low).max(), *DRAWN)) / scale
     too_small = (ends[1] - ends[0]).min() < 2 * SMALLEST * scale
     if len(points) < FEWEST or (high - low).max() * unit > 4 * LARGE or too_small:
@@ -183,7 +181,7 @@ def _sow(
         seed=0,
         progress=lambda share: None,
     )
-    # Read the points from the quilt: each pixel of a point in the drawing is one point.
+    # Read the points from the quilt. Each pixel that is copied from a point's pixel becomes a point.
     drawn = np.flatnonzero(((places >= 0) & (places <= np.array(sides) - 1)).all(axis=1))
     pixel = np.rint(places[drawn]).astype(np.intp)
     number = np.zeros(sides, np.int32)
@@ -205,14 +203,14 @@ def _sow(
 
 
 def _measure_closest(points: Points, radius: Reals) -> float:
-    """Return the usual least distance of elements over the sum of their radii; a tenth of them are closer."""
+    """Return the least distance of elements over the sum of their radii, as the 10 % quantile of all elements."""
     apart = np.hypot(*np.moveaxis(points[:, np.newaxis] - points, -1, 0)) / (radius[:, np.newaxis] + radius)
     np.fill_diagonal(apart, np.inf)
     return float(np.clip(np.quantile(apart.min(axis=1), 0.1), *CLOSE))
 
 
 def _push_apart(found: Sown, points: Points, radius: Reals, closest: float) -> Sown:
-    """Push sown elements apart that are closer than in the image, and remove those without room."""
+    """Push sown elements apart if they are closer than elements of the image, and remove those without room."""
     from scipy.spatial import cKDTree
 
     at, own = found.points.copy(), len(points)
@@ -243,7 +241,7 @@ def _fill_gaps(
     share: float,
     room: float,
 ) -> Sown:
-    """Fill the largest gaps with elements until they cover their share of the box, or have no room."""
+    """Fill the largest gaps with elements until these cover their share of the box, or no gap has room."""
     from scipy.spatial import cKDTree
 
     sides = [np.arange(a, b + step / 2, step) for a, b in zip(low, high, strict=True)]
@@ -264,12 +262,12 @@ def _fill_gaps(
 
 
 def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float) -> NDArray[np.intp]:
-    """Exchange elements for others of similar size if the same one is near, from the image outwards."""
+    """Replace sown elements by others of similar size if the same element is near, starting next to the image."""
     from scipy.spatial import cKDTree
 
     count = len(radius)
     turn = (np.arange(count) - np.arange(count)[:, np.newaxis]) % count
-    # Each element comes first in its own list, and ties have different orders for different elements.
+    # Each element is the first in its own list. Ties have different orders for different elements.
     alike = np.lexsort((turn, np.abs(radius - radius[:, np.newaxis])), axis=1)[:, :ALIKE]
     middle = at[:own].mean(axis=0) if own else at.mean(axis=0)
     order = np.argsort(np.hypot(*(at[own:] - middle).T), kind="stable") + own
@@ -286,7 +284,7 @@ def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float)
 
 
 def _draw(places: Points, sides: tuple[int, int], radius: float) -> Floats:
-    """Draw points as cones with the value 1 at the point."""
+    """Draw points as cones of a radius in pixels, with the value 1 at the point."""
     from scipy.spatial import cKDTree
 
     pixels = np.stack(np.meshgrid(*(np.arange(n) for n in sides), indexing="ij"), -1).reshape(-1, 2)
@@ -297,7 +295,7 @@ def _draw(places: Points, sides: tuple[int, int], radius: float) -> Floats:
 def _keep_apart(
     found: Sown, own: int, points: Points, apart: float, radius: Reals | None, closest: float = 0.0
 ) -> NDArray[np.intp]:
-    """Return the points that are not too close to earlier ones; the layout's own points, at the start, are all kept."""
+    """Return the indices of points that are not too close to earlier ones. The first ``own`` points are all kept."""
     from scipy.spatial import cKDTree
 
     far = apart if radius is None else 2 * float(radius.max())
@@ -305,7 +303,7 @@ def _keep_apart(
     if radius is not None:
         one, two = found.of[pairs[:, 0]], found.of[pairs[:, 1]]
         away = found.points[pairs[:, 1]] - found.points[pairs[:, 0]]
-        # Any two points may keep the offset that they have in the image.
+        # Keep any two points with the offset that they have in the image.
         copied = (np.abs(away - (points[two] - points[one])) < 1).all(axis=1)
         pairs = pairs[~copied & (np.hypot(*away.T) < closest * (radius[one] + radius[two]))]
     dropped = np.zeros(len(found.points), bool)

@@ -1,8 +1,7 @@
 """Fill holes and refine the background: section 4.3 of `texrs.papers.splice`.
 
-The warp leaves holes, and stretches pixels that are not rigid. Both are repaired in coordinates: each pixel refers to
-a pixel of the texture. Pixels that may change take a reference that fits their neighbours (k-coherence, at two
-resolutions).
+The warp leaves holes, and stretches pixels that are not rigid. Both are repaired in the source map. Pixels that may
+change get a source pixel that fits the source pixels of their neighbours (k-coherence, at two resolutions).
 """
 
 from __future__ import annotations
@@ -34,46 +33,53 @@ Kinds = NDArray[np.uint8]
 BITS = ONE.bit_length() - 1
 """Number of fractional bits of a fixed-point position."""
 JITTER = 1.0
-"""Jitter of the positions of non-rigid pixels before their correction, in samples of a level."""
+"""Maximum random displacement of non-rigid pixels before their correction, in samples of a level."""
 PASSES = 2
 WIDE = 1.0
-"""Width of a hole, in spacings, above which it is filled with patches. Narrower holes are grown from their boundary."""
-PATCH, LEAST = 0.33, 6
-"""Side of those patches, as a share of the spacing, and least side in pixels for a meaningful roughness."""
-STROKE, ROUGH, MOST = 2.5, 0.95, 1.1
-"""Gradient that counts as an edge and not as roughness, in median gradients.
+"""Width of a hole, in spacings, above which it is filled with patches.
 
-Least roughness of a patch, relative to the background. Largest sum of roughness and edges of a patch, relative to the
-background.
+Narrower holes are filled by continuing the pixels at their boundary.
+"""
+PATCH, LEAST = 0.33, 6
+"""Side of these patches as a share of the spacing, and minimum side in pixels.
+
+Smaller patches have no reliable roughness.
+"""
+STROKE, ROUGH, MOST = 2.5, 0.95, 1.1
+"""Maximum gradient that counts as roughness, in median gradients; a larger one counts as an edge.
+
+The second number is the minimum roughness of a patch, relative to the background. The third is the maximum mean
+gradient of a patch, edges included, relative to the background.
 """
 CHOICE, FEWEST, PLENTY = 100, 32, 4000
-"""Least number of patches as rough as the background.
+"""Number of patches as rough as the background that is enough to leave out all others.
 
-Least number of patches of any roughness. Number of patches that is enough, because all patches of a plain background
-fit.
+The second number is the minimum number of patches of any roughness. The third is the number of patches that are tried
+at most, because all patches of a plain background fit.
 """
 K, APART = 3, 0.05
-"""Size of a similarity set, and distance between its samples, as a share of the shorter side."""
+"""Number of samples in a similarity set, and minimum distance between them, as a share of the shorter side."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """An image before its refinement.
+    """Source pixels of an image before its refinement.
 
     Attributes
     ----------
     places : (H, W, 2) int32
-        Texture pixel that each pixel shows; undefined in the holes.
+        Source pixel in the texture of each pixel; undefined in the holes.
     known : (H, W) bool
-        False in the holes.
+        False for pixels in the holes.
     fixed : (H, W) bool
-        Rigid pixels, which do not change.
+        True for rigid pixels, which do not change.
     kinds : (h, w) uint8
-        Kind of each texture pixel. Only pixels of the requested kind may replace a pixel. Background is 0.
+        Kind of each texture pixel. A pixel may only be replaced by pixels of the kind that it requests. Background is
+        0.
     wanted : (H, W) uint8
-        Requested kind of each pixel.
+        Requested kind of each pixel, or 255 for any kind.
     mirrored : (H, W, 2) bool
-        Axes along which the texture is mirrored at a pixel.
+        True for each axis along which the texture is mirrored at a pixel.
 
     """
 
@@ -86,7 +92,7 @@ class Draft:
 
 
 def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, progress: Progress | None) -> Draft:
-    """Fill the holes: wide ones with patches of background, others by continuing their boundary."""
+    """Fill the holes of a draft: wide ones with patches of background, others by continuing their boundary."""
     from scipy.ndimage import distance_transform_edt
 
     holes = ~draft.known
@@ -103,8 +109,8 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
         filled = fill_with_patches(image, draft, ground, scale, seed, progress)
         if filled is not None:
             return filled
-    # Continue the nearest known pixel as if the background went on. If that position is not background, take random
-    # background.
+    # Continue the nearest known pixel over the hole. If this reaches a texture pixel that is not background, use
+    # random background.
     at = np.argwhere(holes)
     start = near[:, holes].T
     there = places[start[:, 0], start[:, 1]] + (at - start)
@@ -132,7 +138,7 @@ def fill_with_patches(
 ) -> Draft | None:
     """Return the draft with its holes filled by background patches, or None if no patch fits into the background.
 
-    ``hidden`` pixels will not be visible, and are not filled.
+    ``hidden`` pixels will be covered later, and are not filled.
     """
     guide = guidance(as_image(image))
     found = find_patches(guide, ground, scale)
@@ -160,10 +166,11 @@ def fill_with_patches(
 
 
 def find_patches(guide: Floats, ground: Bools, scale: float) -> tuple[int, Bools] | None:
-    """Return the side of background patches, and the corners of those that may be copied.
+    """Return the side of background patches in pixels, and True for the first corners of patches that may be copied.
 
-    The smoothest patches of noise fit best, so that a filling from all patches looks blurred. Therefore only patches
-    as rough as the background, and without more edges, are used. If these are too few, all patches are used.
+    The smoothest patches of a noisy background fit best, so a filling from all patches looks blurred. Therefore only
+    patches as rough as the background, and without more edges, are used. If there are too few of these, all patches
+    are used.
     """
     steep = np.sqrt(sum((np.gradient(guide, axis=axis) ** 2).sum(axis=-1) for axis in range(2)))
     inner = mark_corners(ground, 3)
@@ -184,7 +191,7 @@ def find_patches(guide: Floats, ground: Bools, scale: float) -> tuple[int, Bools
 
 
 def thin_out(places: Bools) -> Bools:
-    """Return an evenly spaced selection of enough places."""
+    """Return an evenly spaced selection of at most `PLENTY` places."""
     at = np.flatnonzero(places)
     out = np.zeros(places.shape, bool)
     out.flat[at[:: -(-len(at) // PLENTY)]] = True
@@ -192,7 +199,7 @@ def thin_out(places: Bools) -> Bools:
 
 
 def average_windows(values: NDArray[np.floating], side: int) -> NDArray[np.float64]:
-    """Return the mean of each window, stored at its first corner; 0 for windows that do not fit in."""
+    """Return the mean of each window, stored at its first corner; 0 for windows that extend beyond the array."""
     total = np.pad(np.asarray(values, np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
     out = np.zeros(values.shape)
     means = (total[side:, side:] - total[:-side, side:] - total[side:, :-side] + total[:-side, :-side]) / side**2
@@ -203,21 +210,21 @@ def average_windows(values: NDArray[np.floating], side: int) -> NDArray[np.float
 def refine_places(
     image: NDArray[np.generic], wrap: tuple[bool, bool], draft: Draft, seed: int, progress: Progress | None
 ) -> Places:
-    """Return corrected positions of pixels that may change: first at half the resolution, then at the full one.
+    """Return corrected source pixels: first at half the resolution, then at the full one.
 
     The engine of `texrs.growth` starts from the draft, with `Refinement` as its corrector.
 
     Returns
     -------
     (H, W, 2) int32
-        Pixels of the texture.
+        Source pixel in the texture of each pixel.
 
     """
     return correct_draft(Refinement.of(image, wrap, draft, seed), wrap, progress)
 
 
 def correct_draft(refinement: Refinement, wrap: tuple[bool, bool], progress: Progress | None) -> Places:
-    """Return corrected positions of the pixels that a refinement may change."""
+    """Correct the pixels of a draft that may change, and return the source pixel of each pixel."""
     draft, image = refinement.draft, refinement.exemplar.image
     grown = grow(
         Region.whole(draft.fixed.shape),
@@ -228,7 +235,7 @@ def correct_draft(refinement: Refinement, wrap: tuple[bool, bool], progress: Pro
         ask=refinement.at,
         progress=progress,
     )
-    # Shift instead of dividing: both round down, and a shift of integers takes a tenth of the time.
+    # Shift instead of dividing. Both round down, but a shift of integers takes a tenth of the time.
     result = (grown.places.reshape(draft.places.shape) + ONE // 2) >> BITS
     for axis, n in enumerate(image.shape[:2]):
         along = result[..., axis]
@@ -239,7 +246,7 @@ def correct_draft(refinement: Refinement, wrap: tuple[bool, bool], progress: Pro
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
-    """Corrector of a draft: it jitters non-rigid pixels, and chooses among similar samples of their kind.
+    """Corrector of a draft in the engine of `texrs.growth`.
 
     Attributes
     ----------
@@ -250,7 +257,7 @@ class Refinement:
     seed : int
         Seed of the jitter.
     coarsest : int
-        Least side of the texture at half its resolution.
+        Minimum side of the texture at half its resolution, in pixels.
     levels : int
         Number of resolutions: 2, or 1 if the texture is too small to be halved.
 
@@ -264,22 +271,22 @@ class Refinement:
 
     @classmethod
     def of(cls, image: NDArray[np.generic], wrap: tuple[bool, bool], draft: Draft, seed: int) -> Refinement:
-        """Analyse the texture at the resolutions of the refinement."""
+        """Prepare the refinement of a draft: analyse the texture at one or two resolutions."""
         exemplar = Exemplar(image, labels=False, repeat=wrap)
         coarsest = max(COARSEST, min(exemplar.shape) // 2 - 1)
         count = len(exemplar.analyse(coarsest=coarsest).levels)
         return cls(exemplar, draft, seed, coarsest, count)
 
     def begin(self, region: Region) -> Places:
-        """Return the positions of the draft at the first level."""
+        """Return the source positions of the draft at the first level."""
         places = self.draft.places.astype(np.int32, copy=False) << BITS
         if self.levels == 1:
             return places.reshape(-1)
-        # Take the coarse sample between this pixel and the next, at (S + 1/2) / 2 - 1/2.
+        # Use the coarse sample between this pixel and the next, at (S + 1/2) / 2 - 1/2.
         return np.ascontiguousarray((places[::2, ::2] - ONE // 2) >> 1).reshape(-1)
 
     def frames(self, region: Region, spacing: int) -> NDArray[np.int16]:
-        """Return the Jacobian of each pixel: 1 or -1 along each axis."""
+        """Return the Jacobian of each pixel: 1, or -1 along an axis where the texture is mirrored."""
         mirrored = self.draft.mirrored[::spacing, ::spacing]
         if not mirrored.any():
             return to_fixed(None, region)
@@ -289,7 +296,7 @@ class Refinement:
         return out
 
     def at(self, level: int, region: Region, spacing: int) -> Asked:
-        """Return the rigid pixels; at the first level they already have their positions."""
+        """Return the rigid pixels as a constraint. They already have their positions at the first level."""
         held = self.draft.fixed[::spacing, ::spacing].ravel()
         return Asked(held=held, given=None if level == 0 else (self.draft.places << BITS).reshape(-1))
 
@@ -302,7 +309,7 @@ class Refinement:
         asked: Asked,
         progress: Progress | None,
     ) -> Corrected:
-        """Correct one level: jitter non-rigid pixels, then choose among similar samples of the right kind."""
+        """Correct one level: displace non-rigid pixels at random, then choose among similar samples of their kind."""
         here = self.exemplar.analyse(coarsest=self.coarsest).levels[level]
         apart = max(3, 2 * int(APART * min(here.shape)) + 1)
         sets = self.exemplar.similarity(level, coarsest=self.coarsest, k=K, n=apart)

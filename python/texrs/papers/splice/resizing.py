@@ -1,7 +1,7 @@
-"""Bring a texture to another size before an edit.
+"""Bring a texture to another size before its layout is edited.
 
 For a larger size, the texture is spliced with itself, so that its layout continues. For a smaller size, its middle is
-cut out. The edit then treats the result like any other analysed texture, and the source maps are composed.
+cut out. The edit then uses the result like any other analysed texture, and the source maps are composed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["check_resized", "crop", "read_elements", "report_resized"]
 
 
 def crop(a: ElementAnalysis, size: Sequence[int]) -> Synthesis:
-    """Return the middle of a texture, as a splice result."""
+    """Cut out the middle of a texture, and return it like the result of a splice."""
     shape = a.mask.shape
     first = [(n - m) // 2 for n, m in zip(shape, size, strict=True)]
     places = np.moveaxis(np.indices(tuple(size)), 0, -1) + first
@@ -42,16 +42,17 @@ def crop(a: ElementAnalysis, size: Sequence[int]) -> Synthesis:
 
 
 def read_elements(a: ElementAnalysis, made: Synthesis) -> ElementAnalysis:
-    """Return an image's elements that a splice placed in it: those whose centres are inside.
+    """Return the elements of a splice's result as an analysed texture, without a new analysis.
 
-    Elements are not searched. The splice gives their places, and the mask is looked up like the image.
+    The splice's report gives the places of the elements. Elements whose centres are outside the image are left out.
+    The mask is rendered from the source map like the image.
     """
     size = np.array(made.source_map.shape)
     found = [match["found"] for match in made.report["matches"] if match["found"] is not None]
     points = np.array(found, np.float64).reshape(-1, 2)
     points = points[((points >= 0) & (points <= size - 1)).all(axis=1)]
     mask = made.source_map.render(a.mask, interpolation="nearest")
-    # A side of unchanged length wraps as before.
+    # An axis wraps if it wrapped before and its length did not change.
     wrap = [w and n == m for w, n, m in zip(a.wrap, size, a.mask.shape, strict=True)]
     return replace(
         a,
@@ -68,7 +69,7 @@ def read_elements(a: ElementAnalysis, made: Synthesis) -> ElementAnalysis:
 
 
 def check_resized(entry: ElementAnalysis) -> ElementAnalysis:
-    """Check that an image in another size shows enough elements for its layout to be edited."""
+    """Raise an error if a resized texture has too few elements for an edit of its layout."""
     if len(entry.points) < FEWEST:
         size = entry.mask.shape
         raise InvalidInput(
@@ -80,7 +81,7 @@ def check_resized(entry: ElementAnalysis) -> ElementAnalysis:
 def report_resized(
     a: ElementAnalysis, entry: ElementAnalysis, resized: Synthesis, edited: Synthesis, steps: Sequence[Step]
 ) -> Synthesis:
-    """Return the edit of a resized texture as an edit of the texture itself."""
+    """Return the edit of a resized texture with coordinates and report for the original texture."""
     whole = edited.source_map
     if edited is not resized:
         whole = replace(whole.compose(resized.source_map), finish=whole.finish)
