@@ -316,7 +316,7 @@ def test_bad_names_seeds_and_solids_are_refused() -> None:
         samples.load("marble")
     with pytest.raises(ValueError, match="name: must be one of brick"):
         samples.photograph("pebbles")
-    with pytest.raises(ValueError, match="a photograph takes none"):
+    with pytest.raises(ValueError, match="must be empty for a photograph"):
         samples.load("coins", seed=1)
     with pytest.raises(ValueError, match="seed: must be an integer"):
         samples.dots((64, 64), seed=-1)

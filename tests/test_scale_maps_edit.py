@@ -153,7 +153,7 @@ def test_any_list_gives_a_map_of_any_size(edits: list, rows: int, columns: int) 
 @pytest.mark.parametrize(
     ("edits", "message"),
     [
-        ("[{", r"^steps: not JSON \("),
+        ("[{", r"^steps: must be JSON \("),
         ("{}", r"^steps: must be a list of steps, got dict$"),
         (5, r"^steps: must be a list of steps, got int$"),
         (["set"], r"^steps: step 1, set, requires value$"),

@@ -62,7 +62,7 @@ def apply_command(
     values = APPLIED.read(given, which=lambda o: not o.file)
     places = SourceMap.load(source)
     if given["finish_screening"] and places.axes != 2:
-        raise InvalidInput("--screening: not available for volumes, and the source map is of a volume")
+        raise InvalidInput("--screening: not available, because the source map is of a volume")
     groups = group(maps, len(places.shapes))
     targets = name_targets(groups, out, [source, *maps])
     finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))

@@ -164,7 +164,7 @@ def read_mask(path: str, axes: int = 2) -> Array:
     path = name_file(mask.marks)
     marked = mark(mask, path, ("planes", "rows", "columns")[3 - axes :])
     if not marked.any():
-        raise InvalidInput(f"{path}: marks nothing; a mask is white where it marks")
+        raise InvalidInput(f"{path}: marks nothing; marked pixels of a mask must be white")
     assume(f"{os.path.basename(path)}: read as a mask that marks {100 * float(marked.mean()):.3g} % of it")
     return marked
 

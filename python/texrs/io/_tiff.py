@@ -347,7 +347,7 @@ def _check_chain(path: Path, tif: Any, length: int) -> None:
         file.seek(at + layout.tagnosize + count * layout.tagsize)
         at = int.from_bytes(file.read(layout.offsetsize), order)
         if at in seen or len(seen) * least > length:
-            raise FileError(f"{path}: is corrupt; its pages lead to each other in a circle")
+            raise FileError(f"{path}: is corrupt; its pages refer to each other in a circle")
 
 
 def _check_tags(path: Path, tif: Any, page: Any) -> None:

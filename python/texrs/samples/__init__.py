@@ -169,7 +169,7 @@ def load(name: str, **options: Any) -> Sample:
         return _GENERATORS[name](**options)
     if isinstance(name, str) and name in PHOTOGRAPHS:
         if options:
-            raise InvalidInput(f"options: a photograph takes none, got {', '.join(options)}")
+            raise InvalidInput(f"options: must be empty for a photograph, got {', '.join(options)}")
         return photograph(name)
     raise InvalidInput(
         f"name: must be a generated sample ({', '.join(names())}) "

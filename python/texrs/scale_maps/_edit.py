@@ -105,7 +105,7 @@ def _read_all(steps: object) -> list[tuple[str, dict[str, Any]]]:
         try:
             steps = json.loads(steps)
         except (ValueError, RecursionError) as error:
-            raise InvalidInput(f"steps: not JSON ({error})") from None
+            raise InvalidInput(f"steps: must be JSON ({error})") from None
     if not isinstance(steps, Sequence) or isinstance(steps, str | bytes):
         raise InvalidInput(f"steps: must be a list of steps, got {type(steps).__name__}")
     if len(steps) > _MOST:
