@@ -33,7 +33,7 @@ LEAST = 0.05
 Smaller scales are near the horizon.
 """
 FEWEST = 0.02
-"""Least share of the image outside the planes. A smaller part does not continue behind them."""
+"""Minimum share of the image outside the planes. A smaller part does not continue behind them."""
 BESIDE = 0.5
 """Largest nearness of a corner to the camera, relative to the middle, -1 to 1, if the corner shows a part behind the planes."""
 MOSTLY = 0.8

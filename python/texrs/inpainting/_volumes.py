@@ -32,7 +32,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["inpaint_volume", "is_volume"]
 
 LEAST = 16
-"""Least side of a volume, in voxels."""
+"""Minimum side of a volume, in voxels."""
 MOST_CHANNELS = 4
 """Maximum length of a third axis that contains channels of an image."""
 SIDES = (12, 32)

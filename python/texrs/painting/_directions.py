@@ -31,7 +31,7 @@ __all__ = ["field_on_surface"]
 NEAR = 12
 """Number of neighbours of a point."""
 SAME_SIDE = 0.3
-"""Least cosine between the normals of two points on the same side of a thin part."""
+"""Minimum cosine between the normals of two points on the same side of a thin part."""
 ROUNDS = 300
 """Number of rounds of averaging that fill points without a direction."""
 SMOOTHED = 6

@@ -20,7 +20,7 @@ from texrs.painting._surface import Floats64
 __all__ = ["bake_frames", "carve", "read_slopes"]
 
 FLATTEST = 0.05
-"""Least z of a normal. The steepest slope is thus 87 degrees."""
+"""Minimum z of a normal. The steepest slope is thus 87 degrees."""
 
 
 def read_slopes(normals: Map) -> Floats:

@@ -23,7 +23,7 @@ COARSE = 512
 EDGE = 1e-6
 """Largest distance of a UV beyond its tile that counts as a rounding error."""
 SHARED = 0.02
-"""Least overlap, as a fraction of the smaller part's texels. Touching edges share a few texels."""
+"""Minimum overlap, as a fraction of the smaller part's texels. Touching edges share a few texels."""
 MOST = 64
 """Maximum number of texture sets."""
 
