@@ -61,7 +61,7 @@ def list_commands() -> str:
 
 def list_words(architecture: Path) -> str:
     """Return the page with the glossary of ARCHITECTURE.md."""
-    table = architecture.read_text(encoding="utf-8").partition("## The words")[2].partition("\n## ")[0]
+    table = architecture.read_text(encoding="utf-8").partition("## Glossary")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| (.+?) \| (.+?) \|$", table, re.MULTILINE)[1:]
     words = "".join(f"{word}\n  {meaning}\n\n" for word, meaning in sorted(rows, key=lambda row: row[0].lower()))
     intro = "The terms of the interface, of messages and of the code. Each term has one meaning."
