@@ -35,8 +35,8 @@ class DeformationOptions:
         Smallest and largest scale factor, 0.5 to 2. Default: 0.8 to 1.2.
     allow_mirror : bool, optional
         If True, elements, backgrounds and patches may be mirrored along both axes. If False, as for letters, they are
-        not mirrored. Default: True, except for axes along which light or slanted elements would reveal it, and False
-        with ``rotate=0``, because the example then has an upper side.
+        not mirrored. The default is False with ``rotate=0``, because the example then has an upper side. Default: True,
+        except for axes along which light or slanted elements would reveal it.
     start : float, optional
         Start of the logistic map (Eq. 2), within (-1, 1). Default: drawn from the seed for each element.
     growth_rate : float

@@ -1,36 +1,38 @@
-"""PERSPECTIVE: textures whose elements have the sizes of a scale map.
+"""Synthesise a texture whose elements have the sizes that a scale map gives (PERSPECTIVE).
 
 W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", The Visual Computer 24, 2008. The
 steps are:
 
-1. Make a scale map of the exemplar, from a mask of features or from angles, and edit it if needed (section 3;
-   `texrs.scale_maps`);
-2. Make the scale map of the output: the exemplar's map, resized, or any other map (section 4).
-3. Prepare the exemplar as a sheet: a flattened plane, or copies in several sizes, with the elements that are
-   found on the exemplar (`texrs.exemplar.sheet`);
+1. Compute the scale map of the exemplar from a mask of features or from angles, and edit it if needed (section 3,
+   `texrs.scale_maps`).
+2. Choose the scale map of the output: the resized map of the exemplar, or any other map (section 4).
+3. Prepare the exemplar as a sheet: the flattened plane, or copies in several sizes, with the elements of the exemplar
+   (`texrs.exemplar.sheet`).
 4. Stitch patches of the sheet, each at the requested scale, along minimum cuts (section 4; `texrs.growth.sheets`).
-5. Look the exemplar up through the coordinates, with smoothing where it is reduced.
+5. Copy the colours of the exemplar at the resulting coordinates, with smoothing where the exemplar is reduced.
 
 Departures, with their reasons:
 
-- Patches that are cut in whole replace windows that are corrected point by point (Eq. 5 to 7), which tear elements
-  larger than a window. The number of cells that look torn falls by 80 %.
-- An exemplar that is a plane is flattened. Its elements then have the same size everywhere, and any of them can be
-  shown at any depth. Without flattening, a ramp finds only a strip of the exemplar for each of its rows, and repeats
-  it. The test for a plane uses the fit of S to a linear function (of its power 2/3 for a map of areas). It also uses
-  edges, which get steeper with distance on a plane. The report contains the result. A target that grows along the
-  plane's slope shows this plane. Along another line elements are seen from the front. If sizes increase and decrease,
-  elements are half as foreshortened.
-- Other exemplars are used in several sizes, which add samples of each scale. The scale is a cost of showing a patch at
-  a place, (log S_e - log S_o)^2, because ratios of scales are visible. The paper has a channel of windows instead. For
-  planes, the cost of reduced elements is a seventh of that of enlarged ones, because enlarged elements are blurred.
-  The output's map is not changed.
-- The result is a set of coordinates, so the final step is a copy and not a weighted mean. Nothing is blurred.
-- A target may be a surface: another plane, normals, texture coordinates, or Jacobians (`targets`). Patches are bent to
-  it, so that elements are foreshortened like the surface. The sizes on it replace S_o.
-- Directions of elements, which section 6 leaves to future work: fields rotate the copied texture on its surface
-  (`directions`).
-- Instead of the histograms of Eq. 8, places that were shown often and overrepresented classes of colour have a cost.
+- Whole patches are cut in. The paper corrects windows point by point (Eq. 5 to 7), which tears elements larger than a
+  window. Whole patches reduce the number of cells that look torn by 80 %.
+- An exemplar that shows a plane is flattened. Its elements then have the same size everywhere, and any of them can be
+  shown at any depth. Without flattening, each row of a ramp of sizes would find only a strip of the exemplar, and
+  repeat it. A plane is detected by the fit of S to a linear function (of its power 2/3 for a map of areas). Edges are
+  also used, which get steeper with distance on a plane. The report contains the result. If the target grows along the
+  plane's slope, elements are foreshortened as on this plane. If it grows along another line, elements are seen from
+  the front. If its sizes both increase and decrease, elements are half as foreshortened.
+- Other exemplars are used in several sizes, which add samples of each scale. A patch has the additional cost (log S_e
+  - log S_o)^2 at a place, because ratios of scales are visible. The paper treats the scale as another channel of the
+  windows. On planes, a reduced element costs 1/7 of an enlarged one, because enlarged elements are blurred. The
+  output's scale map is not changed.
+- The result is a set of source coordinates. Colours are copied from there instead of averaged, so that they are not
+  blurred.
+- A target can be a surface: another plane, normals, texture coordinates, or Jacobians (`targets`). Patches are bent to
+  the surface, so that elements are foreshortened like it. The sizes of elements on the surface replace S_o.
+- Frame fields can rotate the copied texture on its surface (`directions`). Section 6 of the paper leaves directions of
+  elements to future work.
+- Instead of the histograms of Eq. 8, source places that were already copied often have a cost, as have overrepresented
+  classes of colour.
 
 ``method="paper"`` omits the departures (`texrs.papers.perspective.literal`).
 """
@@ -84,58 +86,59 @@ def perspective(
     interpolation: Interpolation = "cubic",
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Make an image whose elements have the sizes of a scale map.
+    """Synthesise an image whose elements have the sizes that a scale map gives.
 
     Parameters
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Example image, of any real dtype and number of channels, at least 16 pixels a side.
     scale_map : (H, W) float array, Plane, "auto" or "front"
-        Size of the exemplar's elements at each pixel, positive. Only ratios count (`texrs.scale_maps`). `texrs.Plane`
-        or its words ``"plane:slant=50,tilt=90,fov=60"`` give the sizes on a plane. "auto": the sizes on the plane in
-        the image (`texrs.planes.find`), or else measured sizes (`texrs.planes.measure_scale`). "front": one size.
+        Size of the exemplar's elements at each pixel, above 0, in any unit (`texrs.scale_maps`). A `texrs.Plane`, or a
+        text such as ``"plane:slant=50,tilt=90,fov=60"``, gives the sizes on a plane. "auto" uses the plane that is
+        found in the image (`texrs.planes.find`), or else measures the sizes (`texrs.planes.measure_scale`). "front"
+        means that all elements have the same size. Default: "auto".
     size : int or (int, int), optional
         Size of the result in pixels. Default: the size of ``target``, or else twice the size of the exemplar.
     target : array or Plane, optional
         Requested size of elements at each pixel of the result, in the units of ``scale_map``. It is a scale map, or a
-        surface that the texture is placed on. `texrs.Plane` or its words give another plane, with elements of size 1
+        surface that the texture is placed on. A `texrs.Plane` or its text gives another plane, with elements of size 1
         in its middle. Normals (rows, columns, 3) describe a curved surface, seen from far away. Coordinates (rows,
-        columns, 2) on a surface, or Jacobians (rows, columns, 2, 2), give the step on the texture of a step at each
+        columns, 2) on a surface, or Jacobians (rows, columns, 2, 2), specify the step on the texture for a step of one
         pixel (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`,
-        `texrs.Plane.jacobians`). A target of another size is stretched to the result, borders on borders
-        (`texrs.scale_maps.resample`). None: ``scale_map``, stretched.
+        `texrs.Plane.jacobians`). A target of another size is resized so that its borders are the borders of the result
+        (`texrs.scale_maps.resample`). Default: ``scale_map``, resized.
     target_green : {"up", "down"}
         Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX). Default: "up".
     scale_kind : {"width", "area"}, optional
-        Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
-        "area", square roots of areas. The target has the same quantity. Default: the quantity that fits the scale map
-        best as a map of a plane.
+        Quantity that a map contains, if the map does not state it (`texrs.scale_maps.ScaleMap`): "width" (widths
+        across the slope) or "area" (square roots of areas). The target has the same quantity. Default: the quantity
+        for which the scale map fits a plane best.
     fov : float, optional
-        Angle of view of the longer side of the exemplar in degrees, 1 to 170. Default: 60 (`texrs.planes.FOV`). It
-        determines the foreshortening of a plane, in addition to a scale map. A ``target`` that is a surface, and
-        ``direction``, need it. Ignored if ``scale_map`` is a plane, which has its own.
+        Angle of view of the longer side of the exemplar in degrees, 1 to 170. It determines the foreshortening of a
+        plane, in addition to a scale map. A ``target`` that is a surface uses it, and so does ``direction``. Cannot be
+        combined with a plane as ``scale_map``, which has its own angle. Default: 60 (`texrs.planes.FOV`).
     direction : float, (rows, columns) array or Field, optional
         Counter-clockwise rotation of the copied texture in degrees: one number, or one per pixel. Maps of another size
-        are stretched. A `texrs.fields.Field` of two axes, or its words such as ``"circular"`` or
-        ``"zigzag:period=64,angle=30"``, gives the rotation of the field. On a plane or another surface the texture
-        rotates on it. Default: 0.
+        are resized. A `texrs.fields.Field` with two axes, or a text such as ``"circular"`` or
+        ``"zigzag:period=64,angle=30"``, gives the rotation of the field. On a plane or another surface, the texture
+        rotates within this surface. Default: 0.
     scale_measurement : Measuring, optional
-        Measurement of a ``scale_map`` "auto" in a mask of features (`texrs.scale_maps.Measuring`), instead of by a
-        plane.
+        Options that measure the sizes for ``scale_map="auto"`` in a mask of features (`texrs.scale_maps.Measuring`).
+        Default: the sizes come from a plane in the image.
     method : {None, "paper"}
-        Algorithm to use. "paper" is the algorithm as printed, for comparison. It averages windows and is slow. It does
-        not wrap, and takes up to four channels. Default: the algorithm with departures from the paper.
+        Algorithm to use. "paper" is the algorithm as printed, for comparison. It averages windows and is slow,
+        supports at most four channels, and cannot wrap. Default: the algorithm with departures from the paper.
     scale_weight : float
-        Weight of the requested scale compared with similarity to the exemplar, 0 to 16. Copies are chosen by this
-        weight only. Elements on a plane have their size in any case, but another sharpness. If 0, scales are ignored.
-        Default: 1.
+        Weight of the requested scale compared with similarity to the exemplar, 0 to 16. It decides which resized
+        copies are used. Elements on a plane have the requested size with any weight above 0, but another sharpness. If
+        0, scales are ignored. Default: 1.
     augment_scales : {"auto", True, False} or sequence of float
-        Resizing of the exemplar. True: a plane is flattened and shown at any depth, and other exemplars are copied in
-        other sizes. "auto": as True, but without copies if the exemplar has enough of every requested scale. False:
-        requested scales that it lacks become the nearest existing ones, with a warning. Numbers of 1/8 to 4: copies in
-        these sizes, no plane. Default: "auto".
+        Resizing of the exemplar. If True, a plane is flattened and shown at any depth, and other exemplars are copied
+        in other sizes. "auto" does the same, but without copies if the exemplar has enough of every requested scale.
+        If False, the nearest existing scales replace missing ones, with a warning. Numbers from 1/8 to 4 are the sizes
+        of copies, and planes are not flattened. Default: "auto".
     wrap : bool or (rows, columns), optional
-        Axes along which the result is periodic. Default: none. The target must also be periodic.
+        Axes along which the result is periodic. The target must also be periodic along these axes. Default: none.
     seed : int
         Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     interpolation : {"nearest", "linear", "cubic"}
@@ -147,38 +150,39 @@ def perspective(
     Returns
     -------
     Synthesis
-        The image and its source map. The labels of the source map are the patches, and its frames describe how the
-        exemplar is seen at each pixel. ``source_map.render(map, antialias=True)`` applies the result to any map in
-        register.
+        The image and its source map. The labels of the source map number the patches, and its frames contain the scale
+        and foreshortening at each pixel. ``source_map.render(map, antialias=True)`` applies the result to any other
+        map of the exemplar.
 
         Stages:
 
         - ``sheet``: The flattened example that patches are cut from.
-        - ``target``: The scale map that was followed.
+        - ``target``: The requested scale map, limited to the scales that are available.
         - ``before_blending``: The result.
 
         Report:
 
         - ``method``: "default" or "paper".
         - ``seed``: The seed.
-        - ``scale_weight``: Weight of the scale.
-        - ``measured``: The result of a ``scale_map`` "auto", as `texrs.planes.ScaleEstimate`; else None.
-        - ``sheet``: ``kind`` and ``resolution`` of the flattened example.
+        - ``scale_weight``: Weight of the requested scale.
+        - ``measured``: Measured element sizes for ``scale_map="auto"``, as `texrs.planes.ScaleEstimate`, or None.
+        - ``sheet``: ``kind`` and ``resolution`` of the sheet that patches are cut from.
         - ``surface``: Whether the target is a surface.
         - ``turned``: Whether a direction was given.
-        - ``outside``: ``share`` of the target beyond the scales of the example, and the largest ``factor``.
-        - ``scale_error``: Mean error of the scale, as a natural logarithm.
+        - ``outside``: ``share`` of the target beyond the available scales, 0 to 1, and the largest ``factor`` beyond
+          them.
+        - ``scale_error``: Mean error of element sizes, as the natural logarithm of a ratio.
         - ``wrap``: Whether the result repeats along (rows, columns).
         - ``interpolation``: Interpolation between samples of the example.
         - ``elements``: Number of elements that were found.
         - ``stitched``: Number of ``patches``, mean cost of the ``seams`` and number of ``healed`` patches.
-        - ``energies``: For the paper's method, the energy of each round, by level.
+        - ``energies``: Energy of each round and pyramid level, only with ``method="paper"``.
 
     Raises
     ------
     InvalidInput
-        If maps have other shapes, or scales that are not positive, or the exemplar is too small. Also if the exemplar
-        has no scale of the target, or the target is not periodic like the result.
+        If a map has another shape or scales that are not positive, or the exemplar is too small. Also if the exemplar
+        has none of the target's scales, or the result wraps but the target is not periodic.
     Cancelled
         If the work was stopped.
 
@@ -248,7 +252,7 @@ def perspective(
         seed=asked.seed,
         progress=progress,
     )
-    # Reduced parts of the exemplar are smoothed in the look-up, because they would alias.
+    # Smooth reduced parts of the exemplar in the look-up, because they would alias otherwise.
     source = SourceMap.from_coordinates(
         found.coordinates, asked.exemplar.shape, label=found.patches, jacobian=found.frames
     ).with_finish(asked.wrap, interpolation=asked.interpolation, antialias=True)

@@ -1,4 +1,4 @@
-"""Directions of elements, which the paper leaves to future work (section 6): rotation of the copied texture."""
+"""Rotate the elements of the copied texture by angles or a field, which the paper leaves to future work (section 6)."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def follow_field(field: Field, size: tuple[int, int]) -> tuple[NDArray[np.float6
 def normalise(
     cosine: NDArray[np.float64], sine: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return both divided by their length. Zero vectors give no rotation."""
+    """Return (cosine, sine), scaled to length 1. Zero vectors become rotations by 0 degrees."""
     length = np.sqrt(cosine * cosine + sine * sine)
     there = length > 1e-6
     safe = np.where(there, length, 1.0)

@@ -1,8 +1,9 @@
-"""PERSPECTIVE as printed: averages of windows, re-weighted, with the scale as another channel (section 4).
+"""PERSPECTIVE as printed: iterated weighted averages of windows, with the scale as another channel (section 4).
 
-For comparison only. The paper leaves these details open: windows are 8 x 8 at three resolutions, every second one. The
-scale has the variance of all colours together. Histograms have 16 bins, in units of a uniform distribution, and are
-counted again in each round. Distances are kept above zero, where Eq. 6 has no weight. Eq. 8 is read as a sum over
+For comparison only. The paper leaves some details open. Here windows are 8 x 8 pixels at three resolutions, and every
+second one is used. The scale is multiplied so that its standard deviation is the sum of the deviations of all
+channels. Histograms have 16 bins, are relative to a uniform distribution, and are counted again in each round.
+Distances have a positive minimum, because the weight of Eq. 6 is infinite at zero. Eq. 8 is read as a sum over
 histograms (its k is not the number of bins), separately at each pixel of a window.
 """
 
@@ -29,8 +30,11 @@ from texrs.synthesis import Synthesis
 __all__ = ["average", "average_windows"]
 
 SIDE, SPACING = 8, 2
+"""Side of a window, and distance between windows of the output, in pixels."""
 ROUNDS = (20, 10, 6)
+"""Number of rounds at each level of the pyramid, from coarse to fine."""
 BINS = 16
+"""Number of bins of a histogram."""
 R = 0.8
 """Exponent of Eq. 5."""
 AT_ONCE = 256
@@ -42,7 +46,7 @@ Doubles = NDArray[np.float64]
 
 
 def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
-    """Run the algorithm of the paper. The stage ``before_blending`` shows the sources of the averages."""
+    """Synthesise a texture by the paper's algorithm. Its stage ``before_blending`` copies each pixel's main source."""
     image, target = asked.exemplar.pixels, asked.target
     if any(asked.wrap):
         raise InvalidInput("wrap: cannot be combined with method='paper'")
@@ -68,7 +72,7 @@ def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
 def average(
     image: Array, scale: Floats, target: Floats, *, weight: float, seed: int, progress: Progress | None
 ) -> tuple[Array, Floats, list[list[float]]]:
-    """Minimise Eq. 5 from coarse to fine."""
+    """Return the image that minimises Eq. 5 from coarse to fine, its main source positions, and the energies."""
     exemplars, scales, targets = [to_unit(image)], [scale], [target]
     while len(exemplars) < len(ROUNDS) and min(*exemplars[-1].shape[:2], *targets[-1].shape) >= 4 * SIDE:
         exemplars.append(halve(exemplars[-1]))
@@ -115,12 +119,12 @@ def bring_back(x: Doubles, like: Array) -> Array:
 
 
 def scatter(e: Doubles, scale: Floats, target: Floats, seed: int) -> Doubles:
-    """Return for each point a random colour among the samples of nearest scale: 4 in 100, at least 12."""
+    """Return a random colour for each pixel, drawn from the 4 % of samples nearest in scale, and from at least 12."""
     order = np.argsort(scale, axis=None, kind="stable")
     some = min(order.size, max(12, order.size // 25))
     rank = np.searchsorted(scale.ravel()[order], target.ravel())
     first = np.clip(rank - some // 2, 0, order.size - some)
-    # One random number a point, from its position and not from a stream.
+    # Draw one random number per pixel, which depends only on the seed and the pixel's index.
     share = np.random.Philox(key=seed).random_raw(target.size) >> np.uint64(32)
     drawn = order[first + (share * np.uint64(some) >> np.uint64(32)).astype(np.intp)]
     picked: Doubles = e.reshape(-1, e.shape[-1])[drawn].reshape(*target.shape, -1)
@@ -140,7 +144,7 @@ def double(x: Doubles, shape: tuple[int, ...]) -> Doubles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Search:
-    """Projected windows of the exemplar, ready for search."""
+    """Search tree of the exemplar's windows, projected on principal components."""
 
     e: Doubles
     bases: list[tuple[Doubles, Doubles]]
@@ -151,7 +155,7 @@ class Search:
 
     @classmethod
     def of(cls, e: Doubles, scale: Doubles) -> Search:
-        """Project the windows: colours to 95 % of their variance and scales to 99 %, separately (section 4.2)."""
+        """Project windows on components with 95 % of the variance of colours, and 99 % of scales (section 4.2)."""
         from scipy.spatial import cKDTree
 
         parts, bases, variance = [], [], 0.0
@@ -180,13 +184,13 @@ class Search:
             variance += float(total[-1])
         vectors = np.concatenate(parts, axis=1)
         ask()
-        # The first of equal windows is used.
+        # Keep only the first of equal windows.
         first = np.sort(np.unique(vectors, axis=0, return_index=True)[1])
         ask()
         return cls(e, bases, cKDTree(vectors[first]), first, NEAREST * max(variance, 1e-12), e.shape[1] - SIDE + 1)
 
     def step(self, x: Doubles, scale: Doubles) -> tuple[Doubles, NDArray[np.intp], float]:
-        """Search the nearest window for each window of the output, then average them: one round."""
+        """Run one round: find the nearest exemplar window for each output window, then average the found windows."""
         seen = []
         for values, (mean, axes) in zip((x, scale[..., np.newaxis]), self.bases, strict=True):
             ask()
@@ -223,7 +227,7 @@ class Search:
 
 
 def _find_starts(n: int, spacing: int) -> NDArray[np.intp]:
-    """Return the starts of windows: at regular distances, and at the end."""
+    """Return the first pixels of windows along an axis: one every ``spacing`` pixels, and one at the end."""
     return np.unique(np.append(np.arange(0, n - SIDE + 1, spacing), n - SIDE))
 
 

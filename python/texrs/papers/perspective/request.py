@@ -40,39 +40,39 @@ __all__ = ["Method", "Request"]
 Method: TypeAlias = Literal["paper"] | None
 
 LEAST = 16
-"""Minimum side of an exemplar."""
+"""Minimum side of an exemplar, in pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Request:
-    """Checked arguments of a synthesis.
+    """Checked arguments of `texrs.perspective`.
 
     Attributes
     ----------
     exemplar : Exemplar
-        Exemplar.
+        The example image.
     scale : (H, W) float32
-        Size of its elements.
+        Size of the exemplar's elements at each pixel.
     target : (rows, columns) float32
-        Requested size of the output's elements.
+        Requested size of elements at each pixel of the output.
     kinds : (kind, kind)
-        Quantities in the two maps. None if unknown.
+        Quantities in ``scale`` and in ``target``: "width" or "area", or None if unknown.
     measured : texrs.planes.ScaleEstimate, optional
         Element sizes measured in the image, and their confidence.
     plane : texrs.Plane, optional
         Plane that the exemplar shows, if given.
     surface : (rows, columns, 2, 2) float64, optional
-        Surface that the output shows. The target contains the resulting sizes.
+        Jacobians of the surface that the output shows. ``target`` contains the sizes of elements on it.
     turn : (rows, columns, 2, 2) float64, optional
         Rotations of the copied texture.
     fov : float
         Angle of view of the exemplar's longer side in degrees.
     method : {None, "paper"}
-        Algorithm.
+        Algorithm to use.
     strength : float
-        Weight of the scale.
+        Weight of the requested scale, 0 to 16.
     sizes : {"auto", True, False} or sequence of float
-        Sizes of the copies.
+        Resizing of the exemplar, or sizes of its copies.
     wrap : (bool, bool)
         Axes along which the output is periodic.
     seed : int
@@ -144,7 +144,7 @@ class Request:
             raise InvalidInput(
                 "method: cannot be combined with surfaces or directions; give a scale map as target, or omit the method"
             )
-        # Measure the scale map, and bring the target to the size of the result.
+        # Determine the scale map, and resize the target to the result.
         plane, scale, measured = find_scale(known, scale_map, scale_measurement)
         mine = as_map(scale, "scale_map", known.shape)
         kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said
@@ -178,7 +178,10 @@ class Request:
         return None if self.measured is None else self.measured.as_dict()
 
     def match_kinds(self, power: float) -> Request:
-        """Return the arguments with a target of the exemplar map's quantity: a power converts to widths."""
+        """Return the arguments with the target converted to the quantity of the exemplar's scale map.
+
+        The exemplar's quantity, raised to ``power``, is a width.
+        """
         theirs = {None: power, "width": 1.0, "area": AREAS}[self.kinds[1]]
         return self if theirs == power else replace(self, target=power_single(self.target, theirs / power))
 
@@ -186,7 +189,7 @@ class Request:
 def find_scale(
     exemplar: Exemplar, scale_map: Array | Plane | str, scale_measurement: Measuring | None
 ) -> tuple[Plane | None, Array, Measured | None]:
-    """Return the given plane of an exemplar, the size of its elements, and the measurement."""
+    """Return the plane of an exemplar or None, the size of its elements per pixel, and the measurement or None."""
     if scale_measurement is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
         raise InvalidInput(
             "scale_measurement: cannot be combined with a scale map, because nothing is measured; omit one of them"
@@ -212,7 +215,7 @@ def find_scale(
 
 
 def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
-    """Refuse a target that is not periodic along the output's periodic axes, by values that must not jump there."""
+    """Raise an error if values of a target jump at the border, although the output is periodic along this axis."""
     for axis, closed in enumerate(wrap):
         if not closed:
             continue

@@ -1,4 +1,4 @@
-"""Sizes of copies of an exemplar that is not a plane, and the parts of a target that they cannot give."""
+"""Sizes of the copies of an exemplar that is not a plane, and the parts of a target beyond these sizes."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ __all__ = ["Outside", "Sizes", "bring_within", "check_sizes", "choose_sizes", "c
 Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
 
 FACTORS = (1.0, 0.8, 0.64, 1.25, 1.5625)
-"""Sizes of the copies in an atlas, the exemplar first."""
+"""Default sizes of copies, relative to the exemplar, whose own size is the first."""
 PLENTY = 0.75
-"""Minimum number of samples of about the requested scale for each output point, if the atlas has the exemplar only."""
+"""Minimum number of exemplar samples per output pixel of similar scale, for which copies are not needed."""
 ALIKE = 0.1
-"""Natural logarithm of the ratio of scales that count as equal."""
+"""Maximum natural logarithm of the ratio of two scales that count as equal."""
 
 
 def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Slope | None) -> tuple[float, ...]:
-    """Return the sizes of the copies, the exemplar's own first, or the possible sizes of a plane."""
+    """Return the sizes of the copies, starting with 1, or for a plane 1, the minimum and the maximum size."""
     if plane is not None:
         return (1.0, SMALLEST, LARGEST)
     given = check_sizes(asked)
@@ -39,7 +39,7 @@ def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Slope | Non
 
 
 def check_sizes(asked: object) -> tuple[float, ...] | None:
-    """Return the given sizes, 1 first. None if they will be chosen."""
+    """Return the given sizes of copies, starting with 1, or None if sizes are chosen automatically."""
     if isinstance(asked, bool | np.bool_):
         return None if asked else (1.0,)
     if isinstance(asked, str) and asked == "auto":
@@ -52,7 +52,7 @@ def check_sizes(asked: object) -> tuple[float, ...] | None:
 
 
 def count_samples(scale: Floats, target: Floats) -> float:
-    """Return the minimum over points of the number of exemplar samples of about the requested scale."""
+    """Return the minimum over all scales of the number of exemplar samples per output pixel of similar scale."""
     mine, theirs = np.sort(log_single(scale), axis=None), log_single(target).ravel()
     bins = np.arange(theirs.min(), theirs.max() + ALIKE, ALIKE)
     asked = np.histogram(theirs, np.append(bins, bins[-1] + ALIKE))[0]
@@ -64,13 +64,13 @@ def count_samples(scale: Floats, target: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Outside:
-    """Part of a target beyond the existing scales: its share, and the maximum factor."""
+    """Part of a target beyond the available scales: its share, 0 to 1, and the largest factor beyond them."""
 
     share: float
     factor: float
 
     def describe(self, sizes: Sequence[float]) -> str:
-        """Return the text for the caller."""
+        """Return the text of a warning about this part."""
         way = "; augment_scales='auto' adds resized copies" if len(sizes) == 1 else ""
         return (
             f"target: {self.share:.1%} of it is outside the scales of the exemplar's copies, by a factor of up to "
@@ -79,7 +79,7 @@ class Outside:
 
 
 def bring_within(scale: Floats, target: Floats, sizes: Sequence[float]) -> tuple[Floats, Outside]:
-    """Limit a target to the scales of the copies, and return the part beyond them."""
+    """Return a target limited to the scales of the copies, and a description of the part beyond them."""
     low, high = float(scale.min()) * min(sizes), float(scale.max()) * max(sizes)
     slack = 1 + 1e-3
     beyond = (target < low / slack) | (target > high * slack)

@@ -1,4 +1,4 @@
-"""Preparation of the exemplar for an output: the sheet to cut patches from, and its view (see the verb's departures)."""
+"""Prepare the exemplar for an output: the sheet that patches are cut from, and how the output shows it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["PreparedExemplar", "lay_out"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedExemplar:
-    """A prepared exemplar.
+    """An exemplar as a sheet of patches, with the sizes that the output requests.
 
     Attributes
     ----------
@@ -32,13 +32,13 @@ class PreparedExemplar:
     target : (rows, columns) float32
         Requested size of elements, in the units of the sheet.
     wanted : (rows, columns) float32
-        The same as the caller requested it, if given.
+        The same sizes in the units of the caller's target, limited to the available scales.
     frames : (points, 2, 2) int16, optional
-        View of the sheet. None if the target determines it.
+        Jacobians of the sheet at each point of the output. None if ``target`` determines them.
     outside : Outside
-        Requested scales that do not exist.
+        Part of the requested scales that are not available.
     sizes : sequence of float
-        Sizes of the copies, or the possible sizes of a plane.
+        Sizes of the copies, or the possible sizes of a plane, relative to the exemplar.
 
     """
 
@@ -51,7 +51,7 @@ class PreparedExemplar:
 
 
 def lay_out(asked: Request) -> PreparedExemplar:
-    """Prepare an exemplar for the requested output."""
+    """Prepare the sheet of an exemplar for the requested output."""
     colours = asked.exemplar.guidance
     plane = find_slope(asked, colours)
     if asked.surface is not None:
@@ -75,7 +75,7 @@ def lay_out(asked: Request) -> PreparedExemplar:
 
 
 def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Slope | None) -> PreparedExemplar:
-    """Prepare an exemplar for a surface: its plane flattened, the image as it is from the front, or copies."""
+    """Prepare an exemplar for a surface: as a flattened plane, a frontal image, or copies in several sizes."""
     areas = asked.target.astype(np.float64)
     front = plane is None and is_frontal(asked)
     scale, target, power = asked.scale, asked.target, 1.0
@@ -100,12 +100,12 @@ def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, pla
 
 
 def turned(asked: Request, surface: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a surface with a rotated texture."""
+    """Return the Jacobians of a surface, with the texture rotated in the requested direction."""
     return surface if asked.turn is None else multiply(asked.turn, surface)
 
 
 def is_frontal(asked: Request) -> bool:
-    """Return whether an exemplar may be resized and has elements of one size."""
+    """Return whether an exemplar can be resized and has elements of one size."""
     free = asked.strength > 0 and asked.sizes in (True, "auto")
     return free and float(asked.scale.max()) < LEVEL * float(asked.scale.min())
 

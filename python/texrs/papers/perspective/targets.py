@@ -1,8 +1,8 @@
-"""Target of an output (section 4): the size of elements at each pixel, or a surface below the texture.
+"""Target of an output (section 4): the size of elements at each pixel, or a surface that the texture covers.
 
-The paper has scale maps only. A surface also states that elements are foreshortened more along one direction than
-along another. It is given as a plane, by its normals, by its texture coordinates, or by Jacobians. All become
-Jacobians: the step on the texture for a step in the image, at each pixel.
+The paper has only scale maps. A surface also specifies that elements are foreshortened more along one direction than
+along another. It is given as a plane, normals, texture coordinates or Jacobians. All are converted to Jacobians: the
+step on the texture for a step of one pixel in the image, at each pixel.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from texrs.scale_maps._resample import stretch
 __all__ = ["Surface", "as_surface", "as_target", "find_size", "is_map", "is_words", "read_plane"]
 
 PREFIX = "plane:"
-"""Prefix of the words that describe a plane."""
+"""Prefix of a text that describes a plane."""
 WORDS = ("slant", "tilt", "fov", "rotation")
 NEAREST = 0.02
-"""Minimum scale of a plane that is shown, as a share of the scale in the middle. Smaller scales are near the horizon.
+"""Minimum scale in an image of a plane, as a share of the scale in its middle. Smaller scales are near the horizon.
 """
 
 Surface: TypeAlias = NDArray[np.float64]
-"""Jacobians (rows, columns, 2, 2)."""
+"""Jacobians (rows, columns, 2, 2): the step on the texture for a step of one pixel in the image."""
 
 
 def as_target(target: object, green: Literal["up", "down"] = "up") -> Plane | str | Floats | Surface | None:
-    """Check a target before its size is known: a plane, its words, a scale map, or Jacobians."""
+    """Return a checked target: a plane, its text, a scale map, or the Jacobians of a surface."""
     if target is None or isinstance(target, Plane):
         return target
     if isinstance(target, str):
@@ -58,7 +58,7 @@ def as_target(target: object, green: Literal["up", "down"] = "up") -> Plane | st
 
 
 def find_size(target: Plane | str | Array | None) -> tuple[int, int] | None:
-    """Return the size of a target, if it has one."""
+    """Return the (rows, columns) of a target, or None if it does not have a size."""
     if target is None or isinstance(target, str):
         return None
     return target.shape[0], target.shape[1]
@@ -70,12 +70,15 @@ def is_map(target: Plane | str | Floats | Surface) -> TypeGuard[Floats]:
 
 
 def is_words(value: object) -> TypeGuard[str]:
-    """Return whether a value is the text of a plane."""
+    """Return whether a value is a text that describes a plane."""
     return isinstance(value, str) and value.startswith(PREFIX)
 
 
 def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) -> Surface:
-    """Return the Jacobians of a surface in an image of a size: planes get a finer camera, others are stretched."""
+    """Return the Jacobians of a surface in an image of a given size.
+
+    A plane gets a camera of this size, and other surfaces are resized.
+    """
     if isinstance(target, str):
         target = read_plane(target, size, "target")
     if not isinstance(target, Plane):
@@ -93,7 +96,7 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
 
 
 def read_plane(words: str, shape: Sequence[int], name: str) -> Plane:
-    """Return the plane in words: ``plane:slant=50,tilt=90,fov=60``."""
+    """Return the plane that a text such as ``plane:slant=50,tilt=90,fov=60`` describes."""
     form = f"{name}: must be plane:slant=DEGREES and, if known, tilt=, fov= and rotation=, separated by commas"
     if not words.startswith(PREFIX):
         raise InvalidInput(f"{form}; got {words!r}")
