@@ -29,15 +29,15 @@ from texrs.materials import Material
 from texrs.point_sets import directions, spacing
 
 FEWEST = 3
-"""Minimum number of elements in a layout."""
+"""Minimum number of elements of a texture."""
 SHORTEST = 16
 """Minimum side of an image, in pixels."""
 AGAIN = 0.8
-"""Minimum number of elements for a better box, as a share of those that the proposed box found."""
+"""Minimum number of elements found with a better box, as a share of the number found with the proposed box."""
 SURE = 0.9
-"""Confidence of proposals from the colours of a material that makes an analysis of its other maps unnecessary."""
+"""Minimum confidence of the analysis of a material's colours for skipping the analysis of its other maps."""
 LITTLE, MUCH = 0.02, 0.95
-"""Minimum and maximum plausible share of foreground in a mask."""
+"""Minimum and maximum plausible share of the image that is foreground."""
 
 
 def analyse(
@@ -105,9 +105,9 @@ def analyse(
     Raises
     ------
     InvalidInput
-        An argument has another shape, type or range, or the box is outside the image. The background contradicts the
-        box or the mask, or the layout contradicts the mask. Corrections are impossible, or fewer than three elements
-        are found.
+        An argument has an invalid shape, type or range, or the box is outside the image. The background contradicts
+        the box or the mask, or the layout contradicts the mask. A correction is impossible, or fewer than three
+        elements are found.
 
     References
     ----------
@@ -172,7 +172,7 @@ def analyse(
 
 
 def _choose_map(material: Material, look: Callable[[Array], ElementAnalysis]) -> ElementAnalysis:
-    """Return the analysis of a material's colours, or of all its maps if that is more certain."""
+    """Analyse the colours of a material, and also all its maps if the result is uncertain. Return the surer result."""
     entries: list[ElementAnalysis] = []
     trouble: InvalidInput | None = None
     for pixels in (material.base, material.guide):
@@ -189,12 +189,12 @@ def _choose_map(material: Material, look: Callable[[Array], ElementAnalysis]) ->
 
 
 def _be_sure(entry: ElementAnalysis) -> float:
-    """Return the confidence of the least certain proposal."""
+    """Return the lowest confidence of the proposals of an analysis, 0 to 1. 1 if nothing was proposed."""
     return float(min(entry.report["confidence"].values(), default=1.0))
 
 
 def _repeat_channel(guide: Floats) -> Floats:
-    """Return colours with one or three channels, by repeating the first of two."""
+    """Return colours with two channels as three channels, by repeating the first one. Others are unchanged."""
     return np.concatenate([guide, guide[..., :1]], axis=-1) if guide.shape[-1] == 2 else guide
 
 
@@ -207,7 +207,7 @@ def _check(given: Arguments, start: Start, how: Settings) -> None:
 
 
 def _detect(guide: Floats, given: Arguments, start: Start, how: Settings, progress: Any) -> Detections:
-    """Find the places that look like the element, or use the given points with full similarity."""
+    """Find the places that look like the element. Given points are used instead, with similarity 1."""
     if given.points is not None:
         size = guide.shape[:2]
         pixels = np.clip(np.floor(given.points + 0.5).astype(np.intp), 0, np.array(size) - 1)
@@ -227,7 +227,7 @@ def _detect(guide: Floats, given: Arguments, start: Start, how: Settings, progre
 
 
 def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Separation:
-    """Separate the elements from the background, and reconcile detections and mask for the layout."""
+    """Find the pixels of the elements, and correct the detected elements by their pixels."""
     mask = given.whole if given.whole is not None else _cut(guide, given, start, found, how)
     plain = Separation(found.points, found.scores, np.arange(len(found.points)), mask, "cut")
     if how.literal or not len(found.points):
@@ -237,7 +237,7 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
         own = given.shape if given.shape is not None else _mask.ellipse(start.box.size)
         certain = given.whole is not None
         agreed = reconcile(mask, found, own, how.wrap, certain=certain)
-        # The user's points stay as they are. Only the mask is adapted.
+        # Keep the points of the user, and adapt only the mask.
         return replace(plain, mask=agreed.mask, made_by=agreed.made_by) if listed else agreed
     jointed = start.layout == Layout.JOINTED
     if not listed and (jointed or mask[find_nearest_pixels(found.points, mask.shape)].mean() < 0.5):
@@ -248,7 +248,7 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
 def _extend(
     guide: Floats, given: Arguments, start: Start, parted: Separation, how: Settings
 ) -> tuple[Start, Separation]:
-    """Extend separate elements by their common surroundings. Data from the user stay unchanged."""
+    """Extend separate elements by the surroundings that all share. Points and masks from the user are not changed."""
     said = given.points is not None or given.whole is not None or given.shape is not None
     if said or how.literal or start.layout != Layout.DISJOINT or not len(parted.points):
         return start, parted
@@ -262,7 +262,7 @@ def _extend(
 
 
 def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Bools:
-    """Cut out the foreground by its colours (section 3.3)."""
+    """Separate the foreground from the background by their colours (section 3.3)."""
     mask = _mask.cut_foreground(
         to_lab(guide),
         np.concatenate([[start.box.centre], found.pixels]),
@@ -284,9 +284,9 @@ def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: 
 def _reanalyse(
     pixels: Array, given: Arguments, start: Start, parted: Separation, how: Settings, progress: Progress
 ) -> ElementAnalysis | None:
-    """Analyse again from the box of a typical mask component.
+    """Repeat an analysis with the box of a typical element that was found.
 
-    The proposed box may not be centred on an element.
+    This helps because a proposed box is not always centred on an element.
 
     Return None if the box was given, or if the new box finds far fewer elements.
     """
@@ -315,7 +315,7 @@ def _reanalyse(
 def _make_entry(
     pixels: Array, given: Arguments, start: Start, found: Detections, parted: Separation, how: Settings
 ) -> ElementAnalysis:
-    """Return the entry of a texture, with a report of the results and decisions."""
+    """Return the analysis of a texture with its report."""
     report: dict[str, Any] = {
         "proposed": start.proposed,
         "warnings": _list_doubts(given, start, parted, how),
@@ -348,7 +348,7 @@ def _make_entry(
 
 
 def _list_doubts(given: Arguments, start: Start, parted: Separation, how: Settings) -> list[str]:
-    """Return warnings about the result, as texts."""
+    """Return warnings about an implausible result."""
     share = parted.mask.mean()
     found = [] if given.whole is not None else [find_contradiction(parted.mask, start.layout, how.wrap)]
     if not LITTLE <= share <= MUCH:
@@ -357,6 +357,6 @@ def _list_doubts(given: Arguments, start: Start, parted: Separation, how: Settin
 
 
 def _sample_places(marked: Bools, most: int = 64) -> list[list[int]]:
-    """Return about ``most`` marked pixels at most, evenly spread."""
+    """Return the positions of up to ``most`` marked pixels, evenly spread."""
     places: NDArray[np.intp] = np.argwhere(marked)
     return [[int(r), int(c)] for r, c in places[:: max(1, len(places) // most)]]

@@ -20,16 +20,16 @@ Shape = tuple[int, int]
 Wrap = tuple[bool, bool]
 
 LEAST, MOST = 3, 100_000
-"""Minimum side of a box in pixels, and maximum number of points."""
+"""Minimum side of a box in pixels, and maximum number of points that a user can give."""
 CENTRE = 0.5
-"""Central part of a box, as a share of its sides, that certainly is foreground unless the foreground is a net."""
+"""Size of the central part of a box that certainly is foreground, as a share of its sides. Not used for a net."""
 MAIN = 0.5
-"""Minimum share of a connected foreground, or background, in its largest component."""
+"""Minimum share of a connected foreground or background that its largest component must have."""
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Centre and sides of the box of an element, in whole pixels. The sides are odd."""
+    """Box around an element: its centre and its sides, in whole pixels. The sides are odd."""
 
     centre: tuple[int, int]
     size: tuple[int, int]
@@ -37,7 +37,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arguments:
-    """Checked arguments about a texture. Each is None if it was not given.
+    """Checked arguments of an analysis. Arguments that were not given are None.
 
     Attributes
     ----------
@@ -46,13 +46,13 @@ class Arguments:
     layout : Layout
         Layout of the elements.
     background : (H, W) bool
-        Pixels that certainly are not in an element.
+        Pixels that are certainly outside all elements.
     mask : (H, W) bool
-        Foreground of the chosen element or of the whole image.
+        Foreground of the chosen element or of the whole image, as given.
     shape : (h, w) bool
-        Foreground in the box of the chosen element, if the mask specifies it.
+        Foreground within the box of the chosen element, if a mask was given.
     whole : (H, W) bool
-        The mask, if it covers the whole image.
+        The given mask, if it is a foreground of the whole image.
     points : (n, 2) float64
         Centres of the elements.
 
@@ -116,7 +116,7 @@ def as_box(value: object, shape: Shape, name: str = "box") -> Box:
 
 
 def as_points(value: object, shape: Shape, name: str) -> Points:
-    """Check a list of points (row, column): inside the image, finite and different."""
+    """Check a list of points (row, column): finite, different, and inside the image."""
     wanted = f"{name}: must be points (row, column), shape (n, 2)"
     try:
         points = np.asarray(value, np.float64)
@@ -150,7 +150,7 @@ def as_points(value: object, shape: Shape, name: str) -> Points:
 
 
 def as_background(value: object, shape: Shape) -> Bools | None:
-    """Check the known background, points or a mask. None if it is not given."""
+    """Return the known background as a mask, from points or a mask. None if it is not given."""
     if value is None:
         return None
     array = try_array(value) if not isinstance(value, Sequence) or len(value) else np.zeros((0, 2))
@@ -167,7 +167,7 @@ def as_background(value: object, shape: Shape) -> Bools | None:
 
 
 def choose_usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
-    """Return the box of the most typical mask component that no border cuts."""
+    """Return the box of the most typical component of a mask that is not cut by the border."""
     regions = rank_pieces(label_components(mask, wrap)[0], LEAST**2)
     if not regions or layout == Layout.CONNECTED:
         raise InvalidInput("box: must be given, because no component of the mask is entirely inside the image")
@@ -177,9 +177,9 @@ def choose_usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
 
 
 def split_mask(mask: Bools, box: Box, wrap: Wrap) -> tuple[Bools, Bools | None]:
-    """Return the foreground in the chosen element's box, and the mask if it covers the whole image.
+    """Return the foreground in the chosen element's box, and the mask if it describes the whole image.
 
-    The second is None otherwise.
+    The second value is None if the mask only describes the chosen element.
     """
     inside = np.zeros(mask.shape, bool)
     stamp(inside, np.array([box.centre]), np.ones(tuple(n + 2 for n in box.size), bool), wrap)
@@ -217,7 +217,7 @@ def check_consistency(mask: Bools | None, background: Bools | None, box: Box, la
 
 
 def find_contradiction(mask: Bools, layout: Layout, wrap: Wrap) -> str:
-    """Return how a mask contradicts a layout. Empty if it does not."""
+    """Return a sentence about how a mask contradicts a layout, or an empty text."""
     if mask.all() or not mask.any():
         return f"the mask is {'all' if mask.any() else 'no'} foreground"
     pieces, ground = (label_components(m, wrap)[0] for m in (mask, ~mask))

@@ -1,4 +1,4 @@
-"""Describe the arrangement of elements: their spacing, and their lattice or courses."""
+"""Describe how elements are arranged: their spacing, and their lattice or courses."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ __all__ = ["Arrangement", "describe_arrangement"]
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """The arrangement of elements.
+    """How elements are arranged.
 
     Attributes
     ----------
     spacing : float
-        Distance between neighbours, in pixels.
+        Usual distance between neighbours, in pixels.
     lattice : ((float, float), (float, float)) or None
-        The two steps, (rows, columns) in pixels, of the lattice of the elements. None without a lattice.
+        The two vectors of the lattice of the elements, (rows, columns) in pixels. None without a lattice.
     courses : tuple of float or None
-        The rows, in pixels, of the courses of the elements. None without courses.
+        Rows, in pixels, of the courses of the elements. None without courses.
     darker : bool
-        True if the rest (background, joints, or the openings of a net) is darker than the foreground.
+        True if the pixels outside the foreground are darker than it. These are the background, the joints, or the
+        openings of a net.
 
     Examples
     --------
@@ -46,12 +47,12 @@ class Arrangement:
     darker: bool
 
     def describe(self, layout: Layout) -> str:
-        """Return a description in words.
+        """Return a description of the arrangement in words.
 
         Parameters
         ----------
         layout : Layout
-            Layout of the elements, which determines the word for the space between them.
+            Layout of the elements. It determines the word for the space between them.
 
         Returns
         -------
@@ -81,7 +82,7 @@ class Arrangement:
 
 
 def describe_arrangement(image: Array, points: NDArray[np.float64], mask: Bools) -> Arrangement:
-    """Return the arrangement of elements.
+    """Measure the arrangement of elements.
 
     The arguments are the image, the centres (n, 2) with n >= 2, and the foreground (H, W).
     """

@@ -1,4 +1,4 @@
-"""Propose boxes for an element: blobs of every size, areas of a segmentation, cells of a lattice."""
+"""Propose boxes around one element, from blobs of every size, segmented areas and lattice cells."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from texrs.exemplar.segmentation import ElementOptions, segment
 SIGMAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
 """Standard deviations of the Gaussians for detecting blobs, in pixels."""
 A_KIND, PIECES = 3, 6
-"""Number of boxes for each size of blobs, and for segmented areas."""
+"""Maximum number of boxes for blobs of one size, and for segmented areas."""
 BLOB = 2.6
-"""Ratio of the side of the box around a blob to the standard deviation of its Gaussian.
+"""Side of the box around a blob, in standard deviations of its Gaussian.
 
-For a disc, the diameter has the ratio 2.83.
+The diameter of a disc is 2.83 standard deviations.
 """
 LARGEST = 0.34
-"""Maximum side of a box, as a share of the side of the image: three boxes must fit."""
+"""Maximum side of a box, as a share of the side of the image, so that nearly three boxes fit."""
 
 
 def propose_boxes(small: Floats) -> list[Box]:
-    """List candidate boxes without duplicates."""
+    """Return candidate boxes around one element, without duplicates."""
     size = (small.shape[0], small.shape[1])
     found: list[tuple[float, float, float, float]] = [*_find_blobs(small), *_find_pieces(small), *_find_periods(small)]
     kept: dict[tuple[int, ...], Box] = {}
@@ -41,7 +41,7 @@ def propose_boxes(small: Floats) -> list[Box]:
 
 
 def _find_blobs(small: Floats) -> list[tuple[float, float, float, float]]:
-    """Find blobs: maxima of the normalised Laplacian in scale and space (Lindeberg 1998)."""
+    """Return boxes around blobs: maxima of the normalised Laplacian in scale and space (Lindeberg 1998)."""
     from scipy.ndimage import gaussian_laplace, maximum_filter
 
     light = to_lab(small)[..., 0]
@@ -59,14 +59,14 @@ def _find_blobs(small: Floats) -> list[tuple[float, float, float, float]]:
             if len(places) < 3:
                 continue
             values = signed[k][tuple(places.T)]
-            # Prefer blobs of usual strength: the strongest are often not elements.
+            # Prefer blobs of usual strength, because the strongest blobs are often not elements.
             order = np.lexsort((places[:, 1], places[:, 0], np.abs(values - np.quantile(values, 0.7))))
             found += [(float(r), float(c), BLOB * sigma, BLOB * sigma) for r, c in places[order[:A_KIND]]]
     return found
 
 
 def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
-    """Return boxes of segmented areas of usual size."""
+    """Return boxes around segmented areas of the most usual size."""
     inner = rank_pieces(segment(small, ElementOptions(segmentation="components")).elements)
     if len(inner) < 3:
         return []
@@ -80,7 +80,7 @@ def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
 
 
 def _find_periods(small: Floats) -> list[tuple[float, float, float, float]]:
-    """Return boxes of one lattice cell, at the most even places of the image."""
+    """Return boxes of one lattice cell each, at the places of the image with the fewest edges."""
     from scipy.ndimage import gaussian_gradient_magnitude, uniform_filter
 
     regular = find_lattice(small)
@@ -103,7 +103,7 @@ def _find_periods(small: Floats) -> list[tuple[float, float, float, float]]:
 
 
 def resize_box(box: Box, size: tuple[int, ...]) -> list[Box]:
-    """List boxes with one or both sides longer or shorter by 1/3, if they fit."""
+    """Return larger and smaller variants of a box, with one or both sides changed by about 1/3, if they fit."""
     found = []
     for tall, wide in ((1.35, 1), (1, 1.35), (0.74, 1), (1, 0.74), (1.35, 1.35), (0.74, 0.74)):
         sides = (round_to_odd(box.size[0] * tall + 0.5), round_to_odd(box.size[1] * wide + 0.5))

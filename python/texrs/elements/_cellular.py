@@ -1,10 +1,10 @@
-"""Start an analysis from cells: if joints divide the whole image, each cell is an element.
+"""Start an analysis from cells. If joints divide the whole image, each cell is an element.
 
 A search for similar places fails on a wall, a honeycomb or a floor. The cells have many sizes, and only their joints
 are similar (`texrs.exemplar.cells`). Cells are used in two cases:
 
-- Without hints, if the image certainly consists of cells that do not look like objects.
-- With a box, if the cells are about as large as the box. The layout must not be "disjoint".
+- If no element is given, the image must certainly consist of cells that do not look like objects on a background.
+- If a box is given, the cells must be about as large as the box, and the layout must not be "disjoint".
 """
 
 from __future__ import annotations
@@ -27,35 +27,36 @@ from texrs.exemplar.shapes import mark_outlines
 __all__ = ["CellStart", "start_from_cells"]
 
 SURE = 0.8
-"""Minimum confidence in cells.
+"""Minimum confidence of the cells for using them.
 
-It was measured on 40 photographs. All with joints have more. Those without joints have less than 0.7, except heaps of
-stones, beans and peppers.
+It was chosen on 40 photographs. All photographs with joints have a higher confidence. Photographs without joints have
+less than 0.7, except heaps of stones, beans and peppers.
 """
 HEAPED, DARK = 0.95, 0.2
-"""Minimum confidence, and minimum contrast of joints in lightness from 0 to 1, for cells that look like objects on a
-background.
+"""Minimum confidence, and minimum lightness contrast of joints (0 to 1), for using cells that look like objects.
 
-Gaps between heaped fruit are dark enough for this, sand between pebbles is not.
+Gaps between heaped fruit are dark enough for this, but sand between pebbles is not.
 """
 FEWEST = 4
 """Minimum number of cells."""
 NARROW = 0.75
-"""Ratio of the search width of cells to the width of a box around one. The search then finds even fine joints.
+"""Width of the cells that are searched for, relative to the width of the given box.
+
+A smaller width also finds fine joints.
 """
 ALIKE = 1.35
-"""Maximum factor between the sides of a box and those of the usual cell."""
+"""Maximum ratio between a side of the given box and the side of the usual cell, in either direction."""
 NET = {-1: 0.125, 1: 0.075}
-"""Minimum contrast of joints (lightness from 0 to 1) times their share of the image for a net, cracks or wax.
+"""Minimum product of lightness contrast (0 to 1) and area share of joints that are a net, cracks or wax.
 
-The value for dark joints is higher, because gaps between stones are dark anyway.
+The key is the polarity. The value for dark joints (-1) is higher, because gaps between stones are dark as well.
 """
 FAINT = 0.02
-"""Minimum contrast of joints."""
+"""Minimum lightness contrast of joints, 0 to 1."""
 REACH = 0.15
-"""Maximum half width of a joint, in sizes of a cell."""
+"""Maximum half width of a joint, relative to the side of a usual cell."""
 BETWEEN = 0.5
-"""Minimum share of the given background that must look like joints."""
+"""Minimum share of the given background that must be in joints."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,11 +66,12 @@ class CellStart:
     Attributes
     ----------
     start : Start
-        Box of the most typical cell, layout and confidence.
+        Box of the most typical cell, with layout and confidence.
     found : Detections
         The cells, the most certain first.
     parted : Separation
-        The cells with the foreground: the cells themselves for jointed elements, else the joints.
+        The cells with the foreground. The foreground is the cells if they are jointed elements, and otherwise the
+        joints.
     labels : (H, W) int32
         Cell of each pixel, from 1 in the order of the detections; 0 in joints.
 
@@ -82,7 +84,7 @@ class CellStart:
 
 
 def start_from_cells(guide: Floats, given: Arguments, progress: Progress) -> CellStart | None:
-    """Return the cells of an image as elements.
+    """Return the cells of an image as its elements.
 
     None if the cells are uncertain or contradict the arguments.
     """
@@ -110,15 +112,15 @@ def start_from_cells(guide: Floats, given: Arguments, progress: Progress) -> Cel
 
 
 def _measure_sides(cells: Cells) -> NDArray[np.float64]:
-    """Return the median height and width of whole cells, or of all cells if none is whole."""
+    """Return the median height and width, in pixels, of cells that no border cuts, or of all cells if all are cut."""
     whole = cells.whole if cells.whole.any() else np.ones(cells.count, bool)
     return np.asarray(np.median(np.ptp(cells.outlines[whole], axis=1), axis=0), np.float64)
 
 
 def _are_elements(small: Floats, cells: Cells) -> bool:
-    """Return whether cells look like objects on a background.
+    """Return True if cells look like objects on a background.
 
-    False if the background is lighter than the cells, or so dark that it must be gaps.
+    False if the parts between cells are lighter than the cells, or so dark that they must be gaps.
     """
     heaped = cells.confidence >= HEAPED and _measure_contrast(small, cells) >= DARK
     if cells.polarity > 0 or heaped or cells.confidence >= CELLS:
@@ -130,7 +132,7 @@ def _are_elements(small: Floats, cells: Cells) -> bool:
 
 
 def _measure_contrast(guide: Floats, cells: Cells) -> float:
-    """Return the difference in lightness between joints and cells, after smoothing by 1 pixel."""
+    """Return the lightness contrast between joints and cells, 0 to 1, in the image smoothed by 1 pixel."""
     from scipy.ndimage import gaussian_filter
 
     light, joint = gaussian_filter(to_lab(guide)[..., 0], 1.0), cells.joints > 0.5
@@ -140,9 +142,9 @@ def _measure_contrast(guide: Floats, cells: Cells) -> float:
 
 
 def _make_start(guide: Floats, given: Arguments, cells: Cells) -> CellStart:
-    """Return the starting point of an analysis from its cells."""
+    """Build the starting point of an analysis from cells."""
     shape = (guide.shape[0], guide.shape[1])
-    # Decide whether the joints are a figure, such as a net, or only separate cells.
+    # Decide by contrast and area whether the joints are a figure of their own, such as a net, or only separate cells.
     net = _measure_contrast(guide, cells) * float((cells.joints > 0.5).mean()) >= NET[cells.polarity]
     layout = given.layout or (Layout.CONNECTED if net else Layout.JOINTED)
     box = given.box or _choose_box(cells, shape)
@@ -165,9 +167,9 @@ def _make_start(guide: Floats, given: Arguments, cells: Cells) -> CellStart:
 
 
 def _mark_inside(cells: Cells) -> Bools:
-    """Mark the pixels of cells outside joints.
+    """Mark the pixels of cells, without joints.
 
-    Pixels that look like joints but are far inside a cell belong to the cell.
+    Pixels far inside a cell belong to the cell even if they look like joints.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -176,9 +178,9 @@ def _mark_inside(cells: Cells) -> Bools:
 
 
 def _choose_box(cells: Cells, shape: tuple[int, int]) -> Box:
-    """Return the box of the whole cell with the most usual sides.
+    """Return the box of the cell with the most usual sides that fits in the image.
 
-    Among equally usual cells, the nearest to the middle of the image is used.
+    Among equally usual cells, the one nearest to the middle of the image is chosen.
     """
     sides = _measure_sides(cells)
     size = np.clip(sides, LEAST, np.array(shape) - 1)

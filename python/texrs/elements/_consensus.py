@@ -1,7 +1,7 @@
-"""Extend separate elements by the surroundings that all of them share.
+"""Extend separate elements by surroundings that all of them have in common.
 
-A cut by colours stops at a rim whose colours also occur in the background, and at the dark side of a lit element. If
-all elements have the same surroundings, and these differ from the background, the surroundings belong to the element.
+A cut by colours ends at a rim whose colours also occur in the background, and at the dark side of a lit element. If
+the surroundings of all elements are the same and differ from the background, they belong to the element.
 """
 
 from __future__ import annotations
@@ -17,33 +17,39 @@ from texrs.elements._mask import Wrap, round_to_odd, stamp
 __all__ = ["Extent", "extend_mask"]
 
 WIDE = 2.0
-"""Sides of the compared window, as a multiple of the box."""
+"""Sides of the window around an element that is compared, relative to its box."""
 FAR, LEAST = 1.3, 100
-"""Distance from elements, in boxes, beyond which pixels are background; and minimum number of such pixels for an
-estimate of its colours.
+"""Distance from elements, in boxes, beyond which pixels are background.
+
+Minimum number of such pixels for estimating the colours of the background.
 """
 FEWEST = 4
-"""Minimum number of elements that must show a place in their window before its common colour is estimated."""
+"""Minimum number of elements that must show a position of the window for estimating its common colour."""
 CLEAR = 1.5
-"""Minimum ratio of the difference between elements and background to the variation of both.
+"""Minimum ratio of the difference from the background to the variation between elements plus noise.
 
-Pixels above it belong to elements.
+Pixels above this ratio belong to the element.
 """
 GROWN, GUESSED = 1.2, 0.4
-"""Minimum ratio of the common area to the usual area for replacing the mask, if it is certain and if it is guessed.
+"""Minimum ratio of the common area to the usual area of an element in the mask.
+
+The first value is for a certain mask, the second for a guessed one. Below it, the mask is kept.
 """
 PASSES, MOST = 2, 64
-"""Number of passes that compare and move elements, and maximum number of elements that are compared."""
+"""Number of passes that compare and align elements, and maximum number of elements that are compared."""
 NUDGE = 2
-"""Maximum shift of a whole element to match the others, in pixels. Elements that the border cuts may move farther."""
+"""Maximum shift for aligning an element that is completely visible, in pixels.
+
+Elements that the border cuts can be moved farther.
+"""
 SEEN = 0.25
-"""Minimum visible share of an element for finding its position."""
+"""Minimum visible share of an element that is aligned."""
 SOLID = 0.8
-"""Minimum share of its convex hull that an element fills."""
+"""Minimum share of the convex hull that the common shape must fill."""
 
 
 class Extent(NamedTuple):
-    """Foreground (H, W), centres of elements (n, 2) in pixels, and rows and columns of one element."""
+    """Foreground (H, W), centres of elements (n, 2) in pixels, and height and width of one element in pixels."""
 
     mask: Bools
     points: NDArray[np.float64]
@@ -53,9 +59,9 @@ class Extent(NamedTuple):
 def extend_mask(
     colours: Floats, mask: Bools, points: NDArray[np.float64], box: tuple[int, int], wrap: Wrap, *, sure: bool
 ) -> Extent | None:
-    """Return the extent of elements, from their common surroundings.
+    """Return the foreground of elements, extended by the surroundings that all of them have in common.
 
-    None if they share no more than the mask contains.
+    None if the common surroundings do not extend the mask.
 
     Parameters
     ----------
@@ -66,12 +72,11 @@ def extend_mask(
     points : (n, 2) float64
         Centres of the elements.
     box : (int, int)
-        Rows and columns of an element.
+        Height and width of an element, in pixels.
     wrap : (bool, bool)
         Axes along which the image is periodic.
     sure : bool
-        If True, the pixels of the mask certainly are foreground. If False, the mask only indicates the size of
-        elements.
+        If True, all pixels of the mask are foreground. If False, the mask only indicates the size of elements.
 
     """
     half = np.array([round(WIDE * n / 2) for n in box])
@@ -83,10 +88,10 @@ def extend_mask(
         return None
     usual_ground = np.median(ground, axis=0)
     noise = 1.5 * float(np.median(np.sqrt(((ground - usual_ground) ** 2).sum(axis=1))))
-    # Alternate: find the common surroundings, then align the elements with them.
+    # Find the common surroundings and align the elements with them, in turns.
     places, usual = np.rint(points), 0.0
     for turn in range(PASSES):
-        # If there are many elements, a part of them is enough to find the common colours.
+        # Use only some of many elements to estimate the common colours.
         window, shown = _look_around(colours, places[:MOST], away, wrap)
         known = _look_around(mask[..., np.newaxis], places[:MOST], away, wrap)[0][..., 0]
         typical = np.nanmedian(window, axis=0)
@@ -104,7 +109,7 @@ def extend_mask(
         one = piece
         reach, wanted = away[one], typical[one]
         places = _align(colours, wanted, places, reach, half // 2, wrap)
-    # Put the common shape at each element.
+    # Add the common shape at the position of each element.
     grown = mask.copy() if sure else np.zeros(mask.shape, bool)
     stamp(grown, places, one, wrap)
     apart = np.sqrt(((colours - usual_ground) ** 2).sum(axis=-1)) > 0.5 * float(np.median(unlike[one]))
@@ -116,7 +121,7 @@ def extend_mask(
 def _look_around(
     picture: Array, places: NDArray[np.float64], away: NDArray[np.intp], wrap: Wrap
 ) -> tuple[NDArray[np.float64], Bools]:
-    """Return windows of an image (H, W, c) around places, and masks of their visible pixels.
+    """Return the windows of an image (H, W, c) around places, and masks of the pixels inside the image.
 
     Pixels beyond the border are NaN.
     """
@@ -129,12 +134,12 @@ def _look_around(
 
 
 def _find_piece(common: Bools, away: NDArray[np.intp], box: tuple[int, int], *, notched: bool) -> Bools | None:
-    """Return the connected area in the middle, without holes.
+    """Return the connected area in the middle of a window, without holes.
 
-    None if no area is compact and ends inside the window.
+    None if the area is not compact or reaches the border of the window.
 
-    If ``notched``, return its convex hull: parts that vary between elements leave notches, and no mask is available to
-    fill them.
+    If ``notched``, return its convex hull, because parts that vary between elements leave notches, and no mask is
+    available to fill them.
     """
     from scipy import ndimage
     from skimage.morphology import convex_hull_image
@@ -153,7 +158,7 @@ def _find_piece(common: Bools, away: NDArray[np.intp], box: tuple[int, int], *, 
 
 
 def _mark_cut(unlike: Bools, box: tuple[int, int], wrap: Wrap) -> Bools:
-    """Mark areas unlike the background that are parts of undetected elements cut by the border."""
+    """Mark small areas at the border that differ from the background: parts of undetected elements."""
     from scipy import ndimage
 
     pieces, count = ndimage.label(unlike)
@@ -174,9 +179,9 @@ def _align(
     far: NDArray[np.intp],
     wrap: Wrap,
 ) -> NDArray[np.float64]:
-    """Move elements to where their visible part best matches the common colours.
+    """Return the places of elements, moved so that the visible parts best match the common colours.
 
-    Whole elements move a little, others up to a limit.
+    Elements that are completely visible move by at most `NUDGE` pixels, others by at most ``far`` pixels.
     """
     size = np.array(colours.shape[:2])
     moves = np.stack(np.meshgrid(*(np.arange(-f, f + 1) for f in far), indexing="ij"), axis=-1).reshape(-1, 2)

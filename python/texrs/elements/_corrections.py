@@ -1,4 +1,4 @@
-"""Correct an analysis by a list of steps that can be repeated."""
+"""Correct an analysis by a list of steps, which can be stored and repeated."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ STEPS = {
     "foreground": ("points", "radius"),
     "background": ("points", "radius"),
 }
-"""Operations of a step, with the fields that each needs."""
+"""Operations, and the fields that a step with this operation must have."""
 RADIUS = 4.0
-"""Default radius of a dab of foreground or background, in pixels."""
+"""Default radius of a painted dot of foreground or background, in pixels."""
 
 
 def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
@@ -117,7 +117,7 @@ def read_steps(steps: object) -> list[dict[str, Any]]:
 
 
 def _to_plain(value: object, number: int) -> Any:
-    """Return words, numbers and lists in their stored form."""
+    """Return text, numbers and lists with NumPy values converted to plain Python values."""
     try:
         return json.loads(json.dumps(value, allow_nan=False, default=lambda array: np.asarray(array).tolist()))
     except (TypeError, ValueError, RecursionError):
@@ -134,7 +134,7 @@ def _drop(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     if entry.layout == Layout.DISJOINT:
         pieces = label_components(mask, entry.wrap)[0]
         owner = pieces[find_nearest_pixels(entry.points, mask.shape)]
-        # A component that also contains another element stays.
+        # Remove a component only if it does not contain another element.
         alone = np.setdiff1d(owner[gone], owner[kept])
         mask = mask & ~np.isin(pieces, alone[alone > 0])
     return _take(entry, kept, mask)
@@ -148,7 +148,7 @@ def _add(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     if entry.layout == Layout.DISJOINT:
         bare = new[~mask[find_nearest_pixels(new, mask.shape)]]
         stamp(mask, bare, ellipse(entry.box), entry.wrap)
-    # An element that the user adds gets full similarity, without rotation and in normal size.
+    # Give an element that the user adds similarity 1, no rotation and the normal size.
     ones = np.ones(len(new))
     angles = None if entry.angles is None else np.concatenate([entry.angles, 0 * ones])
     scales = None if entry.scales is None else np.concatenate([entry.scales, ones])
@@ -183,7 +183,7 @@ def _dab(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
 
 
 def _take(entry: ElementAnalysis, kept: NDArray[np.intp], mask: Bools) -> ElementAnalysis:
-    """Return an entry with only some of its elements."""
+    """Return an analysis with only the selected elements."""
     angles, scales = (None if a is None else a[kept] for a in (entry.angles, entry.scales))
     return replace(entry, points=entry.points[kept], mask=mask, scores=entry.scores[kept], angles=angles, scales=scales)
 

@@ -15,12 +15,12 @@ CROSS = (255, 40, 40)
 
 
 def draw_plain(image: Array) -> Picture:
-    """Return the texture without marks."""
+    """Return the texture as 8-bit colours, without marks."""
     return np.rint(np.clip(as_rgb(guidance(as_image(image))), 0, 1) * 255).astype(np.uint8)
 
 
 def mark_points(plain: Picture, points: NDArray[np.float64], box: tuple[int, int]) -> Picture:
-    """Return the image with a cross on each element, sized by its box."""
+    """Return the texture with a cross on each element. The size of the cross depends on the box."""
     drawn = plain.copy()
     arm = max(2, min(box) // 10)
     for row, column in np.floor(points + 0.5).astype(int).tolist():
@@ -31,6 +31,6 @@ def mark_points(plain: Picture, points: NDArray[np.float64], box: tuple[int, int
 
 
 def draw_dot(picture: Picture, row: int, column: int, colour: tuple[int, int, int]) -> None:
-    """Colour a pixel, if it is inside the image."""
+    """Draw a pixel if it is inside the image."""
     if 0 <= row < picture.shape[0] and 0 <= column < picture.shape[1]:
         picture[row, column] = colour

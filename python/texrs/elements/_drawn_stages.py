@@ -1,4 +1,4 @@
-"""Draw images of an analysis."""
+"""Draw the images that show an analysis: points, mask and numbers."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from texrs.elements._drawing import Picture, draw_dot, draw_plain, mark_points
 from texrs.elements._elements import ElementAnalysis
 
 BOX, GROUND, NUMBER = (0, 230, 255), np.array((30, 30, 190), np.float64), (255, 235, 90)
-"""Colours of the chosen box, of the background, and of numbers."""
+"""Colours of the box of the chosen element, of the background, and of numbers."""
 DIM = 0.65
-"""Share of this colour in the drawn background."""
+"""Opacity of this colour over the background."""
 
 
 def draw(entry: ElementAnalysis) -> dict[str, Picture]:
-    """Draw an entry: its points on the texture, its mask, and its numbers.
+    """Draw an analysis: points on the texture, the mask, and the numbers of elements.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def draw(entry: ElementAnalysis) -> dict[str, Picture]:
 
 
 def _draw_numbers(plain: Picture, entry: ElementAnalysis) -> Picture:
-    """Draw the number of each element in its middle, on a black plate."""
+    """Draw the number of each element at its centre, on a black rectangle."""
     large = plain.repeat(2, axis=0).repeat(2, axis=1)
     dot = 1 if min(entry.box) < 24 else 2
     for number, (row, column) in enumerate(np.floor(2 * entry.points).astype(int).tolist()):

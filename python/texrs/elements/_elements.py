@@ -1,4 +1,4 @@
-"""Store the analysis of a texture's elements, which splicing uses."""
+"""Define the analysis of a texture's elements, and store it in a file for splicing."""
 
 from __future__ import annotations
 
@@ -29,10 +29,13 @@ from texrs.io import Header, atomic, read_arrays
 from texrs.samples import Sample
 
 FORMAT = 2
-"""Version of the file and of the analysis. Other versions are refused, and a database analyses their textures again."""
+"""Version of the file format and of the analysis.
+
+Files of other versions are rejected, and a database analyses their textures again.
+"""
 MARK = "texrs_elements"
 WORDS = (MARK, "hash", "box", "layout", "directions", "wrap", "report", "numbers")
-"""Names of the arrays in a file that are much smaller than the image."""
+"""Names of the small arrays in a file, whose size does not depend on the size of the image."""
 LONGEST, CHANNELS, SIMILAR = 2**26, 64, 16
 """Maximum size of such an array in bytes, number of channels of an image, and size of a similarity set."""
 
@@ -108,19 +111,19 @@ class ElementAnalysis:
 
     @classmethod
     def of_sample(cls, sample: Sample, *, wrap: tuple[bool, bool] = (False, False)) -> ElementAnalysis:
-        """Return the entry of a generated texture, whose elements are known.
+        """Return the analysis of a generated texture whose elements are known.
 
         Parameters
         ----------
         sample : Sample
             A texture of `texrs.samples` with centres and a mask.
         wrap : (bool, bool)
-            True if it was generated tileable along rows, and along columns.
+            True for each axis, (rows, columns), along which the sample was generated tileable.
 
         Returns
         -------
         ElementAnalysis
-            The entry with the sample's centres and mask. Each element has the similarity 1.
+            The analysis with the centres and mask of the sample. Each element has similarity 1.
 
         Raises
         ------
@@ -140,7 +143,7 @@ class ElementAnalysis:
             raise InvalidInput(f"sample: must be an image with at least three known elements, got {sample!r}")
         mask = sample.labels > 0 if sample.mask is None else sample.mask
         layout, scores = Layout(sample.layout or "disjoint"), np.ones(len(sample.centres))
-        # In a wall, cells are known from its construction. Separate elements are derived from their mask.
+        # The cells of a wall are known from its generator. Separate elements are derived from their mask.
         known = sample.labels if layout == Layout.JOINTED else None
         box = measure_box(sample.labels)
         return cls(sample.image, sample.centres, mask, box, layout, scores, wrap=wrap, known=known)
@@ -154,7 +157,7 @@ class ElementAnalysis:
         layout: Layout | LayoutName = Layout.DISJOINT,
         wrap: Sequence[bool] | bool = False,
     ) -> ElementAnalysis:
-        """Return the entry of a texture from a label image of its elements.
+        """Return the analysis of a texture from a label image of its elements.
 
         The labels may be drawn by hand or come from another program.
 
@@ -173,12 +176,13 @@ class ElementAnalysis:
         Returns
         -------
         ElementAnalysis
-            The entry, with one point per label at its centroid.
+            The analysis, with one point per label at its centroid.
 
         Raises
         ------
         InvalidInput
-            The labels have another shape or fewer than three elements, or separate elements have no background.
+            The labels have another shape than the image, there are fewer than three elements, or separate elements
+            have no background.
 
         Examples
         --------
@@ -207,7 +211,7 @@ class ElementAnalysis:
 
     @cached_property
     def arrangement(self) -> Arrangement:
-        """Arrangement of the elements: spacing, lattice or courses, and whether the rest is darker.
+        """Arrangement of the elements: spacing, lattice or courses, and whether the space between them is darker.
 
         Examples
         --------
@@ -225,13 +229,12 @@ class ElementAnalysis:
     def labels(self) -> Labels:
         """Element of each pixel, (H, W) int32, from 1; 0 is the background.
 
-        Computed on first use, read-only.
+        The array is computed on first use and is read-only.
 
-        Element ``k + 1`` belongs to point ``k``. The numbers after those of the points are components of the
-        foreground, and cells, without a point. Separate elements are the components of the mask, divided if they
-        contain several points. For a connected texture, the elements are its cells without their joints, if the cells
-        are certain; otherwise each pixel belongs to the nearest element. Specks of foreground without a point are
-        background.
+        Element ``k + 1`` belongs to point ``k``. Higher numbers are components of the foreground, and cells, that have
+        no point. Separate elements are the components of the mask. A component with several points is divided between
+        them. For a connected texture whose cells are certain, the elements are the cells without their joints.
+        Otherwise, each pixel belongs to the nearest element. Small components without a point are background.
 
         Examples
         --------
@@ -246,7 +249,7 @@ class ElementAnalysis:
 
     @cached_property
     def instances(self) -> tuple[Instance, ...]:
-        """The elements with a mask each, in the order of `labels`. Computed on first use.
+        """The elements as separate objects, each with a mask, in the order of `labels`. Computed on first use.
 
         Examples
         --------
@@ -271,23 +274,23 @@ class ElementAnalysis:
         return found
 
     def similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Similarity:
-        """Return similar samples for each pixel of the texture: itself and the ``k - 1`` most similar ones.
+        """Return the most similar samples for each pixel of the texture, starting with the pixel itself.
 
-        The samples are nearest by appearance vectors of 5 x 5 windows, and more than 3 pixels apart. They are computed
-        on first use and cached.
+        Similarity is measured by appearance vectors of 5 x 5 windows. Similar samples are more than 3 pixels apart.
+        The result is computed on first use and cached.
 
         Parameters
         ----------
         k : int
             Number of samples per pixel, including itself, 1 to 16.
         progress : callable, optional
-            Function that is called as ``progress(share)`` with the share of the work that is done. An exception from
-            it stops the work.
+            Function that is called as ``progress(share)`` with the finished share of the work. An exception from it
+            stops the work.
 
         Returns
         -------
         Similarity
-            Similar samples. ``sets`` is (H W, k): the flat indices of samples, starting with the pixel itself.
+            Similar samples. ``sets``, (H W, k), contains the flat indices of samples, starting with the pixel itself.
 
         Raises
         ------
@@ -307,20 +310,20 @@ class ElementAnalysis:
         return Exemplar(self.image, repeat=self.wrap).similarity(-1, k=k, progress=progress)
 
     def with_similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> ElementAnalysis:
-        """Return the entry with its similarity sets, so that `save` stores them.
+        """Return the analysis with similar samples of all pixels, so that `save` stores them.
 
         Parameters
         ----------
         k : int
             Number of samples per pixel, including itself, 1 to 16.
         progress : callable, optional
-            Function that is called as ``progress(share)`` with the share of the work that is done. An exception from
-            it stops the work.
+            Function that is called as ``progress(share)`` with the finished share of the work. An exception from it
+            stops the work.
 
         Returns
         -------
         ElementAnalysis
-            The same entry, with another value of `sets`.
+            The same analysis with the attribute `sets`.
 
         Raises
         ------
@@ -339,7 +342,7 @@ class ElementAnalysis:
         return replace(self, sets=self.similarity(k=k, progress=progress))
 
     def save(self, path: Path) -> None:
-        """Write the entry to an ``.npz`` file, completely or not at all. `texrs.elements.load` reads it.
+        """Write the analysis to an ``.npz`` file, which `texrs.elements.load` reads. A failure leaves no partial file.
 
         Parameters
         ----------
@@ -372,7 +375,7 @@ class ElementAnalysis:
             "box": np.array(self.box, np.int64),
             "layout": _encode_text(self.layout),
             "scores": self.scores,
-            # Start with NaN: a reader could not distinguish an empty array from a damaged one.
+            # Start with NaN, because an empty array could not be distinguished from a damaged one.
             "directions": np.array([np.nan, *self.directions]),
             "wrap": np.array(self.wrap, bool),
             "report": _encode_text(json.dumps(self.report, allow_nan=False)),
@@ -422,7 +425,7 @@ def hash_image(image: Array) -> str:
 
 
 def load(path: Path) -> ElementAnalysis:
-    """Read an entry that `save` wrote.
+    """Read an analysis that `ElementAnalysis.save` wrote.
 
     Parameters
     ----------
@@ -436,7 +439,7 @@ def load(path: Path) -> ElementAnalysis:
     Raises
     ------
     FileError
-        The file is missing, damaged, has another version, or does not contain an entry.
+        The file is missing or damaged, has another version, or does not contain an analysis.
 
     Examples
     --------
@@ -455,7 +458,7 @@ def load(path: Path) -> ElementAnalysis:
             raise FileError(f"{path}: is not an analysis of a texture's elements")
         return choose_parts(headers, path)
 
-    # Check the headers first, so that a file of another kind is not read.
+    # Check the headers first, so that a large file of another kind is not read.
     parts = read_arrays(path, choose=choose)
     version = parts[MARK].ravel().tolist()
     if version != [FORMAT]:
@@ -464,7 +467,7 @@ def load(path: Path) -> ElementAnalysis:
             "analyse the texture again"
         )
     try:
-        # Check every part, because a damaged file would fail much later, in a splice.
+        # Check every part now, because a damaged file would cause an error much later, during a splice.
         image = as_image(parts["image"])
         if _decode_text(parts["hash"]) != hash_image(image):
             raise InvalidInput("its image differs from the analysed image")
@@ -513,15 +516,15 @@ def load(path: Path) -> ElementAnalysis:
 
 
 def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
-    """Return which arrays of a file form an entry, after checking their sizes.
+    """Return the names of the arrays in a file that form an analysis, after checking their sizes.
 
-    None may be larger than the image permits, and none is read before.
+    An error is raised before any array is read if one is larger than the image permits.
     """
     shape = headers["image"].shape if "image" in headers else ()
     pixels = prod(shape[:2])
     if len(shape) not in (2, 3) or not 0 < pixels <= MAX_PIXELS or prod(shape[2:]) > CHANNELS:
         raise FileError(f"{path}: is damaged (an image of shape {shape})")
-    # Allow at most as many elements as pixels, and text up to a limit.
+    # Allow at most one element per pixel, and limit the size of texts.
     one = {"mask": 1, "points": 16, "scores": 8, "angles": 8, "scales": 8, "known": 8, "sets": 8 * SIMILAR}
     most = {name: size * pixels for name, size in one.items()} | {"image": headers["image"].size}
     chosen = [name for name in headers if name in most or name in WORDS]

@@ -1,7 +1,7 @@
-"""Divide a foreground among elements: by connected components, and within one by the nearest element.
+"""Divide a foreground among elements: by connected components, and each component by the nearest element.
 
-`design` (which moves elements) and `splice` (which places them) both use this division, so that they mean the same
-elements.
+Both `design`, which moves elements, and `splice`, which places them, use this division, so that their elements are the
+same.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ Points = NDArray[np.float64]
 Wrap = tuple[bool, bool]
 
 SMALLEST = 0.25
-"""Minimum area of a component that becomes an element of its own, as a share of the median area of elements."""
+"""Minimum area of a component without a point that becomes an additional element, as a share of the usual area of elements.
+"""
 
 
 class Division(NamedTuple):
@@ -29,7 +30,7 @@ class Division(NamedTuple):
     Attributes
     ----------
     points : (n, 2) float64
-        Centres as given, followed by those of components that were not assigned to any element.
+        Centres as given, followed by the centres of components that become additional elements.
     labels : (H, W) int32
         Element of each foreground pixel, from 1; 0 elsewhere.
 
@@ -40,16 +41,16 @@ class Division(NamedTuple):
 
 
 def divide_foreground(mask: Bools, points: Points, wrap: Wrap = (False, False)) -> Division:
-    """Divide a foreground.
+    """Divide a foreground among elements, given by their centres.
 
-    A component belongs to the element in it.
+    A component with one centre belongs to this element.
 
-    A component that contains several elements is divided among them.
+    A component with several centres is divided between these elements.
     """
     component, count = label_components(mask, wrap)
     points, at, owner, joined = _claim(component, count, points, mask, wrap)
     claims = np.bincount(owner, minlength=count + 1)
-    # A component with exactly one element needs no division.
+    # A component with exactly one element is not divided.
     number = np.zeros(count + 1, np.int32)
     number[owner[claims[owner] == 1]] = np.flatnonzero(claims[owner] == 1) + 1
     for c, element in joined.items():
@@ -66,7 +67,10 @@ def divide_foreground(mask: Bools, points: Points, wrap: Wrap = (False, False)) 
 
 
 def _part(mask: Bools, shared: Bools, markers: Labels, wrap: Wrap) -> Labels:
-    """Divide components between their markers where they are narrow, across periodic borders."""
+    """Divide components at their narrow parts, so that each part contains one marker.
+
+    Parts continue across periodic borders.
+    """
     from scipy.ndimage import distance_transform_edt
     from skimage.segmentation import watershed
 
@@ -80,18 +84,18 @@ def _part(mask: Bools, shared: Bools, markers: Labels, wrap: Wrap) -> Labels:
 def _claim(
     component: Labels, count: int, points: Points, mask: Bools, wrap: Wrap
 ) -> tuple[Points, NDArray[np.intp], Labels, dict[int, int]]:
-    """Assign every large component to an element.
+    """Assign each large component to an element, and add elements for components without one.
 
     Returns
     -------
     points : (n, 2) float64
-        Centres of elements, followed by those of components that become elements.
+        Centres of elements, followed by the centres of components that become elements.
     at : (n, 2) intp
-        Pixel of each element of the entry.
+        Pixel of each given element.
     owner : (n) int32
-        Component of each element, 0 for none.
+        Component of each element, or 0 if it is not on the foreground.
     joined : dict
-        Components that belong to the element of another component.
+        Component numbers, and for each the index of an element of another component that it belongs to.
 
     """
     from scipy.ndimage import center_of_mass
@@ -113,7 +117,7 @@ def _claim(
     for c, middle in zip(left, middles, strict=True):
         away = np.hypot(*(points - middle).T)
         if len(away) and away.min() < 1:
-            # A ring around a dot belongs to the dot's element. It must not become a second element at the same place.
+            # A ring around a dot belongs to the element of the dot. Do not add a second element at the same place.
             joined[c] = int(away.argmin())
         else:
             points, owner = np.concatenate([points, middle[None]]), np.append(owner, c)
@@ -121,9 +125,9 @@ def _claim(
 
 
 def _snap_centres(component: Labels, orphans: list[int], at: NDArray[np.intp], owner: Labels) -> NDArray[np.intp]:
-    """Move centres outside their elements, such as those of rings, to the nearest pixel of the element.
+    """Move centres that are off the foreground, such as centres of rings, to the nearest pixel of their element.
 
-    The element is a component without a centre, whose bounding box contains the centre.
+    The element of such a centre is a component without another centre, whose bounding box contains this one.
     """
     from scipy.ndimage import distance_transform_edt, find_objects
 

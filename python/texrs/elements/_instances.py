@@ -1,4 +1,4 @@
-"""Provide elements as instances, each with a mask, place, direction, size and confidence."""
+"""Provide elements as separate instances, each with a mask, place, direction, size and confidence."""
 
 from __future__ import annotations
 
@@ -23,18 +23,17 @@ __all__ = ["Instance", "Labelled", "cut_instances", "find_sure_cells", "label_el
 Points = NDArray[np.float64]
 
 SURE = 0.5
-"""Minimum confidence for using cells."""
+"""Minimum confidence of cells for using them as elements."""
 LEAST = 3.0
-"""Minimum width of a cell that is searched for, in pixels."""
+"""Minimum width of cells in a search, in pixels."""
 MISSED, JOINT = 0.4, 0.5
-"""Minimum share of a cell inside the mask.
+"""Minimum share of a cell that the mask must contain.
 
-Below it the mask is ignored for this cell, and its pixels above the given joint strength count as joint.
+Below it, the mask is ignored for this cell, and its pixels with more than the given joint strength are joints.
 """
 
 EVEN, SPREAD = 0.67, 0.057
-"""Similarity of an element that is equally likely to be right or wrong, and difference in similarity for odds of 2.7
-to 1.
+"""Similarity of an element that is equally likely to be correct or wrong, and difference in similarity for odds of 2.7 to 1.
 
 Measured on fifteen annotated textures (`benches/elements_table.py`).
 """
@@ -56,9 +55,9 @@ class Instance:
         Size relative to the chosen element, above 0, if several sizes were searched; 1 is its size. Otherwise the
         square root of its area relative to the median area.
     confidence : float
-        Probability of being an element, 0 to 1, calibrated on annotated textures. It is derived from the similarity to
-        the chosen element, or from how well the joints around it close. For foreground without a detection, it is
-        derived from the ratio of its area to the median. 0 if the element has no pixels.
+        Probability that this is an element, 0 to 1, calibrated on annotated textures. It is derived from the
+        similarity to the chosen element, or from how well the joints around a cell close. For foreground without a
+        detection, it is derived from the ratio of its area to the median area. 0 if the element has no pixels.
     origin : (int, int)
         Row and column of the first pixel of the mask in the texture.
     mask : (h, w) array of bool
@@ -83,7 +82,7 @@ class Instance:
 
 
 class Labelled(NamedTuple):
-    """The elements of a texture per pixel: (H, W) int32 from 1, with centre (n, 2) and confidence (n,) of each."""
+    """Element of each pixel, (H, W) int32 from 1, with the centre (n, 2) and the confidence (n,) of each element."""
 
     labels: Labels
     centres: Points
@@ -91,16 +90,16 @@ class Labelled(NamedTuple):
 
 
 def rate_likeness(scores: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the confidence of elements from their similarity, as in annotated textures.
+    """Return the confidence (0 to 1) of detected elements from their similarity, calibrated on annotated textures.
 
-    No detection with a similarity below 0.5 was an element there, 75 % at 0.74, and all above 0.85.
+    No detection with a similarity below 0.5 was correct, 75 % at 0.74 were correct, and all above 0.85.
     """
     odds = (1 + np.exp((EVEN - 1) / SPREAD)) / (1 + np.exp((EVEN - np.clip(scores, 0, 1)) / SPREAD))
     return np.asarray(np.round(odds, 9), np.float64)
 
 
 def rate_closure(certain: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the confidence of cells from the closedness of their joints, as in annotated textures."""
+    """Return the confidence (0 to 1) of cells from how well their joints close, calibrated on annotated textures."""
     return np.asarray(1 - (1 - np.clip(certain, 0, 1)) ** 2, np.float64)
 
 
@@ -113,16 +112,16 @@ def find_sure_cells(
     *,
     known: Labels | None = None,
 ) -> Cells | None:
-    """Return the known or the certain cells of a connected texture.
+    """Return the cells of a connected texture if they are known or certain.
 
-    None if the cells are uncertain, as in nets.
+    None for separate elements and for uncertain cells, such as the meshes of a net.
     """
     if layout == Layout.DISJOINT:
         return None
     if known is not None:
         return _CELLS.get_or_make(content_hash(np.asarray(image), known), lambda: take_cells(known, image))
     joints = ~mask if layout == Layout.JOINTED else mask
-    # An entry from elsewhere may have a box of any size.
+    # Clip the size, because an analysis from another source can have a box of any size.
     size = float(np.clip(min(box), LEAST, min(mask.shape)))
     key = content_hash(np.asarray(image), np.packbits(mask), size, layout)
     found = _CELLS.get_or_make(key, lambda: find_cells(image, size=size, joints=joints, progress=progress))
@@ -138,13 +137,13 @@ def label_elements(
     layout: Layout,
     wrap: tuple[bool, bool],
 ) -> Labelled:
-    """Return the element of each pixel.
+    """Return the element of each pixel, with the centre and confidence of each element.
 
-    The elements of points come first, then components and cells without a point.
+    Elements with points come first. Components and cells without a point follow.
 
-    Separate elements are the components of the mask, divided among points if there are several. For a connected
-    texture, the elements are its cells without their joints, if the cells are certain and contain points. Otherwise,
-    the elements are divided components of the mask or of its complement, whichever contains most points.
+    Separate elements are the components of the mask. A component with several points is divided between them. For a
+    connected texture whose cells are certain, the elements are the cells without their joints. Otherwise, the elements
+    are divided components of the mask, or of its complement if most points are outside the mask.
     """
     pixels = as_image(image, "image")
     if mask.shape != pixels.shape[:2] or mask.dtype != np.bool_:
@@ -152,7 +151,7 @@ def label_elements(
     at = find_nearest_pixels(points, mask.shape)
     inside = mask
     if layout == Layout.CONNECTED and len(points) and mask[at].mean() < 0.5:
-        # The points of a net are in its meshes.
+        # If most points are outside the foreground, it is a net, and its meshes are the elements.
         inside = ~mask
     if layout == Layout.JOINTED or inside is not mask:
         cells = find_sure_cells(pixels, mask, box, layout)
@@ -168,18 +167,18 @@ def label_elements(
 
 
 def _take_cells(cells: Cells, inside: Bools, points: Points, at: tuple[NDArray[np.intp], ...]) -> Labelled:
-    """Use cells without joints as elements.
+    """Use cells, without their joints, as elements.
 
-    The cell of each point has the point's number. The others follow.
+    A cell that contains a point gets the number of the point. Other cells follow.
     """
     number = np.zeros(cells.count + 1, np.int32)
     for k, cell in enumerate(cells.labels[at].tolist()):
-        # If a cell contains two points, the first is its element, because it is more similar.
+        # If a cell contains several points, use the first, which is the most similar one.
         number[cell] = number[cell] or k + 1
     rest = np.flatnonzero(number[1:] == 0) + 1
     number[rest] = len(points) + 1 + np.arange(len(rest))
     area, seen = (np.bincount(c, minlength=cells.count + 1) for c in (cells.labels.ravel(), cells.labels[inside]))
-    # If the mask misses a cell, use the joint strength to find the cell's pixels.
+    # If the mask contains too little of a cell, find the cell's pixels by the joint strength.
     missed = (seen < MISSED * area)[cells.labels]
     inside = np.where(missed, cells.joints <= JOINT, inside)
     labels = np.where(inside, number[cells.labels], 0).astype(np.int32)
@@ -192,7 +191,7 @@ def _take_cells(cells: Cells, inside: Bools, points: Points, at: tuple[NDArray[n
 def cut_instances(
     found: Labelled, angles: Array | None, scales: Array | None, wrap: Sequence[bool]
 ) -> tuple[Instance, ...]:
-    """Return the elements as separate instances."""
+    """Return each element as an `Instance` with its own mask."""
     shape, count = found.labels.shape, len(found.centres)
     flat = found.labels.ravel()
     order = np.argsort(flat, kind="stable")
@@ -216,7 +215,7 @@ def cut_instances(
 def _cut_mask(
     pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Sequence[bool], centre: NDArray[np.float64]
 ) -> tuple[tuple[int, int], Bools]:
-    """Return the corner of the bounding box of pixels, and the mask within the box."""
+    """Return the top left corner of the bounding box of pixels, and their mask within the box."""
     if not len(pixels):
         row, column = (int(n[0]) for n in find_nearest_pixels(centre[np.newaxis], shape))
         return (row, column), np.zeros((0, 0), bool)
@@ -224,7 +223,7 @@ def _cut_mask(
     for axis, side in enumerate(shape):
         places = np.unique(pixels[:, axis])
         if wrap[axis] and places[0] == 0 and places[-1] == side - 1 and len(places) < side:
-            # The box begins after the widest gap, and continues across the border.
+            # Start the box after the widest gap, so that it continues across the periodic border.
             corner[axis] = places[1 + int(np.argmax(np.diff(places)))]
     inside = (pixels - corner) % shape
     mask = np.zeros(tuple(inside.max(axis=0) + 1), bool)

@@ -1,4 +1,4 @@
-"""Handle elements that are known per pixel: labels from their author or generator."""
+"""Check and measure elements that are known for each pixel, as labels from their author or generator."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Points = NDArray[np.float64]
 
 
 def as_element_labels(value: object, shape: tuple[int, int], wrap: tuple[bool, ...]) -> Labels:
-    """Check labels of elements, and number them consecutively from 1.
+    """Check a label image of elements, and renumber the labels consecutively from 1.
 
-    The order of the labels stays.
+    The order of the labels is kept.
 
-    The components of a mask are numbered.
+    For a bool mask, the connected components are the elements.
     """
     labels: NDArray[Any] = try_array(value)
     if labels.shape != shape or labels.dtype.kind not in "biu":
@@ -36,7 +36,7 @@ def as_element_labels(value: object, shape: tuple[int, int], wrap: tuple[bool, .
 
 
 def measure_box(labels: Labels) -> tuple[int, int]:
-    """Return the usual height and width of elements, as odd numbers."""
+    """Return the median height and width of elements, in pixels, as odd numbers."""
     from scipy.ndimage import find_objects
 
     found = [box for box in find_objects(labels) if box is not None]
@@ -45,7 +45,7 @@ def measure_box(labels: Labels) -> tuple[int, int]:
 
 
 def extend_points(points: Points, labels: Labels, wrap: tuple[bool, ...]) -> Points:
-    """Return the points, followed by the centroids of elements with higher numbers."""
+    """Append the centroids of elements that have no point to a list of points."""
     return np.concatenate([points, measure_centres(labels, wrap)[len(points) :]])
 
 
@@ -56,12 +56,13 @@ def measure_centres(labels: Labels, wrap: tuple[bool, ...]) -> Points:
     centres = np.empty((count, 2))
     for axis, side in enumerate(labels.shape):
         at: NDArray[np.int64] = np.indices(labels.shape)[axis]
-        # Along a periodic axis, measure from about the middle of each element, so that the border does not divide it.
+        # Along a periodic axis, measure from the approximate middle of each element, so that the border does not
+        # divide it.
         middle = _find_middles(labels, at, side) if wrap[axis] else np.zeros(count, np.int64)
         away = at - np.concatenate([[0], middle])[labels]
         away = (away + side // 2) % side - side // 2 if wrap[axis] else away
         mean = middle + np.bincount(flat, away.ravel(), count + 1)[1:] / area
-        # The last pixel extends half a pixel beyond its centre.
+        # Centres range from -0.5 to side - 0.5, because the last pixel extends half a pixel beyond its centre.
         centres[:, axis] = (mean + 0.5) % side - 0.5 if wrap[axis] else mean
     return centres
 

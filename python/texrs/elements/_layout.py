@@ -1,4 +1,4 @@
-"""Define the layouts: how the elements of a texture are connected."""
+"""Define `Layout`: how the elements of a texture are connected."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Literal, TypeAlias
 from texrs.errors import InvalidInput
 
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed", "F=d", "F=c", "B=c"]
-"""Values that `Layout` accepts: its own, and the tags of the paper."""
+"""Texts that `Layout` accepts: its own values, and the tags of the paper."""
 
 
 class Layout(StrEnum):
-    """How the elements of a texture are connected. Determines which parts can move.
+    """How the elements of a texture are connected. It determines which parts can move.
 
     The tags F=d, F=c and B=c of Liu et al. (2009) are accepted as well.
 
@@ -27,7 +27,8 @@ class Layout(StrEnum):
     DISJOINT = "disjoint"
     """Separate elements on a background, such as buttons on paper: a disjoint foreground, F=d."""
     CONNECTED = "connected"
-    """One figure whose repeated parts are the elements, such as the meshes of a net: a connected foreground, F=c."""
+    """A single figure whose repeated parts are the elements, such as the meshes of a net: a connected foreground, F=c.
+    """
     JOINTED = "jointed"
     """Elements separated by joints, such as bricks by mortar: a rigid connected background, B=c."""
 
@@ -42,8 +43,8 @@ class Layout(StrEnum):
 
 
 def as_layout(value: object) -> Layout:
-    """Check a layout.
+    """Convert a text to a layout.
 
-    Only strings are looked up, because other values may be arrays.
+    Other types raise an error. They are not looked up, because they can be arrays.
     """
     return Layout(value if isinstance(value, str) else repr(value))

@@ -19,46 +19,50 @@ from texrs.kernels.seam import binary_labels
 Wrap: TypeAlias = tuple[bool, bool]
 
 SMOOTH = 2.0
-"""Cost of separating neighbours of the same colour."""
+"""Cost of a boundary between two neighbouring pixels of the same colour."""
 NATS, PRIOR = 12.0, 6.0
-"""Maximum cost from the colour of a pixel, and cost from its position in the middle of an element, in nats."""
+"""Maximum cost of a pixel's colour, and bonus for the middle of an element, both in nats."""
 RADIUS = 4
 """Radius around a point of the background that counts as background, in pixels."""
 SAMPLES = 4000
-"""Maximum number of colours per side for a colour model."""
+"""Maximum number of colour samples of the foreground, and of the background, that a colour model is fitted to."""
 HOLE, SPECK = 0.1, 0.25
-"""Maximum size of a filled hole, as a share of its component.
+"""Maximum area of a hole that is filled, as a share of the area around it.
 
-Minimum size of a component, as a share of the chosen element.
+Minimum area of a component, as a share of the area of the chosen element.
 """
 CORE, MESH, OUTER, FAR = 0.8, 0.6, 0.9, 1.3
-"""Shares of the box for its middle, the middle of a mesh, the outer limit of a mesh, and the start of the background.
-The last is for separate elements.
+"""Sizes relative to the box: the middle of an element, and the middle of a mesh.
+
+The last values are the inner limits of the net around a mesh, and of the background around separate elements.
 """
 WHOLE = 0.35
-"""Minimum distance of a detection from the border, as a share of the box, for learning colours from it."""
+"""Minimum distance of a detection from the border for learning colours from it, in box sides."""
 ALIKE = 0.3
-"""Share of the possible net for learning its colours: the pixels least like the background."""
+"""Share of the pixels of a possible net that its colours are learned from.
+
+These pixels differ most from the background.
+"""
 
 
 def ellipse(box: tuple[int, int], share: float = 1.0) -> Bools:
-    """Return the ellipse inscribed in a box, scaled by ``share``."""
+    """Return a mask of the ellipse inscribed in a box, scaled by ``share``."""
     rows, columns = (np.arange(n) - (n - 1) / 2 for n in box)
     inside: Bools = np.add.outer((2 * rows / box[0]) ** 2, (2 * columns / box[1]) ** 2) <= share**2
     return inside
 
 
 def disc(shape: tuple[int, int], points: NDArray[np.float64], radius: int = RADIUS) -> Bools:
-    """Mark pixels within a radius of points."""
+    """Return a mask of the pixels within a radius of any of the points."""
     marked = np.zeros(shape, bool)
     stamp(marked, points, ellipse((2 * radius + 1, 2 * radius + 1)), (False, False))
     return marked
 
 
 def pose(shape: Bools, angle: float, scale: float) -> Bools:
-    """Return a shape rotated by an angle in degrees and scaled about its middle.
+    """Return a shape rotated by an angle in degrees, and scaled about its middle.
 
-    The convention is that of the element search.
+    The sense of rotation is the same as in the element search.
     """
     from scipy.ndimage import affine_transform
 
@@ -72,7 +76,7 @@ def pose(shape: Bools, angle: float, scale: float) -> Bools:
 
 
 def stamp_posed(mask: Bools, points: NDArray[Any], poses: NDArray[np.float64], shape: Bools, wrap: Wrap) -> None:
-    """Mark copies of a shape around points, rotated and scaled by the two columns of ``poses``."""
+    """Mark copies of a shape around points. The columns of ``poses`` are the rotation in degrees and the scale of each."""
     for angle, scale in np.unique(poses, axis=0).tolist():
         here = ((poses == (angle, scale)).all(axis=1)).nonzero()[0]
         plain = angle == 0.0 and scale == 1.0
@@ -80,7 +84,7 @@ def stamp_posed(mask: Bools, points: NDArray[Any], poses: NDArray[np.float64], s
 
 
 def stamp(mask: Bools, points: NDArray[Any], shape: Bools, wrap: Wrap) -> None:
-    """Mark copies of a shape around points, clipped to the image."""
+    """Mark copies of a shape around points. Parts outside the image are dropped, or wrap along periodic axes."""
     rows, columns = np.nonzero(shape)
     offsets = np.stack([rows - shape.shape[0] // 2, columns - shape.shape[1] // 2], axis=-1)
     places = (np.rint(points).astype(np.intp)[:, np.newaxis] + offsets).reshape(-1, 2)
@@ -107,7 +111,7 @@ def cut_foreground(
     seed: int = 0,
     model: Model = "mixture",
 ) -> Bools:
-    """Separate foreground from background.
+    """Return the foreground mask of a texture by a graph cut between the colours of elements and background.
 
     Parameters
     ----------
@@ -120,9 +124,9 @@ def cut_foreground(
     background : (H, W) bool
         Known background.
     layout : Layout
-        Layout of the elements. Elements other than nets fill the middles of their boxes.
+        Layout of the elements. For a net, a box can contain a mesh. Other elements cover the middles of their boxes.
     poses : (n, 2), optional
-        Rotation in degrees and relative size of each element. They determine the middle of each element. Default: all
+        Rotation in degrees and relative size of each element. They are applied to the middle of its box. Default: all
         like the chosen one.
     shape : bool, optional
         Foreground of the chosen element within its box, if it is known.
@@ -148,7 +152,7 @@ def cut_foreground(
     half = WHOLE * turned[:, 1:] * np.array(box)
     whole = ((centres >= half) & (centres <= np.array(size) - 1 - half)) | np.array(wrap)
     whole[0] = True
-    # Do not learn from elements that the border cuts: they may be false detections.
+    # Do not learn from detections cut by the border, because they can be wrong.
     centres, turned = centres[whole.all(axis=1)], turned[whole.all(axis=1)]
     known = flat[background.ravel()]
     core = shape if shape is not None else ellipse(box, CORE)
@@ -160,7 +164,7 @@ def cut_foreground(
         outer = mark(~ellipse(box, OUTER)) & ~background
         mesh = bool(np.median(unlikeness[fore.ravel()]) < np.median(unlikeness[outer.ravel()]))
         if mesh:
-            # The box contains a mesh of the net, and the middle of a mesh is background.
+            # The box contains a mesh of the net: the net is around it, and the middle of the mesh is background.
             fore, back = outer & ~fore, mark(ellipse(box, MESH)) & ~outer
         unlike = unlikeness[fore.ravel()]
         fore.ravel()[np.flatnonzero(fore.ravel())[unlike < np.quantile(unlike, 1 - ALIKE)]] = False
@@ -177,7 +181,7 @@ def cut_foreground(
 
 
 def flatten_shading(colours: Floats, reach: float, wrap: Wrap) -> Floats:
-    """Remove slow changes, which are lighting if elements are spread evenly."""
+    """Remove slow changes of colour, which are lighting if elements are spread evenly."""
     from scipy.ndimage import gaussian_filter
 
     mode = ["wrap" if w else "nearest" for w in wrap]
@@ -186,12 +190,12 @@ def flatten_shading(colours: Floats, reach: float, wrap: Wrap) -> Floats:
 
 
 def round_to_odd(length: float) -> int:
-    """Return the odd number nearest to a length, at least 3."""
+    """Return the odd whole number nearest to a length, at least 3."""
     return max(3, 2 * int(np.floor(length / 2)) + 1)
 
 
 def _subsample(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np.float64]:
-    """Return evenly spaced samples up to a maximum number, from a hashed start."""
+    """Return at most ``most`` evenly spaced samples. The first one depends on the seed."""
     if len(samples) <= most:
         return samples
     at = (np.arange(most) + uniform(seed, 1 << 20)) * (len(samples) / most)
@@ -199,7 +203,7 @@ def _subsample(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np
 
 
 def _measure_nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the squared distance to the nearest sample (equation 2, sign corrected), for colours 0 to 255."""
+    """Return the squared distance of colours to the nearest sample (equation 2 with corrected sign), on a scale of 0 to 255."""
     from scipy.spatial import cKDTree
 
     found: NDArray[np.float64] = (255 * cKDTree(samples).query(colours)[0]) ** 2
@@ -207,9 +211,9 @@ def _measure_nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.flo
 
 
 def _measure_smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
-    """Return the smoothness costs (equation 3) of pairs along each axis.
+    """Return the cost of a boundary between neighbours (equation 3), along each axis.
 
-    Its sigma is that of the image, or 1 as printed.
+    Its sigma is measured in the image. The model of the paper uses sigma 1, as printed.
     """
     squares = [((colours - np.roll(colours, -1, axis)) ** 2).sum(axis=-1) for axis in range(2)]
     inner = [s if wrap[axis] else np.delete(s, -1, axis) for axis, s in enumerate(squares)]
@@ -220,18 +224,19 @@ def _measure_smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequ
 
 
 def tidy_mask(mask: Bools, area: float, *, net: bool = False) -> Bools:
-    """Fill small holes, smooth the outline by a pixel, and remove specks.
+    """Fill small holes in a mask, smooth its outline by a pixel, and remove small components.
 
     ``area`` is the area of the chosen element.
 
-    Only small specks of a net are removed, because nets consist of thin lines.
+    If ``net``, the outline is not smoothed and only very small components are removed, because nets consist of thin
+    lines.
     """
     from scipy import ndimage
 
     pieces, count = ndimage.label(mask)
     holes, _ = ndimage.label(~mask)
     size = np.bincount(holes.ravel())
-    # The component around a hole is the component of the pixel above the hole's first pixel.
+    # A hole is in the component of the pixel above the first pixel of the hole.
     first = np.unique(holes, return_index=True)[1]
     above = np.where(first >= mask.shape[1], pieces.ravel()[first - mask.shape[1]], 0)
     areas = np.bincount(pieces.ravel(), minlength=count + 1)

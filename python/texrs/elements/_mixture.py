@@ -1,4 +1,4 @@
-"""Fit Gaussian mixtures of colours in NumPy, from a hashed start, with reproducible results."""
+"""Fit Gaussian mixtures to colours with reproducible results, using NumPy only."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from texrs._progress import ask
 Doubles = NDArray[np.float64]
 
 COMPONENTS, ROUNDS = 5, 25
-"""Number of Gaussians of a mixture, and number of rounds of expectation and maximisation."""
+"""Number of Gaussians of a mixture, and number of iterations of expectation and maximisation."""
 FLOOR = 1e-3
-"""Minimum variance along any direction, as a share of the mean variance of the samples."""
+"""Minimum variance of a Gaussian along any direction, as a share of the mean variance of the samples."""
 LEAST = 1e-5
-"""Minimum variance, in squared units of Lab / 100: 10 % of a step of 8 bits."""
+"""Absolute minimum variance, in squared units of Lab / 100. Its square root is about the size of an 8-bit step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mixture:
-    """Weighted Gaussians with full covariance.
+    """A mixture of weighted Gaussians with full covariance.
 
     Attributes
     ----------
     weights : (k,) float64
     means : (k, d) float64
     whiten : (k, d, d) float64
-        Lower triangular matrices W with W cov W^T = 1.
+        Lower triangular matrices W that whiten each Gaussian: W cov W^T = 1.
     """
 
     weights: Doubles
@@ -38,7 +38,7 @@ class Mixture:
 
     @classmethod
     def fit(cls, samples: Doubles, *, seed: int = 0, components: int = COMPONENTS) -> Mixture:
-        """Fit to samples (n, d), n >= 1, by expectation and maximisation from a k-means++ start."""
+        """Fit a mixture to samples (n, d), n >= 1, by expectation and maximisation, from a k-means++ start."""
         count = max(1, min(components, len(np.unique(samples, axis=0)), len(samples) // 8))
         centres = _start(samples, count, seed)
         apart = ((samples[:, np.newaxis] - centres) ** 2).sum(axis=-1)
@@ -56,7 +56,7 @@ class Mixture:
 
     @classmethod
     def _estimate(cls, samples: Doubles, share: Doubles, floor: float) -> Mixture:
-        # Avoid matrix products: a library may sum in another order if the number of threads changes.
+        # Avoid matrix products, because a library can sum in another order if the number of threads changes.
         mass = share.sum(axis=0) + 1e-12
         means = np.einsum("nk,nd->kd", share, samples) / mass[:, np.newaxis]
         off = samples[:, np.newaxis] - means
@@ -80,7 +80,7 @@ class Mixture:
         return found
 
     def log(self, samples: Doubles) -> Doubles:
-        """Return the logarithm of the density at samples (n, d)."""
+        """Return the natural logarithm of the density at samples (n, d)."""
         logs = self._measure_logs(samples)
         top = logs.max(axis=1)
         density: Doubles = top + np.log(np.exp(logs - top[:, np.newaxis]).sum(axis=1))
@@ -88,7 +88,7 @@ class Mixture:
 
 
 def _start(samples: Doubles, count: int, seed: int) -> Doubles:
-    """Choose centres that are far apart (k-means++: Arthur and Vassilvitskii 2007)."""
+    """Return initial centres that are far apart (k-means++: Arthur and Vassilvitskii 2007)."""
     chosen = [int(uniform(seed, 0) * len(samples))]
     apart = ((samples - samples[chosen[0]]) ** 2).sum(axis=1)
     for i in range(1, count):

@@ -75,18 +75,18 @@ class ElementSearch:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Checked options that apply to all stages of an analysis."""
+    """Checked options that apply to all steps of an analysis."""
 
     search: ElementSearch
     model: Model
     literal: bool
-    """True if the algorithm is used as published."""
+    """True if the algorithm is used as published, with ``method="paper"``."""
     wrap: tuple[bool, bool]
     seed: int
 
     @classmethod
     def of(cls, search: object, method: object, wrap: object, seed: object) -> Settings:
-        """Check the options, and set the defaults that depend on the method."""
+        """Check the options, and choose the defaults that depend on the method."""
         as_method(method, None, "paper")
         if not isinstance(search, ElementSearch):
             raise InvalidInput(f"search: must be a texrs.elements.ElementSearch, got {type(search).__name__}")

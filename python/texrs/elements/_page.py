@@ -1,4 +1,4 @@
-"""Write an HTML page that shows an analysis and helps to correct it."""
+"""Write an HTML page that shows an analysis and lets the user correct it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["to_html"]
 
 
 def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
-    """Return an HTML page that shows an analysis, with corrections by clicking.
+    """Return an HTML page that shows an analysis. Elements are corrected by clicking.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
     Returns
     -------
     str
-        One page that does not need other files. Its last part is the list of corrections for `correct`.
+        A page that does not need other files. It ends with the list of corrections for `correct`.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
     drawn, report = draw(entry), entry.report
     height, width = entry.image.shape[:2]
     rows = []
-    # Proposed values have a confidence. Doubtful ones are marked.
+    # Show the confidence of proposed values, and mark doubtful ones.
     for name in ("box", "layout", "background"):
         sure = report.get("confidence", {}).get(name)
         said = "given" if sure is None else f"proposed, {sure:.0%} sure"
@@ -55,7 +55,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
         value = {"layout": str(entry.layout), "box": f"{entry.box[0]} x {entry.box[1]}"}.get(name, "")
         rows.append(f"<tr{' class=doubt' if advice else ''}><th>{name}<td>{escape(value)}<td>{said}{advice}")
     doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("warnings", []))
-    # The script of the page computes the list of corrections from these data.
+    # The script of the page derives the list of corrections from these data.
     known = {
         "points": entry.points.round(2).tolist(),
         "box": list(entry.box),
@@ -65,7 +65,7 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
         "earlier": report.get("corrections", []),
     }
     options = "".join(f"<option{' selected' if one == entry.layout else ''}>{one}" for one in Layout)
-    # A name in the data must not end the script element.
+    # Escape "<", so that a name in the data cannot end the script element.
     data = json.dumps(known).replace("<", "\\u003c")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">

@@ -1,10 +1,10 @@
-"""Propose the element, the background and the layout, with their confidence.
+"""Propose the box, the background and the layout of an analysis, with a confidence for each.
 
 1. Sizes: blobs of every scale, areas of a colour segmentation, and periods of the autocorrelation propose boxes.
-2. Element: each box is searched for in a small image. The box that the texture repeats best is used.
-3. Background: the places farthest from all detections, among those with the most common colours.
-4. Layout: elements that are busier and more varied than the rest are objects on a background, unless the whole image
-   certainly consists of cells. Otherwise the rest is a net if it has a high contrast, and joints if not.
+2. Element: copies of each box are searched for in a small image. The box that is repeated best is used.
+3. Background: the places farthest from all detections, among places of the most common colours.
+4. Layout: elements that have more edges and vary more than the rest are objects on a background, unless the whole
+   image certainly consists of cells. Otherwise the rest is a net if it has a high contrast, and joints if not.
 """
 
 from __future__ import annotations
@@ -30,52 +30,58 @@ from texrs.exemplar.cells import find_cells
 from texrs.point_sets import spacing
 
 SMALL = 224
-"""Maximum side of the image for comparing boxes, in pixels."""
+"""Maximum side, in pixels, of the small image for comparing boxes."""
 GROWN, STEPS = 3, 5
-"""Number of boxes whose sides are changed while this improves them, and maximum number of changes."""
+"""Number of the best boxes that are resized step by step, and maximum number of steps."""
 AGAIN = 6
-"""Number of boxes that are moved until they contain one object, and tried again."""
+"""Number of the best boxes that are moved to the middle of an object, and searched for again."""
 WIDE = 1.3
-"""Sides of the window for this, as a multiple of the box."""
+"""Sides of the window for finding the object, relative to the box."""
 OUT = 1.1
-"""Minimum distance from an element for a background pixel, in half boxes."""
+"""Minimum distance of a background pixel from the centre of an element, in half boxes."""
 PLACES = 12
-"""Number of proposed places of the background."""
+"""Maximum number of proposed places of the background."""
 CLEAR = 0.68
-"""Minimum ratio of activity and variation in elements to the rest, for objects on a background."""
+"""Minimum ratio for objects on a background: edges times variation in elements, divided by the same product for the rest.
+"""
 LEAST_EDGE = 0.002
-"""Negligible colour difference. The range of colours is 1."""
+"""Negligible edge strength or colour difference, which is added to both parts of a ratio. Lightness has a range of 1.
+"""
 NET = 0.2
-"""Minimum contrast of a net with evenly spaced openings. Half of it is enough for uneven spacing."""
-EVEN = 0.15
-"""Maximum ratio of the standard deviation of nearest distances to their mean, for even spacing."""
-CELLS, LARGE = 0.99, 256
-"""Minimum confidence in cells that overrides the look of single elements, and maximum side of the image for finding
-cells.
+"""Minimum lightness contrast (0 to 1) of a net to its openings if these are evenly spaced.
 
-Chosen on photographs: walls and tiles have more confidence, heaps of fruit or stones less.
+Half of it is enough otherwise.
+"""
+EVEN = 0.15
+"""Maximum standard deviation of nearest distances, relative to their mean, for even spacing."""
+CELLS, LARGE = 0.99, 256
+"""Minimum confidence of cells that are used although elements look like objects.
+
+The second value is the maximum side, in pixels, of the image for finding cells.
+
+Chosen on photographs: walls and tiles have a higher confidence, heaps of fruit or stones a lower one.
 """
 SMALLEST = 16
-"""Minimum shorter side of that image, in pixels."""
+"""Minimum shorter side of the reduced image for finding cells, in pixels."""
 DOUBTFUL = 0.65
 """Confidence below which a proposal is doubtful.
 
-Measured on layouts of 23 photographs, their parts, and four generated textures of each of eight kinds. Right were 28 %
-of the layouts with confidence below 0.5, 49 % up to 0.65, 78 % up to 0.8, and all above.
+Measured on layouts of 23 photographs, their parts, and four generated textures of each of eight kinds. The share of
+correct layouts was 28 % below 0.5, 49 % up to 0.65, 78 % up to 0.8, and 100 % above.
 """
 ADVICE = {
     "box": "draw a box around one element",
     "background": "give a few places between the elements",
     "layout": "give the layout of the elements",
 }
-"""Advice on what to give instead of a doubtful proposal."""
+"""Advice to the user for each doubtful proposal."""
 OPEN = 0.3
-"""Minimum background share of a given mask for separate components."""
+"""Minimum share of background for a given mask to contain separate elements. Otherwise its components are jointed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """Starting point of an analysis: the arguments, and proposals for the rest.
+    """Starting point of an analysis: the given arguments, and proposals for the others.
 
     Attributes
     ----------
@@ -84,7 +90,7 @@ class Start:
     layout : Layout
         Layout of the elements.
     background : (H, W) bool, optional
-        Pixels that certainly are not in an element. May be unknown if the foreground is known.
+        Pixels that are certainly outside all elements. Can be None if the foreground is known.
     proposed : list of str
         Names of the proposed arguments.
     confidence : dict
@@ -108,13 +114,13 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
         return Start(box, layout, background, [], {})
     missing = (("box", box is None), ("background", blind), ("layout", layout is None))
     sure: dict[str, float] = {}
-    # Without a box, place it at given points, or choose it in a small image.
+    # If no box is given, place one at the given points, or choose one in a small image.
     if box is None:
         if points is not None and len(points) > 2:
             box, sure["box"] = _place_box(points, size), 0.5
         else:
             box, sure["box"] = _choose_box(guide, wrap, progress)
-    # The background and the layout depend on the places of the elements, so search these first.
+    # The background and the layout depend on where the elements are, so search for the elements first.
     if points is None:
         rest = partial(_report_part, progress, 0.8, 0.9)
         points = search_similar(guide, box.centre, box.size, wrap=wrap, progress=rest).points
@@ -125,7 +131,7 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
             layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
         progress(0.95)
     if blind and "layout" in sure and layout == Layout.CONNECTED:
-        # The openings of a net are what repeats. The middle of each, except the chosen one, is background.
+        # If the repeated parts are the openings of a net, the middles of all except the chosen one are background.
         middle = np.array(box.centre)
         others = points[np.abs(points - middle).max(axis=1) > max(box.size) / 2][:PLACES]
         if len(others):
@@ -147,11 +153,11 @@ def _report_part(progress: Callable[[float], object], low: float, high: float, s
 
 
 def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
-    """Try boxes in a small image, and return the box that explains most of the image."""
+    """Return the box whose copies explain the most of a small image, and its confidence."""
     step = max(1, -(-max(guide.shape[:2]) // SMALL))
     small = downscale(guide, step)
     with answering(progress, 0.0):
-        # Search in a small image, because every box needs a search of its own.
+        # Use a small image, because every box needs a search of its own.
         boxes = propose_boxes(small)
     if not boxes:
         raise InvalidInput("box: no box could be proposed for this image; give a box or the points")
@@ -177,12 +183,12 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
     for number, box in enumerate(boxes):
         attempt(box)
         reached = 0.5 * (number + 1) / len(boxes)
-    # Centre the best boxes on the elements that they found.
+    # Move the best boxes so that the found elements are in their middle.
     for _, box, found in sorted(tried, key=lambda t: -t[0])[:AGAIN]:
         moved = _recentre(light, found, box)
         if moved is not None:
             attempt(moved)
-    # Resize the best boxes step by step, as long as their score rises.
+    # Resize the best boxes step by step while their score rises.
     for number, (value, box, _) in enumerate(sorted(tried, key=lambda t: -t[0])[:GROWN]):
         for _ in range(STEPS):
             better = [(attempt(b), b) for b in resize_box(box, small.shape[:2])]
@@ -193,7 +199,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
         reached = 0.5 + 0.3 * (number + 1) / GROWN
     assert best is not None
     sure = _measure_confidence(light, best[1], next(f for _, b, f in tried if b == best[1]))
-    # Convert the best box to pixels of the full image, and move it inside.
+    # Convert the best box to pixels of the full image, and move it into the image.
     row, column = (float(c * step + (step - 1) / 2) for c in best[1].centre)
     height, width = (float(s * step) for s in best[1].size)
     whole = (guide.shape[0], guide.shape[1])
@@ -204,14 +210,14 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
 
 
 def shrink(guide: Floats) -> tuple[Floats, int]:
-    """Return the reduced image for finding cells, and its reduction factor."""
+    """Return a reduced image for finding cells, and the factor of reduction."""
     sides = guide.shape[:2]
     step = max(1, min(-(-max(sides) // LARGE), min(sides) // SMALLEST))
     return downscale(guide, step), step
 
 
 def downscale(guide: Floats, step: int) -> Floats:
-    """Average squares of pixels."""
+    """Reduce an image by averaging squares of ``step`` x ``step`` pixels."""
     rows, columns = (n // step for n in guide.shape[:2])
     cut = guide[: rows * step, : columns * step]
     return np.ascontiguousarray(
@@ -220,10 +226,10 @@ def downscale(guide: Floats, step: int) -> Floats:
 
 
 def _score(light: Floats, found: Detections, box: Box) -> float:
-    """Return how well copies of a box explain an image.
+    """Return a score, at least 0, of how well copies of a box explain an image.
 
-    The score depends on the similarity of the copies, their contrast to other places, and their coverage. It also
-    depends on whether the mean copy shows one object in the middle of the box.
+    The score rises with the similarity of the copies, their contrast to other places, and the area that they cover. It
+    also depends on whether the mean of the copies shows one object in the middle of the box.
     """
     if len(found.scores) < 4:
         return 0.0
@@ -234,7 +240,7 @@ def _score(light: Floats, found: Detections, box: Box) -> float:
     window = _average_window(light, found, box, WIDE)
     if window is None:
         return 0.0
-    # Large boxes are less often similar by chance (Fisher's z grows with the square root of the area).
+    # Prefer large boxes, which are less often similar by chance (Fisher's z grows with the square root of the area).
     large = float(np.sqrt(box.size[0] * box.size[1] / light.size))
     return (
         large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _measure_closure(window, np.zeros(2), box.size) ** 2
@@ -242,7 +248,7 @@ def _score(light: Floats, found: Detections, box: Box) -> float:
 
 
 def _measure_confidence(light: Floats, box: Box, found: Detections) -> float:
-    """Return the confidence of a box, from the similarity of its copies and whether it contains one object."""
+    """Return the confidence of a box, 0.05 to 0.95, from the similarity of its copies and whether it contains one object."""
     window = _average_window(light, found, box, WIDE)
     if window is None or len(found.scores) < 4:
         return 0.1
@@ -250,7 +256,7 @@ def _measure_confidence(light: Floats, box: Box, found: Detections) -> float:
 
 
 def _average_window(light: Floats, found: Detections, box: Box, wide: float) -> Floats | None:
-    """Return the mean window around detections, among those inside the image."""
+    """Return the mean of the windows around detections that are inside the image. None if there are none."""
     half = [round_to_odd(wide * s) // 2 for s in box.size]
     sides = light.shape
     whole = [p for p in found.pixels.tolist() if all(half[a] <= p[a] < sides[a] - half[a] for a in range(2))]
@@ -261,16 +267,16 @@ def _average_window(light: Floats, found: Detections, box: Box, wide: float) -> 
 
 
 def _measure_closure(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
-    """Return the share of changes in a window that point outwards from a centre, 0 to 1.
+    """Return the share of edges in a window that face towards or away from a centre, 0 to 1.
 
-    The outline of one object does so.
+    The share is high for the outline of a single object.
     """
     rows, columns = np.gradient(window)
     middle = (np.array(window.shape) - 1) / 2 + centre
     out = [np.arange(n) - m for n, m in zip(window.shape, middle, strict=True)]
     y, x = (o / (s / 2) for o, s in zip(out, size, strict=True))
     away = np.maximum(np.hypot(y[:, np.newaxis], x), 1e-6)
-    # Measure in units of the box, so that an oblong object counts as round.
+    # Measure in units of the box, so that an oblong object is treated like a round one.
     slope = rows * size[0], columns * size[1]
     total = hypot_single(*slope) * (away < WIDE)
     outward = (slope[0] * y[:, np.newaxis] + slope[1] * x) / away * (away < WIDE)
@@ -281,7 +287,7 @@ def _measure_closure(window: Floats, centre: NDArray[np.float64], size: tuple[in
 
 
 def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
-    """Move a box by up to half of it, so that the mean of its copies shows one object in its middle."""
+    """Move a box by up to half its size, so that one object is in the middle of the mean of its copies."""
     window = _average_window(light, found, box, 2.2)
     if window is None:
         return None
@@ -305,7 +311,7 @@ def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
 
 
 def _place_box(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
-    """Return a box of 0.75 of the spacing, around the point farthest from the border."""
+    """Return a box with sides of 0.75 of the spacing of points, around the point farthest from the border."""
     side = max(float(LEAST), 0.75 * spacing(points))
     side = min(side, min(size) - 1.0)
     depth = np.minimum(points, np.array(size) - 1 - points).min(axis=1)
@@ -339,7 +345,7 @@ def measure_distance(
 def _choose_layout(
     guide: Floats, away: Floats, points: NDArray[np.float64], mask: Bools | None
 ) -> tuple[Layout, float]:
-    """Choose a layout, and return it with its confidence."""
+    """Return the most likely layout and its confidence."""
     from scipy.spatial import cKDTree
 
     if mask is not None:
@@ -359,24 +365,25 @@ def _choose_layout(
         sure = cells
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
-    # A net has more contrast to its openings than joints have to cells. Evenly spaced openings need more contrast.
+    # Compare the contrast with that of a net. Evenly spaced openings require more contrast, because bricks are evenly
+    # spaced too.
     net = contrast / (NET if spread < EVEN else NET / 2)
     return (Layout.CONNECTED if net >= 1 else Layout.JOINTED), sure * _measure_odds(net)
 
 
 def _measure_odds(ratio: float) -> float:
-    """Return the confidence of a choice with a threshold at ratio 1.
+    """Return the confidence of a choice made by comparing a ratio with 1.
 
-    It is 0.5 at the threshold and rises on both sides.
+    It is 0.5 at ratio 1, and rises on both sides.
     """
     return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
 
 def compare_elements(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
-    """Return how much elements are objects, not openings, and their lightness difference to the rest.
+    """Return how much elements look like objects on a background, and their lightness difference to the rest.
 
-    Openings of a net, and bricks between joints, are even and similar. Lines, edges and colours are between them. For
-    objects on a background the reverse holds.
+    The openings of a net and the bricks between joints are even and similar, and lines, edges and colours are between
+    them. Objects have edges and colours of their own, and the background between them is even.
     """
     from scipy.ndimage import gaussian_filter, gaussian_gradient_magnitude
 
@@ -397,7 +404,7 @@ def compare_elements(colours: Floats, away: Floats, points: NDArray[np.float64])
 
 
 def _choose_background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, float]:
-    """Return the places farthest from all elements, among those of the most common colour."""
+    """Return a mask of the places farthest from all elements with the most common colour, and its confidence."""
     from scipy.ndimage import gaussian_filter, maximum_filter
 
     colours = to_lab(guide)

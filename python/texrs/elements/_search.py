@@ -1,4 +1,4 @@
-"""Find where a texture looks like its chosen element (section 3.2), to a fraction of a pixel."""
+"""Find all places of a texture that look like the chosen element (section 3.2), to a fraction of a pixel."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from texrs.kernels.ncc import Correlation
 Wrap: TypeAlias = tuple[bool, bool]
 
 CHANNELS = 8
-"""Number of compared channels of the appearance vectors (section 3.2)."""
+"""Number of channels of an appearance vector that are compared (section 3.2)."""
 RADIUS = 2
 """Radius of the windows that an appearance vector describes: 5 x 5 pixels."""
 COVERED = 0.95
-"""Covered share of the map that ends the search for candidates (section 3.2)."""
+"""Share of the map that must be covered by removed areas before the search for candidates ends (section 3.2)."""
 CONTEXT = 1.3
-"""Sides of the compared window, as a multiple of the box.
+"""Sides of the window that is compared, relative to the box.
 
-The surroundings are part of the look of an element, and the inside of a tile or a coin may only contain noise.
+The surroundings help to recognise an element, and the inside of a tile or a coin may only contain noise.
 """
 APART = 1.3
-"""Sides of the area removed around a candidate, as a multiple of the box.
+"""Sides of the area around a candidate that excludes other candidates, relative to the box.
 
-Boxes of neighbours overlap, but seldom by more.
+Boxes of neighbours can overlap, but seldom by more.
 """
 RANGE = 0.25
-"""Minimum range of the candidates' scores for a meaningful cut."""
+"""Minimum range of the scores of candidates for a threshold that separates two classes."""
 BINS = 64
-"""Number of bins of the histogram over [-1, 1] whose entropy chooses a channel."""
+"""Number of bins, over [-1, 1], of the histogram whose entropy chooses a channel."""
 
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A template of the bank: the box of the element with its surroundings, rotated and scaled."""
+    """Template: the box of the element with its surroundings, rotated and scaled."""
 
     box: tuple[int, int]
     inner: tuple[int, int]
-    """The box without its surroundings."""
+    """Height and width of the box without its surroundings, in pixels."""
     angle: float = 0.0
     scale: float = 1.0
 
@@ -57,21 +57,21 @@ class Detections:
     Attributes
     ----------
     pixels : (n, 2) intp
-        Local maxima of the map.
+        Local maxima of the similarity, in pixels.
     points : (n, 2) float64
-        The maxima to a fraction of a pixel.
+        Positions of the maxima, to a fraction of a pixel.
     scores : (n,) float64
-        Values of the map.
+        Similarity at the maxima, -1 to 1.
     template : (n,) intp
-        Index of the best template in the bank.
+        Index of the most similar template.
     similarity : (H, W) float32
-        Similarity to the element.
+        Similarity of each pixel to the element, -1 to 1.
     threshold : float
-        Minimum score. -1 if no candidates were cut.
+        Minimum similarity of accepted candidates. -1 if all were accepted.
     channel : int or None
-        Channel that was used. None for all channels, weighted.
+        Channel that was used. None if all channels were used, weighted by their variance.
     templates : list of Template
-        The bank, the element itself first.
+        All templates, the unchanged element first.
     """
 
     pixels: NDArray[np.intp]
@@ -85,13 +85,13 @@ class Detections:
 
     @property
     def poses(self) -> NDArray[np.float64]:
-        """Rotation in degrees and size of each detection relative to the element, (n, 2)."""
+        """Rotation in degrees and size of each detection, relative to the element, (n, 2)."""
         found = [(t.angle, t.scale) for t in (self.templates[k] for k in self.template)]
         return np.array(found, np.float64).reshape(-1, 2)
 
 
 def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any]:
-    """Extend an image beyond its border, periodically along axes that wrap, and mirrored along others."""
+    """Extend an image beyond its borders: periodically along axes that wrap, and mirrored along others."""
     for axis in range(2):
         widths = [(margin[axis], margin[axis]) if a == axis else (0, 0) for a in range(array.ndim)]
         array = np.pad(array, widths, mode="wrap" if wrap[axis] else "symmetric" if len(array) < 2 else "reflect")
@@ -99,11 +99,11 @@ def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any
 
 
 def describe_appearance(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
-    """Return the appearance vectors (H, W, 8) of an image, and those of patches.
+    """Return the appearance vectors (H, W, 8) of an image, and of additional patches.
 
-    The margins of patches are `RADIUS` wide.
+    The patches must have margins of `RADIUS` pixels.
 
-    All are in one atlas, so that the same components describe them.
+    All vectors are computed together, so that they have the same components.
     """
     image = pad(colours, (RADIUS, RADIUS), wrap)
     height, width = image.shape[:2]
@@ -126,7 +126,7 @@ def describe_appearance(colours: Floats, wrap: Wrap, patches: Sequence[Floats] =
 
 
 def make_bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> list[Template]:
-    """List the templates to try, the element itself first."""
+    """Return the templates for all directions and sizes, the unchanged element first."""
     found = []
     for scale in sorted(scales, key=lambda s: abs(np.log(s))):
         for turn in range(rotations):
@@ -149,7 +149,7 @@ def extract_template(colours: Floats, centre: tuple[int, int], template: Templat
     half = [n // 2 + RADIUS for n in template.box]
     rows, columns = np.mgrid[-half[0] : half[0] + 1, -half[1] : half[1] + 1].astype(np.float64)
     angle = np.deg2rad(template.angle)
-    # Rotate back and scale down each offset in the template to get the offset in the element.
+    # Convert each offset in the template to an offset in the element, by the inverse rotation and scale.
     back = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / template.scale
     places = [back[i, 0] * rows + back[i, 1] * columns + centre[i] for i in range(2)]
     modes = ["grid-wrap" if w else "mirror" for w in wrap]
@@ -172,7 +172,7 @@ def search_similar(
     features: Floats | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Detections:
-    """Find the places that look like the box around ``centre``.
+    """Find the places of a texture that look like the box around ``centre``.
 
     Parameters
     ----------
@@ -185,11 +185,11 @@ def search_similar(
     options : ElementSearch
         Directions, sizes, minimum similarity and channels.
     cut : bool
-        If True, candidates are cut by their scores, and those that overlap better ones are dropped.
+        If True, apply a threshold to the candidates, and drop those that overlap better ones.
     features : (H, W, 8) float32, optional
-        Result of `describe_appearance` for the image. Saves time if many boxes are searched for.
+        Result of `describe_appearance` for the image, to save time if many boxes are searched for. Default: computed.
     progress : callable, optional
-        Function that is called with the share of the work that is done.
+        Function that is called with the finished share of the work, 0 to 1.
     """
     templates = make_bank(box, options.rotations, options.scales)
     turned = [t for t in templates if t.angle or t.scale != 1.0]
@@ -201,14 +201,14 @@ def search_similar(
     # Pad the features, so that elements at the border can be found.
     margin = tuple(max(t.box[axis] for t in templates) // 2 for axis in range(2))
     around = pad(features, (margin[0], margin[1]), wrap)
-    # Weight each channel by its variance, so that channels without content do not count.
+    # Weight each channel by its variance, so that channels with little content have little influence.
     variance = features.reshape(-1, CHANNELS).var(axis=0, dtype=np.float64)
     weights = (variance / max(float(variance.sum()), 1e-12)).astype(np.float32)
     correlation = Correlation(around)
     best: Floats | None = None
     which = np.zeros(colours.shape[:2], np.intp)
     chosen: int | None = None
-    # Keep the best template at each pixel.
+    # Keep the similarity of the best template at each pixel.
     for i, template in enumerate(templates):
         half = [n // 2 for n in template.box]
         if template in turned:
@@ -223,7 +223,7 @@ def search_similar(
             chosen = choose_channel(maps) if chosen is None else chosen
             here = np.ascontiguousarray(maps[..., chosen])
         else:
-            # Add in a fixed order, so that the last bits do not depend on a library.
+            # Sum in a fixed order, so that the last bits do not depend on a library.
             here = np.zeros(colours.shape[:2], np.float32)
             for c in range(CHANNELS):
                 here += weights[c] * maps[..., c]
@@ -235,7 +235,7 @@ def search_similar(
         if progress is not None:
             progress((i + 1) / len(templates))
     assert best is not None
-    # Elements are at the maxima of the similarity.
+    # Elements are at local maxima of the similarity.
     pixels = suppress_non_maxima(best, [t.inner for t in templates], which, wrap)
     scores = best[tuple(pixels.T)].astype(np.float64)
     least = -1.0
@@ -244,7 +244,8 @@ def search_similar(
     elif cut and len(scores) and scores[1:].max(initial=-1) - scores[-1] > RANGE:
         least = threshold_otsu(scores[1:])
     if cut:
-        # The threshold needs candidates between elements. After the cut, drop those that overlap a better one.
+        # Determine the threshold with candidates between elements included. Afterwards, drop those that overlap a
+        # better one.
         apart = suppress_non_maxima(best, [t.inner for t in templates], which, wrap, share=APART)
         pixels, scores = apart, best[tuple(apart.T)].astype(np.float64)
     pixels, scores = pixels[scores >= least], scores[scores >= least]
@@ -253,7 +254,7 @@ def search_similar(
 
 
 def choose_channel(maps: Floats) -> int:
-    """Return the channel whose map has the lowest entropy (section 3.2, as printed)."""
+    """Return the channel whose similarity map has the lowest entropy (section 3.2, as printed)."""
     entropies = []
     for c in range(maps.shape[-1]):
         share = np.histogram(maps[..., c], BINS, (-1, 1))[0] / maps[..., c].size
@@ -265,7 +266,7 @@ def choose_channel(maps: Floats) -> int:
 def suppress_non_maxima(
     map: Floats, boxes: Sequence[tuple[int, int]], which: NDArray[np.intp], wrap: Wrap, share: float = 1.0
 ) -> NDArray[np.intp]:
-    """Return local maxima, best first, each with the box around it removed.
+    """Return local maxima, the best first. Each removes the area around it from the candidates.
 
     The result is (n, 2), in the order of choice.
     """
@@ -295,7 +296,7 @@ def suppress_non_maxima(
 
 
 def threshold_otsu(values: NDArray[np.float64]) -> float:
-    """Return the value that separates numbers into two classes with the largest variance between them."""
+    """Return the threshold that divides numbers into two classes with the largest variance between them (Otsu)."""
     ordered = np.sort(values)
     count = np.arange(1, len(ordered))
     below = np.cumsum(ordered)[:-1] / count
@@ -306,7 +307,7 @@ def threshold_otsu(values: NDArray[np.float64]) -> float:
 
 
 def offset_maxima(map: Floats, pixels: NDArray[np.intp], wrap: Wrap) -> NDArray[np.float64]:
-    """Return the offsets of parabola peaks through maxima, along each axis, within half a pixel."""
+    """Return the offset of the true peak at each maximum, from a parabola along each axis, within half a pixel."""
     offsets = np.zeros((len(pixels), 2))
     for axis in range(2):
         near = []

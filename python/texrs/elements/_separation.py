@@ -1,4 +1,4 @@
-"""Reconcile detections and mask for separate elements (section 3.3 and details that it leaves open)."""
+"""Correct the detections and the mask of separate elements by each other (section 3.3, which leaves this open)."""
 
 from __future__ import annotations
 
@@ -13,28 +13,27 @@ from texrs.elements._mask import Wrap, ellipse, stamp_posed
 from texrs.elements._search import Detections
 
 ADDED = 0.25
-"""Minimum area of a component that becomes an undetected element, as a share of the usual area."""
+"""Minimum area of a component for an undetected element, as a share of the usual area."""
 SOLID, ROUND = 0.8, 0.9
-"""Minimum share of its convex hull that an element fills, and minimum share for merging several detections into one
-element.
+"""Minimum share of its convex hull that an element fills, and minimum share for merging several detections in one component.
 """
 SWOLLEN, ONE = 2.5, 3.5
-"""Maximum area of a component in usual areas: per detection in it, and for several detections of one element."""
+"""Maximum area of a component, in usual areas: for each of its detections, and for merging several detections into one element.
+"""
 LONG, THIN = 2.2, 0.6
-"""Length and mean thickness of a component, in sides of the box, for recognising a strip that is not an element."""
+"""Minimum length and maximum mean thickness of a strip that is not an element, in sides of the box."""
 HEAP = 0.3
-"""Maximum share of the detections in one component."""
+"""Maximum share of all detections in one component."""
 JOINED, MESHED = 0.5, 0.25
-"""Minimum area, in usual areas, of a component that becomes an element between joints, and of one that becomes a mesh
-of a net.
+"""Minimum area, in usual areas, of an undetected element between joints, and of an undetected mesh of a net.
 """
 TRUSTED = 0.7
-"""Minimum share of detections in such components. With fewer, the mask is wrong."""
+"""Minimum share of the detections that must be in plausible components. Otherwise the mask is replaced."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Separation:
-    """The elements of a texture, and their pixels.
+    """Elements of a texture, with their foreground.
 
     Attributes
     ----------
@@ -43,11 +42,11 @@ class Separation:
     scores : (n,) float64
         Similarity of each element to the chosen one.
     detection : (n,) intp
-        Index of the detection of each element, -1 for none.
+        Index of the detection of each element, or -1 if it was not detected.
     mask : (H, W) bool
         The foreground.
     made_by : str
-        Origin of the mask: "cut", "elements" (copies of the chosen one), "consensus" (common to all elements) or
+        Origin of the mask: "cut", "elements" (copies of the chosen element), "consensus" (common to all elements) or
         "cells".
     """
 
@@ -59,7 +58,7 @@ class Separation:
 
 
 def label_components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
-    """Return the component of each pixel of a mask, and the number of components.
+    """Return the connected component of each pixel of a mask, from 1, and the number of components.
 
     Components continue across periodic borders.
     """
@@ -79,7 +78,7 @@ def label_components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
 
 
 def rank_pieces(labels: Labels, least: float = 0) -> list[Any]:
-    """Return the components that no border cuts, of a minimum size, those of the most usual area first."""
+    """Return the regions of a minimum size that no border cuts, sorted by how usual their area is."""
     from skimage.measure import regionprops
 
     rows, columns = labels.shape
@@ -90,7 +89,7 @@ def rank_pieces(labels: Labels, least: float = 0) -> list[Any]:
 
 
 def find_nearest_pixels(points: NDArray[np.float64], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], ...]:
-    """Return the rows and columns of the pixels at or nearest to points."""
+    """Return the rows and columns of the pixels nearest to points."""
     rows, columns = np.clip(np.rint(points).astype(np.intp), 0, np.array(shape) - 1).T
     return rows, columns
 
@@ -103,9 +102,10 @@ def reconcile(
     *,
     certain: bool = False,
 ) -> Separation:
-    """Move detections to the middle of their components, add and drop some, or replace the mask by copies.
+    """Correct detections and mask by each other: centre, add and drop elements, or replace an implausible mask.
 
-    ``shape`` is the foreground of the chosen element within its box. If the mask is ``certain``, it is never replaced.
+    ``shape`` is the foreground of the chosen element within its box. It is copied to all detections if the mask is
+    implausible. If the mask is ``certain``, it is never replaced.
     """
     from skimage.measure import regionprops
 
@@ -123,7 +123,8 @@ def reconcile(
     good = (area >= ADDED * usual) & (area <= SWOLLEN * usual * np.maximum(inside, 1)) & (solid >= SOLID)
     good[0] = False
     several = (inside > 1) & (area <= SWOLLEN * usual * inside) & (area >= ADDED * usual)
-    # A component with a large part of all detections is not a heap of elements.
+    # Elements that touch form components of a few. A component with a large share of all detections is an error of the
+    # mask.
     several &= inside <= max(4, HEAP * len(points))
     good &= inside <= max(4, HEAP * len(points))
     share = float((good | several)[owner].mean()) if len(points) else 0.0
@@ -143,7 +144,7 @@ def reconcile(
             kept.extend((*points[i], scores[i], int(i)) for i in mine)
         elif len(mine):
             best = int(mine[np.argmax(scores[mine])])
-            # The middle of a ragged or too large component is meaningless, so keep the detection.
+            # The centroid of a ragged or too large component is meaningless, so keep the detected place.
             place = centre if good[number] or whole else points[best]
             kept.append((*place, scores[best], best))
         elif good[number] or certain:
@@ -152,7 +153,7 @@ def reconcile(
     table = np.array(kept, np.float64).reshape(-1, 4)
     names = np.unique(pieces[find_nearest_pixels(table[:, :2], mask.shape)])
     used = np.isin(pieces, names[names > 0])
-    # A component cut by the border may not be an element, but is not background either, so keep it in the mask.
+    # Keep components that the border cuts in the mask, because they are not background, even if they are not elements.
     ends = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
     cut = np.unique(np.concatenate(ends)) if ends else np.zeros(0, np.intp)
     cut = cut[(cut > 0) & (area[cut] >= ADDED * usual) & (area[cut] <= SWOLLEN * usual)]
@@ -161,19 +162,19 @@ def reconcile(
 
 
 def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> bool:
-    """Return whether a component is a strip: much longer and thinner than an element.
+    """Return True if a component is a strip, which is much longer and thinner than an element.
 
-    Most are along the border.
+    Most strips are along the border of the image.
     """
     side = max(bounds[axis + 2] - bounds[axis] for axis in range(2))
     return side > LONG * max(box) and area / side < THIN * min(box)
 
 
 def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bool) -> Separation:
-    """Add undetected elements between joints, or meshes of a net, that resemble the detected ones.
+    """Add undetected elements between joints, or undetected meshes of a net, that are like the detected ones.
 
-    A component counts if it is whole, as solid as an element, and of about the usual area. Detections between joints
-    are dropped if their component is far too small.
+    A component is added if no border cuts it, if it is as solid as an element, and if it has about the usual area.
+    Detections between joints are dropped if their component is far too small.
     """
     from skimage.measure import regionprops
 
@@ -213,9 +214,9 @@ def _drop_fragments(found: Separation, pieces: Labels, areas: NDArray[np.intp], 
 
 
 def find_middle(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:
-    """Return the centroid of pixels.
+    """Return the centroid of pixels (n, 2).
 
-    Along periodic axes it is the mean of their angles.
+    Along a periodic axis that the pixels cross, positions are averaged as angles.
     """
     centre = pixels.mean(axis=0)
     for axis in range(2):
