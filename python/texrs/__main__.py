@@ -1,4 +1,4 @@
-"""Run the command ``texrs`` by ``python -m texrs``."""
+"""Run the command ``texrs`` as ``python -m texrs``."""
 
 import signal
 import sys
@@ -6,7 +6,10 @@ from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code. Ctrl-C ends it without a traceback, also during import."""
+    """Run the command line and return its exit code.
+
+    Ctrl-C ends it without a traceback, even while modules are imported.
+    """
     try:
         try:
             from texrs.cli import main as run
@@ -14,8 +17,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run(arguments)
         finally:
             if arguments is None:
-                # The command has finished or cleaned up, so ignore a late Ctrl-C: the exit code already states the
-                # result.
+                # The command has finished or cleaned up, so ignore a late Ctrl-C, because the exit code already states
+                # the result.
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
         print("texrs: stopped; nothing was left half-written", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Colours and alpha: not multiplied in memory, multiplied in EXR files."""
+"""Multiply and divide colours by alpha: they are premultiplied in EXR files, but not in memory."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from texrs._typing import Array
 __all__ = ["adapt", "divide", "has_alpha", "multiply", "undo"]
 
 CLEAR = 0.01
-"""Minimum visible level of a colour. Colours of clear pixels below it are noise."""
+"""Minimum visible level of a colour, 0 to 1. Smaller colours of transparent pixels are noise."""
 MOST = 0.5
-"""Share of clear pixels with a colour above which a file is taken as not multiplied by alpha."""
+"""Fraction of coloured pixels among those with alpha 0, above which a file is treated as not premultiplied."""
 
 
 def has_alpha(pixels: Array) -> bool:
-    """Return whether the last channel of an image is its alpha.
+    """Return True if the last channel of an image is its alpha, so if it has 2 or 4 channels.
 
     Examples
     --------
@@ -31,7 +31,7 @@ def has_alpha(pixels: Array) -> bool:
 
 
 def multiply(pixels: Array, name: str) -> Array:
-    """Return linear colours multiplied by their alpha, and report colours that are lost.
+    """Return linear colours multiplied by alpha, and report colours that are lost because alpha is 0.
 
     Examples
     --------
@@ -52,9 +52,9 @@ def multiply(pixels: Array, name: str) -> Array:
 
 
 def divide(pixels: Array, name: str) -> Array:
-    """Return linear colours of an EXR file divided by their alpha.
+    """Return the linear colours of an EXR file divided by alpha.
 
-    They do not change if clear pixels show that the file is not multiplied by alpha.
+    They are returned unchanged if pixels with alpha 0 have colours, which shows that they are not premultiplied.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def divide(pixels: Array, name: str) -> Array:
 
 
 def undo(pixels: Array) -> Array:
-    """Return linear colours divided by their alpha. Clear pixels do not change.
+    """Return linear colours divided by alpha. Pixels with alpha 0 do not change.
 
     Examples
     --------
@@ -91,16 +91,16 @@ def undo(pixels: Array) -> Array:
 
 
 def adapt(array: Array, path: Path, multiplied: bool | None) -> Array:
-    """Return an image in the convention of its file format: only EXR files have colours multiplied by alpha.
+    """Convert an image to the alpha convention of its file format: only EXR files have premultiplied colours.
 
     Parameters
     ----------
     array : (H, W, C) array_like
-        Linear colours. Only floats with alpha are changed.
+        Linear colours. Only floats with an alpha channel are converted.
     path : pathlib.Path
-        File that the image is written to.
+        File to which the image is written.
     multiplied : bool or None
-        If True, the colours are already multiplied by alpha. None leaves all values unchanged.
+        If True, the colours are already multiplied by alpha. If None, nothing is converted.
 
     """
     wanted = path.suffix.lower() == ".exr"

@@ -1,6 +1,6 @@
-"""Checks and conversions of arrays, for every function that takes an image from a user.
+"""Check and convert arrays, for every function that takes an image from a user.
 
-The checks of other arguments (`texrs._checks`) are available here too.
+The checks of other arguments (`texrs._checks`) can also be imported from here.
 """
 
 from __future__ import annotations
@@ -75,40 +75,41 @@ __all__ = [
 ]
 
 FEW = 4
-"""Maximum number of channels that the check of the channel order assumes for an image."""
+"""Maximum number of channels of an image in the check of the channel order."""
 
 
 def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int = 2, finite: bool = True) -> Array:
-    """Check an image (or a volume, with ``axes=3``) and return it with its channels last, contiguous.
+    """Check an image (or a volume, with ``axes=3``) and return it contiguous, with the channels as the last axis.
 
     Parameters
     ----------
     value : array_like, path_like or PIL.Image.Image
-        Shape (H, W) or (H, W, C); with ``axes=3`` (D, H, W) or (D, H, W, C). Integers, floats of 16, 32 or 64 bit, or
-        bool. `as_ndarray` lists other accepted types.
+        Image of shape (H, W) or (H, W, C), or with ``axes=3`` volume of shape (D, H, W) or (D, H, W, C). Bool,
+        integers, or floats of 16, 32 or 64 bits. `as_ndarray` lists other accepted types.
     name : str
-        Name of the argument, for messages.
+        Name of the argument in error messages.
     minimum : int
-        Minimum length of an axis.
+        Minimum length of each spatial axis.
     axes : int
-        Number of axes without the channels.
+        Number of spatial axes: 2 for images, 3 for volumes.
     finite : bool
-        If True, floats must be finite. This reads all of them.
+        If True, floats must be finite. This check reads all values.
 
     Returns
     -------
     ndarray
-        The same values and dtype, shape (..., C), C-contiguous and in native byte order. Copied only if needed.
+        Array of shape (..., C) with the same values and dtype, C-contiguous and in native byte order. It is copied
+        only if needed.
 
     Raises
     ------
     InvalidInput
-        If the values are not numbers, not finite or masked. Also if the image is too small, has the wrong number of
-        axes, or its channels are first.
+        The values are not numbers, not finite or masked, the image is too small or has the wrong number of axes, or
+        its channels are the first axis.
     FileError
-        If a path cannot be read.
+        A path cannot be read.
     LimitExceeded
-        If a copy is needed and would take more bytes than the machine has.
+        A copy is needed that would take more bytes than the machine has.
 
     """
     array = as_ndarray(value, name, axes=axes)
@@ -137,7 +138,7 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
 
 
 def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
-    """Refuse an array with channels first, or a batch: few samples along the first axis, and many along all others."""
+    """Raise an error for arrays with channels first and for batches: only the first axis is short."""
     first = len(shape) - axes - 1
     if first not in (0, 1) or not 0 < shape[first] <= FEW or min(shape[first + 1 :]) < 2 * FEW:
         return
@@ -154,33 +155,33 @@ def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
 
 
 def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | str] | None = None) -> Array:
-    """Check numbers for a compiled function, and return them in the form that it takes.
+    """Check an array of numbers, and convert it to the dtype and layout that a compiled function needs.
 
     Parameters
     ----------
     value : array_like
-        Bool, integers or floats. An integer dtype accepts bool, or integers within its range. Bool accepts the same,
-        and zero means False.
+        Bool, integers or floats. For an integer ``dtype``: bool, or integers within its range. For bool: bool or
+        integers, where 0 means False.
     name : str
-        Name of the argument, for messages.
+        Name of the argument in error messages.
     dtype : dtype
         Dtype of the result.
     shape : sequence of int or str, optional
-        Length of each axis. A word stands for any length of at least 1, and names the axis in messages. Default: any
+        Length of each axis. A word allows any length of at least 1, and names the axis in error messages. Default: any
         shape.
 
     Returns
     -------
     ndarray
-        Array that is C-contiguous, aligned and in native byte order; the given array if it is so already. Floats
-        beyond the range of ``dtype`` become infinite.
+        C-contiguous, aligned array in native byte order, which is the argument itself if possible. Floats beyond the
+        range of ``dtype`` become infinite.
 
     Raises
     ------
     InvalidInput
-        If the values are not numbers, of another kind, out of range, or of another shape.
+        The values are not numbers, of the wrong kind, out of range, or have the wrong shape.
     LimitExceeded
-        If a copy is needed and would take more bytes than the machine has.
+        A copy is needed that would take more bytes than the machine has.
 
     Examples
     --------
@@ -213,7 +214,7 @@ def _has_shape(sides: tuple[int, ...], shape: Sequence[int | str]) -> bool:
 
 
 def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
-    """Return the values in a dtype, contiguous and aligned. The size of a broadcast view is checked before the copy."""
+    """Return a contiguous, aligned array in a dtype. Check the size first, because broadcast views can be huge."""
     if array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned:
         return array
     check_memory(array.size * dtype.itemsize, name)
@@ -225,17 +226,17 @@ def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
 
 
 def check_finite(array: Array, name: str) -> None:
-    """Refuse floats that are NaN or infinite.
+    """Raise an error if floats are NaN or infinite.
 
     Raises
     ------
     InvalidInput
-        If some values are NaN or infinite.
+        Some values are NaN or infinite.
 
     """
     if array.dtype.kind != "f":
         return
-    # Check a cached part at a time: a mask of all values takes ten times as long.
+    # Check parts that fit into the cache, because a mask of all values would take ten times as long.
     parts = np.nditer(array, ["external_loop", "buffered", "zerosize_ok"], buffersize=2**15)
     bad = array.size - sum(int(np.count_nonzero(np.isfinite(part))) for part in parts)
     if bad:
@@ -245,17 +246,17 @@ def check_finite(array: Array, name: str) -> None:
 
 
 def to_unit(array: Array) -> Floats:
-    """Scale an image to [0, 1] in float32, so that thresholds mean the same for every dtype.
+    """Scale an image to [0, 1] in float32, so that thresholds have the same meaning for every dtype.
 
-    Integers of 8 or 16 bit are divided by the largest value of their dtype. Wider integers, and floats beyond [0, 1],
-    are scaled by their own range. ``v`` as uint8 and ``257 v`` as uint16 give the same result.
+    Integers of 8 or 16 bits are divided by the maximum of their dtype. Wider integers, and floats outside [0, 1], are
+    scaled by their own range. ``v`` as uint8 and ``257 v`` as uint16 give the same result.
     """
     if array.dtype == np.bool_:
         return array.astype(np.float32)
     if array.dtype.kind in "ui" and array.itemsize <= 2:
         info = np.iinfo(array.dtype)
         if array.dtype.kind == "u":
-            # The values are exact in float32, so that one rounding gives the same result as float64.
+            # The values are exact in float32, so a division in float32 gives the same result as in float64.
             return np.divide(array, np.float32(info.max), dtype=np.float32)
         return ((array.astype(np.float64) - min(info.min, 0)) / (float(info.max) - min(info.min, 0))).astype(np.float32)
     low, high = float(array.min()), float(array.max())
@@ -265,9 +266,9 @@ def to_unit(array: Array) -> Floats:
 
 
 def locate(values: Array, low: float, high: float) -> NDArray[np.float64]:
-    """Return the position of values between two bounds, from 0 to 1.
+    """Return the position of values between two bounds, as a fraction from 0 to 1.
 
-    The bounds may differ by more than the range of double.
+    The difference of the bounds can exceed the range of float64.
     """
     given = values.astype(np.float64)
     if math.isinf(high - low):
@@ -276,7 +277,7 @@ def locate(values: Array, low: float, high: float) -> NDArray[np.float64]:
 
 
 def guidance(pixels: Array) -> Floats:
-    """Return the colours for decisions: up to three channels in [0, 1], with transparency over mid grey."""
+    """Return up to three colour channels in [0, 1] for decisions, with transparent pixels over mid grey."""
     unit = to_unit(pixels)
     if unit.shape[-1] in (2, 4):
         alpha = unit[..., -1:]
@@ -285,14 +286,14 @@ def guidance(pixels: Array) -> Floats:
 
 
 def as_rgb(unit: Floats) -> Floats:
-    """Return three channels: the first three, or the first one three times."""
+    """Return three channels: the first three, or three copies of the first."""
     return unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
 
 
 def to_lab(unit: Floats) -> Floats:
     """Return the CIE Lab values of colours, divided by 100.
 
-    A just visible difference is about 0.02. The bits are the same on any processor.
+    A just noticeable difference is about 0.02. The bits are the same on any processor.
     """
     from skimage.color import rgb2lab
 
@@ -300,9 +301,9 @@ def to_lab(unit: Floats) -> Floats:
 
 
 def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
-    """Check a mask and return a copy.
+    """Check a mask and return a bool copy of it.
 
-    The mask may be an array of bool or integers (zero means False), a file, an image of PIL, or a `texrs.Mask`.
+    The mask can be an array of bool or integers (0 means False), a file, an image of PIL, or a `texrs.Mask`.
     """
     if isinstance(value, Mask) and value.feather:
         raise InvalidInput(f"{name}: cannot have a feather, which is only for holes that are filled")
@@ -314,25 +315,25 @@ def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     return np.array(as_array(given, name, np.bool_, shape))
 
 
-# NumPy computes functions of single precision in different ways on different processors, so that the last bits differ. Values
-# computed in double precision and then rounded are the same everywhere.
+# The float32 functions of NumPy give different last bits on different processors. Values that are computed in float64
+# and then rounded are the same everywhere.
 
 
 def log_single(values: Array) -> Floats:
-    """Return natural logarithms in single precision, with the same bits on any processor."""
+    """Return natural logarithms in float32, with the same bits on any processor."""
     return np.log(values, dtype=np.float64).astype(np.float32)
 
 
 def exp_single(values: Array) -> Floats:
-    """Return exponentials in single precision, with the same bits on any processor."""
+    """Return exponentials in float32, with the same bits on any processor."""
     return np.exp(values, dtype=np.float64).astype(np.float32)
 
 
 def hypot_single(rows: ArrayLike, columns: ArrayLike) -> Floats:
-    """Return lengths of vectors in single precision, with the same bits on any processor."""
+    """Return the square root of x^2 + y^2 in float32, with the same bits on any processor."""
     return np.asarray(np.hypot(rows, columns, dtype=np.float64), np.float32)
 
 
 def power_single(values: Array, exponent: float) -> Floats:
-    """Return powers in single precision, with the same bits on any processor."""
+    """Return powers in float32, with the same bits on any processor."""
     return np.power(values, np.float64(exponent), dtype=np.float64).astype(np.float32)

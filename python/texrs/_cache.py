@@ -1,4 +1,4 @@
-"""Cache of recent results by the values that they were computed from."""
+"""Cache recent results by the values from which they were computed."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ V = TypeVar("V")
 
 
 class Cache(Generic[K, V]):
-    """Values by key. The least recently used ones are dropped first.
+    """Cache of values by key. If it is full, the least recently used values are removed first.
 
     Parameters
     ----------
     limit : int
-        Maximum total size of all values. A single value above it is not kept.
+        Maximum total size of all values. A single larger value is not stored.
     size : callable, optional
-        Function that returns the size of a value, such as its bytes. Default: each value counts 1.
+        Function that returns the size of a value, such as its number of bytes. Default: each value has size 1.
 
     """
 
@@ -32,24 +32,24 @@ class Cache(Generic[K, V]):
 
     @property
     def used(self) -> int:
-        """Total size of the values."""
+        """Total size of the stored values."""
         return int(self._kept.currsize)
 
     def get(self, key: K) -> V | None:
-        """Return the value of a key, or None."""
+        """Return the value of a key, or None if it is not stored."""
         with self._lock:
             return self._kept.get(key)
 
     def put(self, key: K, value: V) -> None:
-        """Keep a value."""
+        """Store a value."""
         with self._lock:
             if self._kept.getsizeof(value) <= self._kept.maxsize:
                 self._kept[key] = value
 
     def get_or_make(self, key: K, make: Callable[[], V]) -> V:
-        """Return the value of a key, and compute it if it is not kept.
+        """Return the value of a key. If it is not stored, compute and store it.
 
-        Two threads may compute it at once, because no lock is held meanwhile.
+        Two threads can compute the same value at once, because no lock is held during the computation.
         """
         found = self.get(key)
         if found is None:
@@ -58,13 +58,13 @@ class Cache(Generic[K, V]):
         return found
 
     def clear(self) -> None:
-        """Drop everything."""
+        """Remove all values."""
         with self._lock:
             self._kept.clear()
 
 
 def content_hash(*parts: object) -> bytes:
-    """Return a hash of the shape, dtype and values of arrays, and of the repr of other parts."""
+    """Return a hash of the shape, dtype and values of arrays, and of the `repr` of other objects."""
     digest = hashlib.blake2b(digest_size=16, person=b"texrs")
     for part in parts:
         if isinstance(part, np.ndarray):

@@ -1,4 +1,4 @@
-"""Checks of functions that callers pass, before long work calls them."""
+"""Check functions that callers pass, before long work begins that will call them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["check_call"]
 
 
 def check_call(function: Callable[..., object], name: str, *arguments: str) -> None:
-    """Refuse a function that cannot be called with these arguments, as far as its signature shows."""
+    """Raise an error if the signature of a function shows that it cannot be called with the named arguments."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

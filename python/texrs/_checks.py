@@ -1,4 +1,4 @@
-"""Checks of arguments that are not arrays: numbers, sizes, choices."""
+"""Check arguments that are not arrays: numbers, sizes and choices."""
 
 from __future__ import annotations
 
@@ -18,16 +18,19 @@ from texrs.limits._context import find
 from texrs.limits._estimates import estimate_memory
 
 FREE = 2**20
-"""Bytes that are allocated without asking for the available memory, because asking takes as long as filling them."""
+"""Maximum size in bytes that is allocated without a check of the available memory.
+
+Such a check takes as long as filling this memory.
+"""
 
 
 def as_list(value: object) -> list[Any]:
-    """Return several values as a list, and a single one as a list with one entry."""
+    """Return a list or tuple as a list, and any other value as a list with one entry."""
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
 def try_array(value: object, dtype: DTypeLike | None = None) -> NDArray[Any]:
-    """Return an array of a value, or an empty array of objects if it is not an array."""
+    """Return a value as an array, or an empty array of objects if it cannot be converted."""
     try:
         return np.asarray(value, dtype)
     except (ValueError, TypeError, OverflowError, MemoryError):
@@ -37,14 +40,14 @@ def try_array(value: object, dtype: DTypeLike | None = None) -> NDArray[Any]:
 def as_size(
     value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int | None = None, way: str = ""
 ) -> tuple[int, ...]:
-    """Check a size: an int for a square, or one int for each axis (rows, columns). ``way`` names a method for larger sizes.
+    """Check a size: an int for a square, or one int for each axis. ``way`` names a remedy for larger sizes.
 
     Raises
     ------
     InvalidInput
-        If it is not integers, has too few or too many, or is below ``minimum``.
+        The size is not integers, has the wrong number of entries, or is below ``minimum``.
     LimitExceeded
-        If it has more than ``limit`` pixels, by default the limit of `texrs.limits`.
+        The size has more than ``limit`` pixels (by default the limit of `texrs.limits`).
 
     """
     order = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
@@ -62,12 +65,12 @@ def as_size(
 
 
 def check_pixels(shape: Sequence[int], name: str = "size", *, limit: int | None = None, way: str = "") -> None:
-    """Refuse more pixels or voxels than ``limit``, by default the limit of `texrs.limits`. ``way`` names a remedy.
+    """Raise an error for more pixels or voxels than ``limit`` (default: `texrs.limits`). ``way`` names a remedy.
 
     Raises
     ------
     LimitExceeded
-        If there are more.
+        There are more pixels or voxels than the limit.
 
     """
     count = math.prod(shape)
@@ -78,12 +81,12 @@ def check_pixels(shape: Sequence[int], name: str = "size", *, limit: int | None 
 
 
 def check_memory(needed: int, name: str = "size", *, limit: int | None = None, way: str = "") -> None:
-    """Refuse more bytes than ``limit`` or than `texrs.limits` allows. ``way`` names a method with less memory.
+    """Raise an error for more bytes than ``limit`` or `texrs.limits` allow. ``way`` names a method with less memory.
 
     Raises
     ------
     LimitExceeded
-        If more bytes are needed than are allowed or known to be available.
+        More bytes are needed than are allowed or known to be available.
 
     """
     if needed <= FREE and limit is None:
@@ -110,27 +113,27 @@ def check_work(
     way: str = "",
     **more: Any,
 ) -> None:
-    """Refuse work beyond the limits of `texrs.limits` before it begins.
+    """Raise an error, before work begins, if it exceeds the limits of `texrs.limits`.
 
     Parameters
     ----------
     verb : str
         Name of the verb, as in `texrs.limits.estimate_memory`.
     examples : sequence of (..., C) array
-        Examples that the verb uses.
+        Examples of the verb.
     size : sequence of int
-        Size of the result.
+        Size of the result in pixels or voxels.
     name, way : str
-        Argument that requests this much, and a method that takes less.
+        Name of the argument that requests this size, and remedy that needs less memory, both for the error message.
     limit : int, optional
-        Maximum bytes for this work only.
+        Maximum number of bytes for this work only.
     **more
         Options of `texrs.limits.estimate_memory`.
 
     Raises
     ------
     LimitExceeded
-        If the work needs more pixels or bytes than allowed.
+        The work needs more pixels or bytes than allowed.
 
     """
     check_pixels(size, name, way=way)
@@ -139,7 +142,7 @@ def check_work(
 
 
 def as_instance(value: object, name: str, *kinds: type) -> Any:
-    """Check that a value is an instance of one of some classes."""
+    """Check that a value is an instance of one of the given classes, and return it."""
     if not isinstance(value, kinds):
         needed = " or a ".join(kind.__name__ for kind in kinds)
         raise InvalidInput(f"{name}: must be a {needed}, got {type(value).__name__}")
@@ -147,26 +150,27 @@ def as_instance(value: object, name: str, *kinds: type) -> Any:
 
 
 def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
-    """Check a sequence with a number of entries. The length is checked first, because the value may be of any kind."""
+    """Check a sequence of a given length. The length is checked first, because entries can be of any type."""
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         try:
             if len(value) == length:
                 return tuple(value)
-        except (TypeError, OverflowError, MemoryError):  # An array without axes, or a range too long for memory.
+        # The value is an array without axes, or a range too long for the memory.
+        except (TypeError, OverflowError, MemoryError):
             pass
     raise InvalidInput(f"{name}: must be {what}, got {value!r}")
 
 
 def as_items(value: object, name: str) -> Iterator[Any]:
-    """Check an iterable. Its items are read only when they are needed."""
+    """Check that a value is iterable. Its items are read only when they are needed."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes):
-        with suppress(TypeError):  # An array without axes.
+        with suppress(TypeError):  # The value is an array without axes.
             return iter(value)
     raise InvalidInput(f"{name}: must be a sequence, got {value!r}")
 
 
 def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | None = None) -> tuple[bool, ...]:
-    """Check a choice of periodic axes: one bool for all, or one for each axis. None gives the default, if there is one."""
+    """Check periodic axes: one bool for all axes, or one for each. None means the default, if there is one."""
     if value is None and usual is not None:
         return (usual,) * axes
     if isinstance(value, bool | np.bool_):
@@ -179,21 +183,24 @@ def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | N
 
 
 def as_bool(value: object, name: str) -> bool:
-    """Check a bool."""
+    """Check that a value is a bool."""
     if not isinstance(value, bool | np.bool_):
         raise InvalidInput(f"{name}: must be True or False, got {value!r}")
     return bool(value)
 
 
 def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
-    """Check a choice by name."""
+    """Check that a value is one of the allowed names."""
     if not isinstance(value, str) or value not in allowed:
         raise InvalidInput(f"{name}: must be one of {', '.join(allowed)}; got {value!r}")
     return value
 
 
 def as_one(value: Any, name: str, *allowed: str | int | None) -> Any:
-    """Check a choice among words, numbers and None. The type is checked first, because arrays compare entry by entry."""
+    """Check that a value is one of some words, numbers and None.
+
+    Its type is checked first, because arrays compare by entry.
+    """
     plain = isinstance(value, str | numbers.Integral | None) and not isinstance(value, bool)
     if not plain or value not in allowed:
         names = [str(each) if isinstance(each, int) else repr(each) for each in allowed if each is not None]
@@ -209,14 +216,14 @@ def as_axes(value: object, name: str = "axes") -> int:
 
 
 def as_method(value: object, *allowed: str | None) -> None:
-    """Check the name of an algorithm. None is the default one."""
+    """Check the name of an algorithm. None means the default algorithm."""
     if not isinstance(value, str | None) or value not in allowed:
         names = [repr(name) for name in allowed]
         raise InvalidInput(f"method: must be one of {', '.join(names)}; got {value!r}")
 
 
 def as_progress(value: object, name: str = "progress", *, stages: bool = False) -> Callable[..., object] | None:
-    """Check a progress function, which is called with the completed share, or with the stage and the share if ``stages``."""
+    """Check a progress function. It is called with the completed share, or with stage and share if ``stages``."""
     if value is None:
         return None
     if not callable(value):
@@ -244,7 +251,7 @@ def as_float(value: object, name: str, low: float, high: float) -> float:
 
 
 def as_limit(value: object, name: str = "limit", *, axes: int = 2) -> int:
-    """Check a limit of pixels, or of voxels with ``axes=3``. None is the limit of `texrs.limits`."""
+    """Check a limit of pixels, or of voxels if ``axes`` is 3. None means the limit of `texrs.limits`."""
     if value is None:
         return find("voxels" if axes == 3 else "pixels") or MAX_PIXELS
     return as_int(value, name, 1, 2**40)

@@ -1,4 +1,4 @@
-"""Conversion of colours of any dtype to linear light and back, for addition and averages."""
+"""Convert colours of any dtype to linear light and back, for sums and averages."""
 
 from __future__ import annotations
 
@@ -14,38 +14,41 @@ Space = Literal["srgb", "linear"]
 
 
 def decode_srgb(values: Floats) -> Floats:
-    """Return linear light of sRGB values (IEC 61966-2-1). Negative values give 0."""
+    """Convert sRGB values to linear light (IEC 61966-2-1). Negative values give 0."""
     kept = np.maximum(values, np.float32(0))
     curved = power_single((kept + np.float32(0.055)) / np.float32(1.055), 2.4)
     return np.where(kept <= np.float32(0.04045), kept / np.float32(12.92), curved)
 
 
 def encode_srgb(light: Floats) -> Floats:
-    """Return sRGB values of linear light. Negative values give 0."""
+    """Convert linear light to sRGB values. Negative values give 0."""
     kept = np.maximum(light, np.float32(0))
     curved = np.float32(1.055) * power_single(kept, 1 / 2.4) - np.float32(0.055)
     return np.where(kept <= np.float32(0.0031308), kept * np.float32(12.92), curved)
 
 
 def to_light(pixels: Array, space: Space) -> Floats:
-    """Return linear light of encoded values. Integers count as shares of their range."""
+    """Convert encoded values to linear light. Integers are first scaled to 0 to 1."""
     unit = to_unit(pixels) if pixels.dtype.kind in "bui" else pixels.astype(np.float32)
     if space == "linear":
         return unit
     if pixels.dtype == np.uint8:
-        # Compute one power for each possible value instead of each pixel.
+        # Compute the power for each possible value instead of for each pixel.
         table: Floats = decode_srgb(np.arange(256, dtype=np.float32) / np.float32(255))
         return table[pixels]
     return decode_srgb(unit)
 
 
 def to_share(pixels: Array) -> Floats:
-    """Return values in [0, 1]: integers as shares of their range, floats clipped."""
+    """Scale values to [0, 1]: divide integers by the maximum of their dtype, and clip floats."""
     return to_unit(pixels) if pixels.dtype.kind in "bui" else np.clip(pixels, 0, 1).astype(np.float32)
 
 
 def to_pixels(values: Array, dtype: np.dtype[Any]) -> Array:
-    """Return shares in a dtype, the inverse of `to_share`. Values beyond the dtype become its largest."""
+    """Convert values from 0 to 1 to a dtype, the inverse of `to_share`.
+
+    Values beyond the range of the dtype are clipped.
+    """
     if dtype.kind == "f":
         most = min(float(np.finfo(dtype).max), float(np.finfo(values.dtype).max))
         return np.clip(values, -most, most).astype(dtype)
@@ -58,7 +61,7 @@ def to_pixels(values: Array, dtype: np.dtype[Any]) -> Array:
 
 
 def shrink(values: Array, shape: Sequence[int]) -> Array:
-    """Return floats with fewer samples along the first axes. Each is the mean of the area that it covers."""
+    """Shrink an array of floats along its first axes. Each new sample is the mean of the area that it covers."""
     for axis, wanted in enumerate(shape):
         given = values.shape[axis]
         if given == wanted:

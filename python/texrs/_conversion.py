@@ -1,4 +1,4 @@
-"""Conversion to arrays: files, PIL images, tensors, labelled and masked arrays."""
+"""Convert inputs to arrays: files, PIL images, tensors, labelled and masked arrays."""
 
 from __future__ import annotations
 
@@ -12,44 +12,44 @@ from texrs._typing import Array, Bools
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 
 COLOURED = {"P": "RGB", "PA": "RGBA", "RGBX": "RGB", "RGBa": "RGBA", "La": "LA", "YCbCr": "RGB", "HSV": "RGB"}
-"""Modes of PIL images whose numbers are not colours, and the modes that they are converted to."""
+"""PIL modes whose numbers are not colours, and the modes to which they are converted."""
 WITH_ALPHA = {"L": "LA", "RGB": "RGBA"}
-"""Modes that images are converted to if one of their colours means transparency."""
+"""PIL modes to which images are converted if one of their colours is marked as transparent."""
 NEAR = 1e-6
-"""Relative tolerance for comparing a float with the nodata value of a file, which is rounded text."""
+"""Relative tolerance for floats that are compared with the nodata value of a file, which is a rounded text."""
 KEPT = ("1", "L", "LA", "I", "F", "RGB", "RGBA")
-"""Modes whose numbers are used unchanged, in addition to the modes I;16."""
+"""PIL modes whose numbers are used unchanged, in addition to the modes I;16."""
 
 
 def as_ndarray(value: object, name: str, *, axes: int = 2, used: bool = True) -> Array:
-    """Return an array of any supported image type. This is the one place that knows these types.
+    """Convert an image of any supported type to an array. Only this function lists the supported types.
 
     Parameters
     ----------
     value : array_like, path_like or PIL.Image.Image
-        An array, or an object with an array interface (``__array__``, ``__array_interface__``, the buffer protocol,
-        DLPack): tensors, labelled arrays, nested lists. A path is read. The palette of a PIL image is applied, and its
-        transparent colour becomes alpha.
+        Array or path, or any object with an array interface (``__array__``, ``__array_interface__``, the buffer
+        protocol, DLPack), such as tensors, labelled arrays and nested lists. Paths are read. Palettes of PIL images
+        are applied, and their transparent colour becomes alpha.
     name : str
-        Name of the argument, for messages.
+        Name of the argument in error messages.
     axes : int
-        Number of axes of a file's array without the channels: 3 reads a volume.
+        Number of spatial axes of a file: 2 reads an image, 3 a volume.
     used : bool
-        If True, pixels that have the nodata value of their file are reported, because they are used as values.
+        If True, a notice reports pixels with the nodata value of their file, because they are used as colours.
 
     Returns
     -------
     ndarray
-        Array of any dtype and shape, copied only if needed.
+        Array of any dtype and shape. It is copied only if needed.
 
     Raises
     ------
     InvalidInput
-        If the value has no array form, has masked values, or is a PIL image in inks or in CIELAB.
+        The value cannot be converted to an array, has masked entries, or is a PIL image in CMYK or CIELAB colours.
     FileError
-        If a path cannot be read.
+        A path cannot be read.
     LimitExceeded
-        If there is not enough memory.
+        There is not enough memory.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def as_ndarray(value: object, name: str, *, axes: int = 2, used: bool = True) ->
         raise
     except (
         Exception
-    ) as error:  # Libraries raise many types for data that they cannot export, such as a tensor on another device.
+    ) as error:  # Libraries raise various errors for data that they cannot export, such as tensors on another device.
         text = " ".join(str(error).split())
         raise InvalidInput(f"{name}: is not an array of numbers ({text or type(error).__name__})") from None
 
@@ -98,7 +98,7 @@ def _read(path: str | os.PathLike[str], name: str, axes: int) -> Array:
 
 
 def _take_whole(value: Any, name: str) -> Array:
-    """Return the values of a masked array without masked entries."""
+    """Return the data of a masked array, or raise an error if entries are masked."""
     count = int(np.ma.getmaskarray(value).sum())
     if count:
         raise InvalidInput(
@@ -109,9 +109,9 @@ def _take_whole(value: Any, name: str) -> Array:
 
 
 def find_value(pixels: Array, value: float, axes: int) -> Bools:
-    """Return a mask of the pixels that have a value in all channels.
+    """Return a mask of the pixels whose channels all have the given value.
 
-    Floats are compared as the rounded text in a file.
+    Floats are compared with a tolerance, because files state the value as rounded text.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def find_value(pixels: Array, value: float, axes: int) -> Bools:
 
 
 def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
-    """Report pixels with the nodata value of their file if they are used as values."""
+    """Report pixels with the nodata value of their file, because they are used as colours."""
     from texrs.io import read_metadata
 
     if os.path.splitext(path)[1].lower() not in (".tif", ".tiff"):
@@ -146,13 +146,13 @@ def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
 
 
 def is_pillow(value: object) -> bool:
-    """Return whether a value is an image of PIL."""
-    # Do not import PIL, because this takes a while.
+    """Return True if a value is an image of PIL."""
+    # Do not import PIL for this test, because that is slow.
     return any(c.__module__ == "PIL.Image" and c.__name__ == "Image" for c in type(value).__mro__)
 
 
 def _take_colours(picture: Any, name: str) -> Any:
-    """Return a PIL image in a mode whose numbers are colours."""
+    """Return a PIL image, converted if necessary to a mode whose numbers are colours."""
     mode = str(picture.mode)
     seen_through = picture.info.get("transparency") is not None
     if mode == "P":

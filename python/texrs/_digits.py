@@ -1,4 +1,4 @@
-"""Numbers drawn into images."""
+"""Draw numbers into images."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ GLYPHS = {
     "0": 0o75557, "1": 0o26227, "2": 0o71747, "3": 0o71717, "4": 0o55711, "5": 0o74717,
     "6": 0o74757, "7": 0o71122, "8": 0o75757, "9": 0o75717, ".": 0o00002,
 }  # fmt: skip
-"""Digits of three by five dots each, with the rows from the top as octal digits."""
+"""Digits as bitmaps of 3 x 5 dots. Each octal digit is one row, from the top."""
 
 
 def write_number(picture: NDArray[Any], text: str, row: int, column: int, ink: Any, dot: int = 1) -> None:
-    """Draw digits and points into an image, as far as they are inside.
+    """Draw a text of digits and points into an image. Parts outside the image are omitted.
 
     Parameters
     ----------
     picture : (H, W, ...) array
-        Image to draw into, in place.
+        Image that is changed in place.
     text : str
-        Digits and points.
+        Text of digits and points.
     row, column : int
-        Upper left corner.
+        Position of the upper left corner in pixels.
     ink : number or (C,) array
         Colour of the digits.
     dot : int
-        Size of a dot in pixels. A digit is three dots wide and five high, and the next one starts one dot further on.
+        Side of a dot in pixels. A digit is 3 dots wide and 5 dots high, with 1 dot of space after it.
 
     """
     for k, glyph in enumerate(text):

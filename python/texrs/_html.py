@@ -1,4 +1,4 @@
-"""HTML pages in one file: the page, its sections, its images."""
+"""Build an HTML page in one file: its sections, images and captions."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from texrs._typing import Array
 from texrs._version import __version__
 
 QUALITY, LARGE_QUALITY = 90, 75
-"""JPEG quality of images, and of images with millions of pixels."""
+"""JPEG quality of images, and of images with millions of pixels, 1 to 100."""
 
 
 def encode_uri(image: Array, *, exact: bool = False, quality: int = QUALITY) -> str:
-    """Encode an image as a data URI: PNG if it must be exact or has an alpha channel, else JPEG."""
+    """Encode an image as a data URI: as PNG if ``exact`` or if it has an alpha channel, else as JPEG."""
     seen = preview(image)
     if seen.ndim == 3 and seen.shape[2] == 1:
         seen = seen[..., 0]
@@ -29,7 +29,7 @@ def encode_uri(image: Array, *, exact: bool = False, quality: int = QUALITY) -> 
 
 
 def figure(image: Array, caption: str, *, exact: bool = False, share: float = 1.0, note: str = "") -> str:
-    """Show an image with its caption. ``share`` is its width as a share of the available width."""
+    """Return HTML for an image with a caption. ``share`` is its width as a fraction of the available width."""
     height, width = image.shape[:2]
     style = f' style="width:{share:.0%}"' if share != 1 else ""
     size = f'width="{width}" height="{height}"{style}'
@@ -38,7 +38,7 @@ def figure(image: Array, caption: str, *, exact: bool = False, share: float = 1.
 
 
 def pair(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
-    """Show an image, and next to it the same data tiled 2 x 2 as a background."""
+    """Return HTML for an image, and next to it the same image repeated 2 x 2."""
     height, width = image.shape[:2]
     ratio = f"aspect-ratio:{width}/{height}"
     picture = '<div class="ground{}" role="img" aria-label="{}" style="{}"></div>'
@@ -50,27 +50,27 @@ def pair(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
 
 
 def row(*parts: str) -> str:
-    """Show an exemplar before its result."""
+    """Return HTML for an exemplar followed by its result."""
     return f'<div class="row">{"".join(parts)}</div>'
 
 
 def grid(parts: Sequence[str], *, least: int = 150, columns: int = 12) -> str:
-    """Show images of one size side by side, with a minimum width in pixels and a maximum number in a row."""
+    """Return HTML for images of one size side by side, with a minimum width in pixels and a maximum number per row."""
     return f'<div class="grid" style="--least:{least}px;--most:{columns}">{"".join(parts)}</div>'
 
 
 def card(given: Sequence[str], made: str) -> str:
-    """Show an input and its result together. They stay together in a narrow window."""
+    """Return HTML that keeps an input and its result together, even in a narrow window."""
     return f'<div class="card"><div class="given">{"".join(given)}</div>{made}</div>'
 
 
 def cards(parts: Sequence[str]) -> str:
-    """Show cards side by side, two in a row if there is room."""
+    """Return HTML for cards side by side, two per row if there is room."""
     return f'<div class="cards">{"".join(parts)}</div>'
 
 
 def opening(image: Array, example: str, caption: str, detail: str, *, note: str = "") -> str:
-    """Show a large image at full size, and below it the example and the whole image, from the same data."""
+    """Return HTML for a large image at full size, and below it the example and the same image reduced."""
     height, width = image.shape[:2]
     seen = f'<div class="ground" role="img" aria-label="{escape(caption)}" style="aspect-ratio:{width}/{height}"></div>'
     return (
@@ -81,12 +81,12 @@ def opening(image: Array, example: str, caption: str, detail: str, *, note: str 
 
 
 def code(text: str) -> str:
-    """Show a command."""
+    """Return HTML for a command."""
     return f"<pre><code>{escape(text)}</code></pre>"
 
 
 def section(name: str, title: str, lead: str, body: str) -> str:
-    """Return a section."""
+    """Return HTML for a section."""
     return f'<section id="{escape(name)}"><h2>{escape(title)}</h2><p class="lead">{escape(lead)}</p>{body}</section>'
 
 
@@ -100,7 +100,7 @@ def document(
     command: str = "texrs demo",
     style: str = "",
 ) -> str:
-    """Return the page."""
+    """Return the complete page."""
     menu = "".join(f'<a href="#{escape(name)}">{escape(title)}</a>' for name, title in links)
     body = "\n".join(sections)
     return f"""<!doctype html>

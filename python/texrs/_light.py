@@ -1,8 +1,9 @@
-"""Slowly changing light of copied pixels: divided out before, multiplied back afterwards.
+"""Remove slowly changing light before pixels are copied, and restore it afterwards.
 
-Copied pixels bring the light of their source along: a patch of the sunny end of a floor is too bright at the other
-end. Light is a polynomial of up to the second degree in the position, fitted to the logarithms of local means. A
-higher degree is used only if it explains clearly more. The light depends only on the map and its known pixels.
+Copied pixels contain the light of their source: a patch from the bright end of a floor is too bright at the dark end.
+The light is modelled as a polynomial of up to the second degree in the position, fitted to the logarithms of local
+means. A higher degree is used only if it explains clearly more. The light depends only on the image and its known
+pixels.
 """
 
 from __future__ import annotations
@@ -17,34 +18,35 @@ from texrs._arrays import exp_single
 from texrs._typing import Array, Bools, Floats
 
 BLOCKS = 32
-"""Number of squares along the shorter side whose means are used."""
+"""Number of squares along the shorter side. The light is fitted to their means."""
 FULL = 0.25
-"""Minimum known share of a square."""
+"""Minimum fraction of known pixels for a square to be used."""
 FEWEST = 24
 """Minimum number of squares for a fit."""
 BETTER = 0.75
-"""Maximum share of the squared residuals that a higher degree may leave."""
+"""Maximum ratio of the squared residuals to those of the next lower degree, for a higher degree to be used."""
 ROUNDS, FAR = 6, 4.0
-"""Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
+"""Number of steps of the robust fit, and deviation in standard deviations at which a value is an outlier."""
 DIGITS = 8
-"""Decimal places of the coefficients of the polynomial. The last bits of a fit depend on the processor."""
+"""Number of decimal places to which coefficients are rounded, because the last bits of a fit depend on the processor.
+"""
 MOST = 1.1
-"""Maximum natural logarithm of the light that is followed."""
+"""Maximum absolute value of the natural logarithm of the light."""
 TERMS = (1, 3, 6)
 """Number of terms of polynomials of degree 0, 1 and 2."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
-    """Brightness of a map at each position, as a factor of its mean."""
+    """Brightness of an image at each position, relative to its mean."""
 
     shape: tuple[int, int]
     polynomial: tuple[float, ...]
-    """Polynomial of (row, column) from the middle, in halves of the longer side."""
+    """Coefficients of the polynomial of (row, column), measured from the centre in units of half the longer side."""
 
     @classmethod
     def of(cls, image: Array, where: Bools) -> Light | None:
-        """Return the light of the marked pixels of a map (H, W, C) of values from 0 on, or None if it is even."""
+        """Fit the light to the marked pixels of a non-negative image (H, W, C). Return None if it is even."""
         shape = where.shape[0], where.shape[1]
         step = max(4, min(shape) // BLOCKS)
         rows, columns = (n // step for n in shape)
@@ -71,7 +73,7 @@ class Light:
         return cls(shape, tuple(round(float(c), DIGITS) for c in polynomial))
 
     def at(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
-        """Return the factor at positions. Positions beyond the map have the factor of the nearest one in it."""
+        """Return the light at positions. Positions outside the image get the light of the nearest position inside."""
         y, x = (np.clip(p, 0, n - 1).astype(np.float64) for p, n in zip((rows, columns), self.shape, strict=True))
         terms = _list_terms(y, x, self.shape)
         total = np.zeros(terms.shape[:-1])
@@ -81,8 +83,8 @@ class Light:
 
 
 def measure_lights(image: Array, parts: Sequence[Bools]) -> list[Light | None]:
-    """Return the light of each part of a map (H, W, C), or no light for maps without colours."""
-    # The last of two or of four channels is transparency.
+    """Return the light of each marked part of an image (H, W, C), or None for parts in even light."""
+    # The last of two or four channels is alpha.
     colours = image[..., :-1] if image.shape[-1] in (2, 4) else image
     if image.dtype.kind not in "uf" or (image.dtype.kind == "f" and not (colours >= 0).all()):
         return [None] * len(parts)
@@ -90,7 +92,7 @@ def measure_lights(image: Array, parts: Sequence[Bools]) -> list[Light | None]:
 
 
 def divide_out(image: Array, lights: Sequence[Light | None], parts: Sequence[Bools]) -> Floats:
-    """Return a map (H, W, C) in even light."""
+    """Return an image (H, W, C) with the light of its parts divided out."""
     even = image.astype(np.float32)
     count = image.shape[-1] - (image.shape[-1] in (2, 4))
     for light, part in zip(lights, parts, strict=True):
@@ -107,7 +109,7 @@ def _list_terms(rows: NDArray[np.float64], columns: NDArray[np.float64], shape: 
 
 
 def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return the coefficients that most values follow, and the sum of squared residuals, each at most `FAR`."""
+    """Fit coefficients robustly, and return them with the weighted mean of the squared residuals."""
     weight = np.ones(len(values))
     spread = 1.0
     coefficients = np.zeros(terms.shape[1])
@@ -117,6 +119,6 @@ def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArr
         coefficients = np.round(coefficients, DIGITS)
         off = values - np.einsum("nk,k->n", terms, coefficients)
         spread = max(1.4826 * float(np.median(np.abs(off))), 1e-6)
-        # Tukey's biweight.
+        # Reduce the weight of outliers by Tukey's biweight.
         weight = np.square(np.maximum(0, 1 - np.square(off / (FAR * spread))))
     return coefficients, float(np.einsum("n,n,n->", weight, off, off) / max(float(weight.sum()), 1e-9))

@@ -1,8 +1,8 @@
-"""Slowly changing light of an image, as far as there is evidence of it.
+"""Estimate the slowly changing light of an image, as far as there is evidence for it.
 
-An image is also brighter where elements are denser by chance, which is not light. Light extends over the whole image.
-It is a polynomial of the position, or a sum of waves if the image is periodic. More terms are used only if they explain
-clearly more. The residuals of single squares then measure the amount of chance.
+An image is also brighter where it has more bright elements by chance, which is not light. Light extends over the whole
+image. It is modelled as a polynomial of the position, or as a sum of waves if the image is periodic. More terms are
+used only if they explain clearly more. The residuals of single squares measure how much terms would explain by chance.
 """
 
 from __future__ import annotations
@@ -17,31 +17,34 @@ from texrs._colours import shrink
 from texrs._typing import Array
 
 SQUARES = 32
-"""Number of squares along the longer side whose means are compared."""
+"""Number of squares along the longer side. The light is fitted to their means."""
 MOST = 8
-"""Maximum degree of polynomials, and twice the maximum number of waves."""
+"""Maximum degree of polynomials. It is also twice the maximum number of waves."""
 BETTER = 0.75
-"""Maximum share of the residual variance that a higher degree may leave, for typical squares."""
+"""Maximum ratio of the residual variance to that of the next lower degree, for a higher degree to be used.
+
+The variance is that of typical squares.
+"""
 CHANCE = 2.0
-"""Minimum gain of each further term, as a multiple of the gain by chance of one among all independent squares."""
+"""Minimum gain of each further term, as a multiple of the gain of one term by chance."""
 ROUNDS, FAR = 6, 4.0
-"""Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
+"""Number of steps of the robust fit, and deviation in standard deviations at which a value is an outlier."""
 DIGITS = 8
-"""Decimal places of the fit. Its last bits depend on the processor."""
+"""Number of decimal places to which the fit is rounded, because its last bits depend on the processor."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slow:
-    """A quantity that changes slowly over an image."""
+    """Slowly changing quantity over an image, such as the logarithm of the light."""
 
     factors: tuple[float, ...]
-    """Factors of the terms of `list_terms`. None if the quantity is constant."""
+    """Factors of the terms of `list_terms`. It is empty if the quantity is constant."""
     waves: tuple[int, int]
     wrap: tuple[bool, bool]
 
     @classmethod
     def of(cls, values: NDArray[np.float64], waves: tuple[int, int], wrap: tuple[bool, bool]) -> Slow:
-        """Return the trend of values (rows, columns), with a maximum number of bends along each axis."""
+        """Fit the trend of values (rows, columns), with at most ``waves`` bends along each axis."""
         rows, columns = (max(1, round(n * SQUARES / max(values.shape))) for n in values.shape)
         means = shrink(values, (min(rows, values.shape[0]), min(columns, values.shape[1])))
         degrees, terms = list_terms((means.shape[0], means.shape[1]), waves, wrap)
@@ -50,14 +53,14 @@ class Slow:
         for degree in np.unique(degrees)[1:].tolist():
             used = degrees <= degree
             found, left, _ = _fit(terms[used], means)
-            # The gain that this many further terms have by chance is not evidence.
+            # Require more than the gain that so many terms would have by chance.
             chance = 1 + CHANCE * (np.count_nonzero(used) - np.count_nonzero(degrees <= best)) / told
             if left * chance < BETTER ** (degree - best) * least:
                 best, factors, least = degree, found, left
         return cls(tuple(factors.tolist()), waves, wrap)
 
     def at(self, shape: tuple[int, int]) -> NDArray[np.float64]:
-        """Return the trend on a grid of samples, without its mean."""
+        """Return the trend on a grid of samples, minus its mean."""
         if not self.factors:
             return np.zeros(shape)
         _, terms = list_terms(shape, self.waves, self.wrap)
@@ -71,9 +74,9 @@ class Slow:
 def list_terms(
     shape: tuple[int, int], waves: Sequence[int], wrap: Sequence[bool]
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return the degrees of terms (n,), lowest first, and their values on samples, (n, rows * columns)."""
+    """Return the degrees of the terms (n,), in increasing order, and their values on a grid, (n, rows * columns)."""
     (down, own), (across, other) = (_list_bends(n, w, c) for n, w, c in zip(shape, waves, wrap, strict=True))
-    # A shorter side has the same number of bends for each length, not in total.
+    # Allow a shorter side fewer bends, in proportion to its length.
     degrees = np.ceil(max(waves) * (own[:, np.newaxis] / waves[0] + other / waves[1]) - 1e-9).astype(np.intp)
     order = np.argsort(degrees, axis=None, kind="stable")
     order = order[degrees.ravel()[order] <= max(waves)]
@@ -83,7 +86,7 @@ def list_terms(
 
 
 def _list_bends(count: int, most: int, wrap: bool) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return basis functions along an axis (n, count), and their degrees (n,)."""
+    """Return basis functions along an axis (n, count), waves or polynomials, and their degrees (n,)."""
     at = (2 * np.arange(count) + 1) / count - 1
     bends: list[Array] = [np.ones(count)]
     degrees = [0]
@@ -95,7 +98,7 @@ def _list_bends(count: int, most: int, wrap: bool) -> tuple[NDArray[np.float64],
     else:
         before: Array = np.zeros(count)
         for degree in range(1, most + 1):
-            # Bonnet's recursion for Legendre polynomials.
+            # Compute Legendre polynomials by Bonnet's recursion.
             bends.append(((2 * degree - 1) * at * bends[-1] - (degree - 1) * before) / degree)
             before = bends[-2]
             degrees.append(degree)
@@ -103,9 +106,10 @@ def _list_bends(count: int, most: int, wrap: bool) -> tuple[NDArray[np.float64],
 
 
 def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
-    """Return the factors of terms (n, rows * columns) that most values (rows, columns) follow, and their error.
+    """Fit the factors of terms (n, rows * columns) to values (rows, columns) robustly, and return them with the error.
 
-    The error is the residual variance, and the number of independent values, because neighbours are similar.
+    The error consists of the residual variance, and the number of independent values, which is smaller than the number
+    of values because neighbours are similar.
     """
     seen, weight = values.ravel(), np.ones(values.size)
     factors: Array = np.zeros(len(terms))
@@ -114,7 +118,7 @@ def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArr
         factors = np.round(np.linalg.solve(normal, np.einsum("im,m,m->i", terms, weight, seen)), DIGITS)
         off = seen - np.einsum("i,im->m", factors, terms)
         spread = max(1.4826 * float(np.median(np.abs(off))), 1e-6)
-        # Tukey's biweight.
+        # Reduce the weight of outliers by Tukey's biweight.
         weight = np.square(np.maximum(0, 1 - np.square(off / (FAR * spread))))
     shown = np.clip(off, -FAR * spread, FAR * spread).reshape(values.shape)
     told = float(values.size)

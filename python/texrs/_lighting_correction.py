@@ -1,4 +1,4 @@
-"""Removal of uneven light from colours: brightness is evened at large scale, and all finer detail stays."""
+"""Remove uneven light from colours: brightness is evened at large scale, and finer detail is preserved."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 
 FINE, COARSE = 256, 96
-"""Samples along the longer side: for the separation of elements, and for the light, which is smooth."""
+"""Number of samples along the longer side, for the separation of elements and for the light, which is smoother."""
 SHARE = 0.25
-"""Share of the shorter side. Larger structures count as light."""
+"""Minimum size of light variations, as a fraction of the shorter side."""
 LEAST = 0.02
-"""Encoded brightness below which a position is too dark to show how it is lit."""
+"""Encoded brightness, 0 to 1, below which a position is too dark to measure its light."""
 STRONGEST = 1.4
-"""Logarithm of the maximum change of encoded values: to a quarter, or four times."""
+"""Maximum absolute logarithm of the correction factor of encoded values: from 0.25 to 4."""
 BRIGHTEST = 1e15
-"""Maximum float colour, so that its light, a power of it, stays finite."""
+"""Maximum value of float colours, so that their light, which is a power of it, stays finite."""
 TURNS = 3
-"""Number of alternations between separating bright from dark elements and estimating the light of both."""
+"""Number of iterations. Each separates bright from dark elements, and then estimates the light from both."""
 BINS = 128
 LOOKED_AT = 256
-"""Pixels of the longer side that suffice to measure uneven light."""
+"""Number of pixels along the longer side that suffice to measure uneven light."""
 STRIP = 1 << 20
-"""Pixels that are corrected at a time."""
+"""Maximum number of pixels that are corrected at once."""
 
 
 def flatten_lighting(
@@ -41,37 +41,36 @@ def flatten_lighting(
     size: float | None = None,
     space: Space | None = None,
 ) -> Array:
-    """Make the light of an image even.
+    """Remove uneven light from an image.
 
-    Brightness is divided out at large scale, and hues stay. Bright and dark elements, such as flowers and leaves, are
-    separated first. Light is the variation that both share (Wells et al. 1996), because more flowers do not mean more
-    light. Light is removed as far as there is evidence of it. A more complex light needs more evidence, and an image
-    whose parts differ only by chance is returned unchanged.
+    Brightness is evened at large scale, and hues are preserved. Bright and dark elements, such as flowers and leaves,
+    are separated first. The light is the variation that both share (Wells et al. 1996), because a part with more
+    flowers is not better lit. Light is removed only as far as there is evidence for it. More complex light needs more
+    evidence. An image whose parts differ only by chance is returned unchanged.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Colours, in any dtype, floats up to 1e15. The last of two or four channels is transparency, which does not
-        change.
+        Colours in any dtype; floats up to 1e15. The last of two or four channels is alpha, which does not change.
     amount : float
-        Share of the unevenness to remove, 0 to 1. Default: 1.
+        Fraction of the unevenness to remove, 0 to 1. Default: 1.
     wrap : bool or (bool, bool)
-        Axes along which the image is periodic. It stays periodic.
+        Axes along which the image is periodic. It remains periodic.
     size : float, optional
-        Size in pixels, at least 4, above which variation counts as light. Elements should be smaller. Default: a
-        quarter of the shorter side.
+        Minimum size in pixels, at least 4, of variations that are treated as light. Elements should be smaller.
+        Default: a quarter of the shorter side.
     space : {"srgb", "linear"}, optional
         Encoding of the values. Default: integers are sRGB and floats are linear.
 
     Returns
     -------
     array
-        Image of the same shape and dtype. Values are clipped at the largest of the dtype.
+        Image of the same shape and dtype. Values are clipped at the maximum of the dtype.
 
     Raises
     ------
     InvalidInput
-        If it is not an image, has colours beyond 1e15, or amount, size or space is invalid.
+        The argument is not an image, has colours above 1e15, or ``amount``, ``size`` or ``space`` is invalid.
 
     Examples
     --------
@@ -115,9 +114,9 @@ def flatten_lighting(
 
 
 def measure_unevenness(image: Array, space: Space | None = None) -> float:
-    """Return the ratio of brightness of the best lit and the worst lit part of colours.
+    """Return the brightness of the best lit part of an image divided by that of the worst lit part.
 
-    The ratio 1 means no evidence of uneven light.
+    The result is 1 if there is no evidence of uneven light.
     """
     pixels = as_image(image, "image")
     step = max(1, max(pixels.shape[:2]) // LOOKED_AT)
@@ -129,7 +128,7 @@ def measure_unevenness(image: Array, space: Space | None = None) -> float:
 
 
 def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[bool, bool]) -> Floats:
-    """Return logarithms of the correction of each part of an image, on a few samples."""
+    """Return the logarithm of the correction factor at each position, on a coarse grid."""
     rows, columns = pixels.shape[:2]
     step = max(1.0, max(rows, columns) / FINE)
     shape = max(1, ceil(rows / step)), max(1, ceil(columns / step))
@@ -138,13 +137,13 @@ def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[
         part = slice(start, min(start + max(1, STRIP // columns), rows))
         seen = encode_srgb(to_light(pixels[part][..., :colours], space)).mean(axis=-1, keepdims=True)
         if pixels.shape[-1] > colours:
-            # Fill unknown pixels with the mean of the known ones.
+            # Replace transparent pixels by the mean of the others.
             there = to_light(pixels[part][..., -1:], "linear")
             mean = (seen * there).sum(axis=(0, 1)) / np.maximum(there.sum(), np.float32(1e-6))
             seen = seen * there + mean * (1 - there)
         values[part] = np.swapaxes(shrink(np.swapaxes(seen, 0, 1), shape[1:]), 0, 1)
     bright = log_single(np.maximum(shrink(values, shape), np.float32(LEAST)))[..., 0].astype(np.float64)
-    # Start from means around each position, which separate elements in any light.
+    # Start from local means, which allow elements to be separated in any light.
     few, waves = reduce(shape), [min(MOST, max(1, round(n / over))) for n in pixels.shape[:2]]
     bells = [smooth(few[k], over / 2 * few[k] / pixels.shape[k], wrap[k]) for k in (0, 1)]
     low = enlarge(np.einsum("kl,il->ik", bells[1], np.einsum("ij,jl->il", bells[0], shrink(bright, few))), shape, wrap)
@@ -159,20 +158,20 @@ def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[
 
 
 def reduce(shape: tuple[int, int]) -> tuple[int, int]:
-    """Return the number of samples of the light."""
+    """Return the size of the coarse grid on which the light is computed."""
     rows, columns = (min(max(1, ceil(n * COARSE / max(shape))), n) for n in shape)
     return rows, columns
 
 
 def enlarge(values: NDArray[np.float64], shape: tuple[int, int], wrap: tuple[bool, bool]) -> NDArray[np.float64]:
-    """Return values on more samples, by linear interpolation."""
+    """Return values on a finer grid, by linear interpolation."""
     for axis in (0, 1):
         values = mix(values, place(shape[axis], values.shape[axis], wrap[axis]), axis)
     return values
 
 
 def divide(values: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return a mask of the brighter of the two best separable classes of values (Otsu 1979)."""
+    """Return 1 for bright and 0 for dark values, separated by the threshold of Otsu 1979."""
     low, high = float(values.min()), float(values.max())
     if high - low < 1e-6:
         return np.zeros(values.shape, np.intp)
@@ -185,7 +184,7 @@ def divide(values: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def smooth(count: int, width: float, wrap: bool) -> NDArray[np.float64]:
-    """Return the matrix of Gaussian means around each sample."""
+    """Return a matrix that averages samples with a Gaussian weight."""
     at = np.arange(count)
     apart = (at - at[:, np.newaxis]).astype(np.float64)
     if wrap:
@@ -198,7 +197,7 @@ def smooth(count: int, width: float, wrap: bool) -> NDArray[np.float64]:
 
 
 def place(count: int, samples: int, wrap: bool) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Return the sample before each pixel, and the distance from it."""
+    """Return for each pixel the sample before it, the sample after it, and the weight of the latter."""
     at = (np.arange(count) + 0.5) * (samples / count) - 0.5
     if not wrap:
         at = np.clip(at, 0, samples - 1)
@@ -210,7 +209,7 @@ def place(count: int, samples: int, wrap: bool) -> tuple[NDArray[np.intp], NDArr
 
 
 def mix(values: Array, between: tuple[Array, Array, Array], axis: int) -> Array:
-    """Interpolate values between samples along an axis."""
+    """Interpolate values linearly between samples along an axis."""
     first, second, share = between
     sides = [1] * values.ndim
     sides[axis] = len(share)

@@ -1,4 +1,4 @@
-"""Masks: pixels or voxels that a user marked, in any supported form."""
+"""Read masks, in any form in which users mark pixels or voxels."""
 
 from __future__ import annotations
 
@@ -27,25 +27,30 @@ __all__ = [
 ]
 
 HALF = 0.5
-"""Minimum share of white that marks a pixel. JPEG at quality 20 moves black and white by up to 0.46 of their distance.
+"""Minimum brightness of marked pixels, as a fraction of white.
+
+JPEG at quality 20 changes black and white by up to 0.46.
 """
 GREY, LEAST_GREY = 1 / 16, 0.01
-"""Minimum share of white of a grey pixel, and minimum share of unmarked grey pixels that is reported."""
+"""Minimum brightness of grey pixels (1 is white), and minimum fraction of unmarked grey pixels to report."""
 TWO = 0.1
-"""Maximum share of non-zero pixels between the two values of a mask: edges, and noise of JPEG."""
+"""Maximum fraction of non-zero pixels between the two values of a mask, at smooth edges or from JPEG noise."""
 PLAIN = 0.25
-"""Minimum share of the opaque pixels of a layer with the same brightness: a stroke is plain, and an image is not."""
+"""Minimum fraction of the opaque pixels of a layer with the same brightness.
+
+A painted stroke has one brightness, and an image does not.
+"""
 MUCH = 0.5
-"""Share of an image above which a mask is probably inverted."""
+"""Fraction of an image above which a mask is probably inverted."""
 FARTHEST = 4096
-"""Maximum number of pixels of `Mask.grow` and of `Mask.feather`."""
+"""Maximum of `Mask.grow` and `Mask.feather` in pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mask:
-    """A mask, and how to read it.
+    """Mask with options for how to read it.
 
-    White pixels of a mask are marked. Any parameter of texrs that takes a mask also takes a `Mask`.
+    White pixels of a mask are marked. Every parameter of texrs that takes a mask also takes a `Mask`.
 
     Parameters
     ----------
@@ -55,21 +60,21 @@ class Mask:
         contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency varies is
         a layer of a paint program: each pixel that is at least half opaque is marked.
     invert : bool
-        If True, the pixels that the mask does not mark are marked instead. Default: False.
+        If True, all pixels that the mask does not mark are marked instead. Default: False.
     threshold : float, optional
         Minimum brightness of marked pixels, or minimum opacity in an image with transparency, 0 to 1. The value 0
-        marks each pixel that is not black. For the marks "alpha", it is the share of transparency, and any
-        transparency by default. Default: 0.5, which is above the noise of JPEG.
+        marks each pixel that is not black. For the marks "alpha", it is the minimum transparency, which by default is
+        anything above 0. Default: 0.5, which is above the noise of JPEG.
     grow : int
         Growth of the marked area on all sides in pixels, -4096 to 4096. A negative number shrinks it. Default: 0.
     feather : int
-        Width in pixels of the band around the marked area where the filling fades into the image, 0 to 4096. The
-        marked area is replaced completely. Only for a hole that is filled. Default: 0.
+        Width in pixels of a band around the marked area in which the filling fades into the image, 0 to 4096. The
+        marked area is replaced completely. It can only be used for holes that are filled. Default: 0.
 
     Raises
     ------
     InvalidInput
-        If an option is out of its range.
+        An option is out of its range.
 
     Examples
     --------
@@ -99,17 +104,17 @@ class Mask:
 
 
 def as_marks(value: object) -> Mask:
-    """Return a mask as it is, or one of marks that are read by default."""
+    """Return a `Mask` unchanged, and other marks as a `Mask` with default options."""
     return value if isinstance(value, Mask) else Mask(value)
 
 
 def name_marks(mask: Mask, name: str) -> str:
-    """Return the name of the marks in notices: the file name, or the name of the parameter."""
+    """Return the name of the mask in notices: its file name, or the name of the parameter."""
     return os.path.basename(mask.marks) if isinstance(mask.marks, str | os.PathLike) else name
 
 
 def adjust(mask: Mask, marked: Bools, wrap: Sequence[bool] | None = None) -> Bools:
-    """Return a marked area, inverted and grown as requested.
+    """Invert and grow a marked area as its `Mask` requests.
 
     Examples
     --------
@@ -123,16 +128,16 @@ def adjust(mask: Mask, marked: Bools, wrap: Sequence[bool] | None = None) -> Boo
 
 
 def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bool] | None = None) -> Bools:
-    """Return the pixels or voxels that a mask marks.
+    """Return a bool array of the pixels or voxels that a mask marks.
 
     Parameters
     ----------
     value : Mask, array_like, path_like or PIL.Image.Image
-        The mask, of the shape or with channels last.
+        Mask of the given shape, with or without channels as the last axis.
     name : str
-        Name of the parameter, for messages.
+        Name of the parameter in error messages.
     shape : sequence of int or str
-        Length of each axis. A word stands for any length.
+        Length of each axis. A word allows any length.
     wrap : sequence of bool, optional
         Axes along which the image is periodic. Default: none.
 
@@ -143,9 +148,9 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     Raises
     ------
     InvalidInput
-        If the mask is not numbers, not finite, or of another shape.
+        The mask does not consist of finite numbers, or has another shape.
     FileError
-        If the file cannot be read.
+        The file cannot be read.
 
     Examples
     --------
@@ -171,7 +176,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
 
 
 def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:
-    """Return the marked pixels of an image, and report uncertain ones."""
+    """Decide which pixels of a mask image are marked, and report what was assumed."""
     levels = given
     if given.ndim > axes:
         colours, alpha = (given[..., :-1], given[..., -1]) if given.shape[-1] in (2, 4) else (given, None)
@@ -204,7 +209,7 @@ def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:
 
 
 def _look_through(levels: Array, alpha: Array, called: str) -> Array:
-    """Return the marks of an image with varying transparency: its opacity, or the white pixels of its opaque part."""
+    """Return the marks of an image with varying alpha: opaque, transparent, or white opaque pixels."""
     white, full = _find_white(levels), _find_white(alpha)
     seen = levels[alpha >= HALF * full].astype(np.float64) / white
     dark, light = (float(np.mean(part)) if seen.size else 0.0 for part in (seen < 0.25, seen > 0.75))
@@ -222,9 +227,9 @@ def _look_through(levels: Array, alpha: Array, called: str) -> Array:
 
 
 def _find_white(levels: Array) -> float:
-    """Return the value of white.
+    """Return the value of white in an image.
 
-    It is the largest value of an integer type, 1 for floats within 0 to 1, else the largest float.
+    It is the maximum of an integer dtype, 1 for floats from 0 to 1, and else the largest float in the image.
     """
     if levels.dtype == np.bool_:
         return 1.0
@@ -232,23 +237,23 @@ def _find_white(levels: Array) -> float:
 
 
 def check_share(marked: Bools, name: str, called: str, verb: str, *, invertible: bool = True) -> None:
-    """Refuse a mask without marked pixels, and report one that marks more than half.
+    """Raise an error if a mask marks no pixels, and report a mask that marks more than half of them.
 
     Parameters
     ----------
     marked : (...) bool
-        The marked pixels or voxels.
+        Bool array of the marked pixels or voxels.
     name, called : str
-        Name of the parameter, and name of the mask in notices.
+        Name of the parameter in error messages, and name of the mask in notices.
     verb : str
-        Verb for the marked pixels, such as "fill".
+        Verb that the notice uses for the marked pixels, such as "fill".
     invertible : bool
         If True, the notice advises to invert the mask.
 
     Raises
     ------
     InvalidInput
-        If no pixel is marked.
+        No pixels are marked.
 
     Examples
     --------
@@ -268,7 +273,7 @@ def check_share(marked: Bools, name: str, called: str, verb: str, *, invertible:
 
 
 def widen(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Bools:
-    """Grow a mask by a number of pixels on all sides, also across the borders of periodic axes.
+    """Grow a mask by a number of pixels on all sides, across the borders of periodic axes.
 
     Examples
     --------
@@ -289,7 +294,7 @@ def widen(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Bools:
 
 
 def fade(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floats:
-    """Return the weight of a filling: 1 in the mask, falling linearly to 0 beyond a band around it.
+    """Return the weight of a filling: 1 inside the mask, falling linearly to 0 outside a band around it.
 
     Examples
     --------
@@ -302,7 +307,7 @@ def fade(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floats:
 
 
 def measure(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floats:
-    """Return the distance in pixels to the nearest marked pixel, infinite beyond a width."""
+    """Return the distance of each pixel to the nearest marked pixel, or infinity far beyond ``width``."""
     from scipy.ndimage import distance_transform_edt
 
     closed = (False,) * mask.ndim if wrap is None else wrap
@@ -310,7 +315,7 @@ def measure(mask: Bools, width: int, wrap: Sequence[bool] | None = None) -> Floa
     padded = np.pad(mask, [(n, n) for n in reach], mode="wrap")
     far = np.full(padded.shape, np.inf, np.float32)
     if mask.any():
-        # Measuring distances is slow, so measure only in the box of short distances.
+        # Computing distances is slow, so use only the bounding box of the mask plus ``width``.
         box = []
         for axis in range(mask.ndim):
             marked = np.flatnonzero(padded.any(axis=tuple(a for a in range(mask.ndim) if a != axis)))

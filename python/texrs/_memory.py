@@ -1,6 +1,6 @@
-"""Memory that this process may take: the minimum of the machine's, the container's and the process's limits.
+"""Find the memory that this process can use: the minimum of the limits of the machine, the container and the process.
 
-`texrs.limits` handles limits from the environment and from the process itself.
+`texrs.limits` handles the limits that users set.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ OWN = Path("/proc/self/cgroup")
 
 
 def find_memory() -> int | None:
-    """Return the bytes that this process may take in total, if known.
+    """Return the number of bytes that this process can use in total, or None if unknown.
 
     Examples
     --------
@@ -37,19 +37,20 @@ def _read_machine() -> list[int]:
 
 
 def _read_limits() -> list[int]:
-    """Return the limits of ``ulimit -v`` and ``-d``."""
+    """Return the limits of ``ulimit -v`` and ``ulimit -d`` in bytes."""
     try:
         import resource
-    except ImportError:  # Windows has no such module.
+    except ImportError:  # Windows does not have the module ``resource``.
         return []
     limits = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
     return [limit for limit in limits if limit not in (resource.RLIM_INFINITY, -1)]
 
 
 def _read_groups(root: Path, own: Path) -> list[int]:
-    """Return the limits of the Linux control groups of the process and of all groups above them, versions 1 and 2.
+    """Return the memory limits of the Linux control groups (versions 1 and 2) of the process and of all parent groups.
 
-    Names in a container may be those of the host, where no files exist. Its own limit is then at the root.
+    In a container, the group names can be those of the host, for which there are no files. The limit of the container
+    is then at the root.
     """
     try:
         lines = own.read_text(encoding="utf-8").splitlines()

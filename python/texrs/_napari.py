@@ -1,7 +1,7 @@
-"""Reader plugin for napari (extra ``texrs[napari]``): stores, volumes, source maps and elements as layers.
+"""Reader plugin for napari (extra ``texrs[napari]``): shows stores, volumes, source maps and elements as layers.
 
-`napari.yaml` next to this file is its manifest. Nothing of napari is imported: the reader returns plain tuples of
-data, options and layer type. Stores are opened lazily, with all their levels.
+Its manifest is `napari.yaml`, next to this file. Nothing of napari is imported, because the reader returns plain
+tuples (data, options, layer type). Stores are opened lazily, with all their levels.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from texrs.io._formats import READ_VOLUMES
 from texrs.source_map import SourceMap
 
 LayerData = tuple[Any, dict[str, Any], str]
-"""Data, options, and type of the layer."""
+"""Layer of napari: its data, its options and its type."""
 _BRIGHT = 4
-"""Maximum number of channels for which the last axis may be colours."""
+"""Maximum length of a last axis without a name that is treated as channels."""
 
 
 def get_reader(path: str | Sequence[str]) -> Callable[[str | Sequence[str]], list[LayerData]] | None:
-    """Return the reader of one or several paths, or None if texrs reads none of them.
+    """Return the reader for one or several paths, or None if texrs cannot read all of them.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def get_reader(path: str | Sequence[str]) -> Callable[[str | Sequence[str]], lis
 
 
 def read(path: str | Sequence[str]) -> list[LayerData]:
-    """Return the layers of one or several paths."""
+    """Return the layers of all given paths."""
     names = [path] if isinstance(path, str | os.PathLike) else list(path)
     return [layer for name in names for layer in _read(Path(name))]
 
@@ -65,12 +65,12 @@ def _read(path: Path) -> list[LayerData]:
 
 
 def show(array: Array, axes: int, name: str, spacing: Sequence[float] | None = None) -> LayerData:
-    """Return a layer of an image or a volume: as colours, as one channel, or as separate channels."""
+    """Return a layer for an image or a volume: RGB colours, a single channel, or separate channels."""
     said: dict[str, Any] = {"name": name}
     if spacing is not None:
         said["scale"] = [float(s) for s in spacing]
     if axes == 3 and array.shape[0] == 1:
-        # A single plane needs no slider.
+        # Show a single plane as an image, because it needs no slider.
         array, axes = array[0], 2
         if spacing is not None:
             said["scale"] = said["scale"][1:]
@@ -84,19 +84,20 @@ def show(array: Array, axes: int, name: str, spacing: Sequence[float] | None = N
 
 
 def _are_colours(array: Any) -> bool:
-    """Return whether values are in the range of colours."""
+    """Return True if the values are in a range that is displayed as colours."""
     if array.dtype in (np.uint8, np.uint16):
         return True
     return bool(array.dtype.kind == "f" and array.size and float(array.min()) >= 0 and float(array.max()) <= 1)
 
 
 def read_source_map(path: Path, name: str) -> list[LayerData]:
-    """Return the source coordinates as colours, and the patches as labels."""
+    """Return two layers for a source map: the source coordinates as colours, and the patches as labels."""
     places = SourceMap.load(path)
     most = np.array(places.shapes)[places.exemplar] - 1
     share = np.clip(places.coordinates / np.maximum(most, 1), 0, 1)
     blue = 0.25 + 0.75 * places.exemplar[..., np.newaxis] / max(len(places.shapes) - 1, 1)
-    # Show two axes in red and green, and exemplars in blue. Volumes have three axes.
+    # In images, red and green show the coordinates and blue shows the exemplar. In volumes, all three show
+    # coordinates.
     colours = np.concatenate([share, blue], axis=-1) if places.axes == 2 else share
     shown = np.rint(255 * colours).astype(np.uint8)
     patches = places.label.astype(np.int64) + 1
@@ -107,7 +108,7 @@ def read_source_map(path: Path, name: str) -> list[LayerData]:
 
 
 def read_elements(path: Path, name: str) -> list[LayerData]:
-    """Return an image, the elements found in it, and their centres."""
+    """Return layers for an image, the elements found in it, and their centres."""
     entry = elements.load(path)
     return [
         show(entry.image, 2, name),
@@ -120,7 +121,7 @@ def read_elements(path: Path, name: str) -> list[LayerData]:
 
 
 def read_store(path: Path, name: str) -> list[LayerData]:
-    """Return a layer for each image of a store, with all its levels, read on demand."""
+    """Return a layer for each image of a Zarr store, with all its levels. Pixels are read on demand."""
     import zarr
     from dask import array as lazy
 
@@ -137,7 +138,7 @@ def read_store(path: Path, name: str) -> list[LayerData]:
 
 
 def _find_images(group: Any, name: str, depth: int = 3) -> list[LayerData]:
-    """Return the images of a group: its own, or those of its arrays and groups."""
+    """Return layers for the images of a group: its own image, or the images of its arrays and subgroups."""
     from dask import array as lazy
 
     said = group.attrs.get("ome", group.attrs)
@@ -163,7 +164,7 @@ def _name_axes(array: Any) -> list[str] | None:
 
 
 def _find_place(image: Mapping[str, Any], axes: int) -> tuple[list[float], list[float]]:
-    """Return the size of a sample along each axis, and the position of the first."""
+    """Return the distance between samples along each axis, and the position of the first sample."""
     scale, move = [1.0] * axes, [0.0] * axes
     for each in image["datasets"][0].get("coordinateTransformations", ()):
         if each.get("type") == "scale":
@@ -174,7 +175,7 @@ def _find_place(image: Mapping[str, Any], axes: int) -> tuple[list[float], list[
 
 
 def _is_labelled(group: Any, name: str) -> bool:
-    """Return whether a store of texrs has classes as values."""
+    """Return True if the values of a store that texrs wrote are labels."""
     for root in (group, None if group.path == "" else _open_root(group)):
         said = {} if root is None else root.attrs.get("texrs", {})
         if isinstance(said, Mapping) and "maps" in said:
@@ -195,7 +196,7 @@ def _open_root(group: Any) -> Any:
 def _show_lazy(
     levels: list[Any], names: list[str] | None, options: dict[str, Any], *, labelled: bool = False
 ) -> LayerData:
-    """Return a layer of the levels of an image, with channels where viewers expect them."""
+    """Return a layer for an image with several levels, with the channel axis where napari expects it."""
     first = levels[0]
     channel: int | None = None
     if names is not None:
@@ -206,7 +207,7 @@ def _show_lazy(
     if channel is None:
         kept: dict[str, Any] = {}
     else:
-        # The range of a lazy array is not computed. Floats are colours only if the store states it.
+        # The range of a lazy array is unknown without reading it, so treat only 8- and 16-bit integers as colours.
         colours = first.shape[channel] in (3, 4) and first.dtype in (np.uint8, np.uint16)
         if colours:
             from dask import array as lazy
@@ -222,6 +223,6 @@ def _show_lazy(
     if labelled and not kept and first.dtype.kind in "iub":
         return data, {**options, "multiscale": several}, "labels"
     if first.dtype == np.uint8 and "rgb" not in kept:
-        # Fix the contrast, so that it does not depend on the part that is viewed first.
+        # Fix the contrast limits, so that they do not depend on the part that is viewed first.
         kept["contrast_limits"] = [0, 255]
     return data, {**options, **kept, "multiscale": several}, "image"

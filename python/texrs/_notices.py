@@ -1,4 +1,4 @@
-"""Notices: which parts of an input a call ignored, and what it assumed about an input."""
+"""Collect notices: which parts of an input were ignored, and what was assumed about an input."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ PACKAGE = os.path.dirname(__file__)
 
 @dataclass(frozen=True, slots=True)
 class Notices:
-    """The notices that were given in a block of `collect`, each once.
+    """Notices of a `collect` block, without repetitions.
 
     Attributes
     ----------
     ignored : list of str
         One sentence for each part of an input that was not used.
     assumed : list of str
-        One sentence for each fact about an input that the input does not state.
+        One sentence for each assumption about an input that the input does not state.
 
     """
 
@@ -35,11 +35,11 @@ class Notices:
     assumed: list[str] = field(default_factory=list)
 
     def __bool__(self) -> bool:
-        """Return whether there are any."""
+        """Return True if there are any notices."""
         return bool(self.ignored or self.assumed)
 
     def add_to(self, report: Any) -> dict[str, Any]:
-        """Return a report with these notices: keys ``ignored`` and ``assumed``, only if there are any."""
+        """Return a report with these notices added under the keys ``ignored`` and ``assumed``, if there are any."""
         made = dict(report)
         for key, several in (("ignored", self.ignored), ("assumed", self.assumed)):
             if several:
@@ -61,21 +61,21 @@ _COLLECTORS: ContextVar[tuple[_Collector, ...]] = ContextVar("collectors", defau
 def collect(
     *, show: Callable[[str], object] | None = None, strict: bool = False, apart: bool = False
 ) -> Iterator[Notices]:
-    """Collect the notices of a block.
+    """Collect the notices that are given in a ``with`` block.
 
     Parameters
     ----------
     show : callable, optional
-        Called with the text of each notice when it is given. Without it, an ignored part is also a Python warning.
+        Function that is called with the text of each notice. If it is None, ignored parts are also Python warnings.
     strict : bool
-        If True, an ignored part raises `texrs.errors.InvalidInput`.
+        If True, an ignored part of an input raises `texrs.errors.InvalidInput`.
     apart : bool
-        If True, the notices do not reach outer blocks and are not warnings. Default: False.
+        If True, enclosing blocks do not get the notices, and there are no warnings. Default: False.
 
     Yields
     ------
     Notices
-        Grows while the block runs.
+        Object to which notices are added while the block runs.
 
     """
     notices = Notices()
@@ -90,23 +90,22 @@ def collect(
 
 
 def ignore(message: str) -> None:
-    """Report that a part of an input is not used.
+    """Report that a part of an input was not used.
 
     Parameters
     ----------
     message : str
-        One sentence that starts with the name of the input: ``"rock: preview.png is not used (its name gives no
-        role)"``.
+        Sentence that starts with the name of the input: ``"rock: preview.png is not used (its name gives no role)"``.
 
     Raises
     ------
     InvalidInput
-        If a block is strict.
+        An enclosing block of `collect` is strict.
 
     Warns
     -----
     InputWarning
-        If no block of `collect` shows the notice.
+        No enclosing block of `collect` shows the notice.
 
     """
     collectors = _COLLECTORS.get()
@@ -117,19 +116,19 @@ def ignore(message: str) -> None:
 
 
 def assume(message: str) -> None:
-    """Report a fact that a call assumes because the input does not state it.
+    """Report an assumption about an input that the input does not state.
 
     Parameters
     ----------
     message : str
-        One sentence that starts with the name of the input: ``"stone_n.png: read as normals with y down"``.
+        Sentence that starts with the name of the input: ``"stone_n.png: read as normals with y down"``.
 
     """
     _add("assumed", message)
 
 
 def repeat(notices: Notices) -> None:
-    """Give notices again that were collected earlier, without a warning: they belong to this call also."""
+    """Give notices again that were collected earlier, without warnings, because they also apply to this call."""
     for message in notices.ignored:
         _add("ignored", message)
     for message in notices.assumed:
@@ -137,7 +136,7 @@ def repeat(notices: Notices) -> None:
 
 
 def _add(kind: str, message: str) -> bool:
-    """Add a notice to all open blocks; return whether it is new to the outermost one."""
+    """Add a notice to all enclosing blocks, and return True if it is new to the outermost block."""
     new, shown = True, False
     for rank, collector in enumerate(_COLLECTORS.get()):
         several = getattr(collector.notices, kind)
@@ -152,7 +151,7 @@ def _add(kind: str, message: str) -> bool:
 
 
 def _count_frames() -> int:
-    """Return the number of stack frames between a notice and the code that called texrs."""
+    """Return the number of stack frames between a notice and the code that called texrs, for warnings."""
     frame, count = sys._getframe(1), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, count = frame.f_back, count + 1

@@ -1,7 +1,7 @@
-"""Images with a palette or few colours: their results contain only these colours.
+"""Keep the colours of images with a palette or few colours: their results contain no other colours.
 
-Interpolation, antialiasing and the correction of seams would add colours. Each pixel of a result is therefore looked
-up at the nearest pixel of the example.
+Interpolation, antialiasing and seam correction would add new colours. Each pixel of a result is therefore copied from
+the nearest pixel of the example.
 """
 
 from __future__ import annotations
@@ -28,35 +28,37 @@ from texrs.synthesis import Synthesis
 __all__ = ["Palette", "ask", "find", "has_few_colours", "keep_material", "keeps_colours", "make_plain"]
 
 MOST = 64
-"""Maximum number of few colours. Pixel art has up to 64, and photographs with so few grey levels are rare."""
-SPARE = 8
-"""Minimum number of pixels for each colour. A small crop of a photograph has a colour for each pixel."""
-STEP, SHARE = 8, 0.75
-"""Minimum difference of different neighbours, of 255 levels, and the minimum share of such pairs.
+"""Maximum number of colours of an image with few colours. Pixel art has up to 64.
 
-Smooth images have steps of 1 or 2 levels.
+Few photographs have so few grey levels.
+"""
+SPARE = 8
+"""Minimum number of pixels per colour. In a small crop of a photograph, almost every pixel has its own colour."""
+STEP, SHARE = 8, 0.75
+"""Minimum difference of adjacent pixels, of 255 levels, and minimum fraction of unequal pairs that reach it.
+
+In smooth images, adjacent pixels differ by 1 or 2 levels.
 """
 ENOUGH = 2**18
-"""Approximate number of pixels whose neighbours are compared: rows and columns spread over the image."""
+"""Approximate number of pixels whose neighbours are compared, in rows and columns spread over the image."""
 CHUNK, MANY = 2**16, 2**12
-"""Number of pixels whose colours are listed at a time, and number of colours above which one sort of all pixels is
-faster.
+"""Number of pixels whose colours are collected at once, and number of colours above which sorting all pixels is faster.
 """
 OFF = "--no-palette or another interpolation turns this off"
-"""The end of each notice: how to get other colours."""
+"""End of each notice, which explains how to allow other colours."""
 _ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
-"""If True, every image keeps its colours; if False, none. If None, indexed images and images of few colours do."""
+"""True: all images keep their colours. False: no image does. None: indexed images and images of few colours do."""
 
 
 @dataclass(frozen=True, slots=True)
 class Palette:
-    """Examples of a verb whose result contains only their colours."""
+    """Examples of a verb whose result contains only the colours of the examples."""
 
     images: list[Array]
     count: int
 
     def keep(self, made: Synthesis) -> Synthesis:
-        """Return a result whose pixels are pixels of the examples."""
+        """Return the result with its pixels copied from the examples, without interpolation or correction."""
         if made.source_map.axes != 2:
             return made
         source = make_plain(made.source_map)
@@ -69,7 +71,7 @@ class Palette:
 
 @contextmanager
 def ask(kept: bool | None) -> Iterator[None]:
-    """Choose in a block whether images keep their colours. None decides for each image."""
+    """Set for a ``with`` block whether results keep the colours of images. None decides for each image."""
     token = _ASKED.set(kept)
     try:
         yield
@@ -78,12 +80,12 @@ def ask(kept: bool | None) -> Iterator[None]:
 
 
 def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) -> Palette | None:
-    """Return the examples among the arguments of a verb if its result contains only their colours.
+    """Return the examples in the arguments of a verb if its result must contain only their colours, else None.
 
-    A path among the arguments is replaced by its image. Arguments that request other colours disable this.
+    A path in the arguments is replaced by its image. Arguments that request other colours disable the palette.
     """
     asked, weight, how = _ASKED.get(), given.get("screening"), given.get("interpolation")
-    # The verb refuses values of other types.
+    # The verb reports values of other types later.
     wanted = isinstance(weight, int | float) and weight not in (0, usual.get("screening"))
     smooth = isinstance(how, str) and how not in ("nearest", usual.get("interpolation"))
     fading = any(isinstance(value, Mask) and value.feather for value in given.values())
@@ -94,7 +96,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
         value = given.get(name)
         if isinstance(value, str | os.PathLike):
             with suppress(TexrsError):
-                # A verb that fills holes does not use pixels without data as values.
+                # A verb that fills holes does not use nodata pixels as colours, so do not report them.
                 value = given[name] = as_ndarray(value, name, used="mask" not in usual)
         elif isinstance(value, list | tuple) and any(isinstance(each, str | os.PathLike) for each in value):
             with suppress(TexrsError):
@@ -117,7 +119,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
 
 
 def has_few_colours(image: Array) -> bool:
-    """Return whether an image has so few colours that a new one would be visible.
+    """Return True if an image has so few colours that a new colour would be visible.
 
     Examples
     --------
@@ -142,7 +144,7 @@ def has_few_colours(image: Array) -> bool:
 
 
 def keeps_colours(image: Array) -> bool:
-    """Return whether results of an image have only its colours, and report it."""
+    """Return True if results keep the colours of an image, and report it."""
     asked = _ASKED.get()
     kept = has_few_colours(image) if asked is None else asked
     if kept:
@@ -151,13 +153,13 @@ def keeps_colours(image: Array) -> bool:
 
 
 def make_plain(source: SourceMap) -> SourceMap:
-    """Return a source map with nearest-pixel look-up and without correction."""
+    """Return a source map that copies the nearest pixel, without interpolation and correction."""
     wrap = (False, False) if source.finish is None else source.finish.wrap
     return replace(source, finish=RenderOptions(wrap, interpolation="nearest"))
 
 
 def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
-    """Return a result with nearest-pixel look-up of all maps if its materials have few colours."""
+    """Return a result whose maps are copied from the nearest pixels, if the colours of its materials are few."""
     asked, bases = _ASKED.get(), [m.base for m in materials]
     few = asked is not False and made.source_map.axes == 2 and all(has_few_colours(base) for base in bases)
     if not few and not asked:
@@ -167,7 +169,7 @@ def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
 
 
 def _keeps(image: Array, indexed: bool) -> bool:
-    """Return whether an image keeps its colours. A palette of many greys belongs to a grey photograph."""
+    """Return True if results keep the colours of this image. A palette of many greys means a photograph."""
     if not indexed or image.dtype != np.uint8:
         return has_few_colours(image)
     grey = image.ndim == 2 or (image.shape[2] >= 3 and bool((image[..., :3] == image[..., :1]).all()))
@@ -175,7 +177,7 @@ def _keeps(image: Array, indexed: bool) -> bool:
 
 
 def _list_images(value: object) -> Iterator[Array]:
-    """Return the images in an argument: an array, an object with an image, or a list of them."""
+    """Yield the images in an argument: an array, an object with an image, or a list of them."""
     several = value if isinstance(value, list | tuple) else [value]
     for each in several:
         image = each if isinstance(each, np.ndarray) else getattr(each, "image", None)
@@ -186,7 +188,7 @@ def _list_images(value: object) -> Iterator[Array]:
 
 
 def _list_colours(image: Array, most: int = MANY) -> Array:
-    """Return the distinct colours of an image as numbers, or some of them if there are more than ``most``."""
+    """Return the different colours of an image as integers. If there are more than ``most``, only some are returned."""
     found, rows = _pack(image[:0]), max(1, CHUNK // max(image.shape[1], 1))
     for first in range(0, image.shape[0], rows):
         found = np.union1d(found, _pack(image[first : first + rows]))
@@ -196,7 +198,7 @@ def _list_colours(image: Array, most: int = MANY) -> Array:
 
 
 def _pack(image: Array) -> Array:
-    """Return the colours of pixels as one number each."""
+    """Return the colour of each pixel as a single value."""
     if image.ndim == 2:
         return image.ravel()
     flat = np.ascontiguousarray(image).reshape(-1, image.shape[2])

@@ -1,4 +1,4 @@
-"""Progress of long work: reports of kernels, and their display."""
+"""Report the progress of long work to a callback, and display it."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from texrs.errors import InvalidInput
 from texrs.limits._context import check_time, find_end
 
 if TYPE_CHECKING:
-    # Import the typing names only here, because they would load NumPy.
+    # Import the type names only here, because they would import NumPy.
     from texrs._typing import Progress
 
 PAUSE = 5.0
-"""Minimum seconds between two lines of one stage."""
+"""Minimum number of seconds between two lines of the same stage."""
 _ASKED: ContextVar[Callable[[], object] | None] = ContextVar("asked", default=None)
 
 
 @contextmanager
 def answering(progress: Callable[..., object] | None, *place: str | float) -> Iterator[None]:
-    """Connect calls without a progress argument in the block to a listener, by `ask`.
+    """Let calls of `ask` in a ``with`` block reach a progress function.
 
     Parameters
     ----------
     progress : callable or None
-        The listener.
+        Progress function of the caller.
     *place
-        First arguments of each call of the listener: the stage and its share, or only the share.
+        Arguments with which the function is called: the stage and its share, or only the share.
 
     Yields
     ------
     None
 
     """
-    # If nobody listens to this block, ask the listener of the enclosing block.
+    # Without a progress function for this block, use the function of the enclosing block.
     token = _ASKED.set(_ASKED.get() if progress is None else lambda: progress(*place))
     try:
         yield
@@ -47,14 +47,14 @@ def answering(progress: Callable[..., object] | None, *place: str | float) -> It
 
 
 def ask() -> None:
-    """Ask the listener, if there is one, whether to continue. For loops in shared code without a progress argument."""
+    """Call the progress function of the enclosing block, if any. It can raise an exception to stop the work."""
     asked = _ASKED.get()
     if asked is not None:
         _tell(asked)
 
 
 def _tell(asked: Callable[[], object]) -> None:
-    # Calls made by a listener are not reported to it.
+    # Calls of texrs inside the progress function must not call it again.
     token = _ASKED.set(None)
     try:
         asked()
@@ -63,27 +63,28 @@ def _tell(asked: Callable[[], object]) -> None:
 
 
 def stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    """Return a function that a kernel calls with its completed share, or None without a listener."""
+    """Return a function that a kernel calls with its completed share, or None without a progress function."""
     if progress is None:
         return None
-    progress(name, 0.0)  # Short work may finish before the first report.
+    progress(name, 0.0)  # Report the start, because short work can finish before its first report.
     return lambda share: progress(name, share)
 
 
 def listen(progress: Progress | bool | None) -> Progress | None:
-    """Return the listener of a verb: the caller's function, a bar for True, or None unless time is limited.
+    """Return the progress function of a verb: the caller's, a bar for True, or None if no reports are needed.
 
     Parameters
     ----------
     progress : callable, bool or None
-        Argument of the verb. True shows a bar of tqdm on stderr or in the notebook, which disappears when the verb
-        ends. Without tqdm it prints a line for each stage, and one every five seconds with the completed share. Calls
-        without a listener in a block of `answering` behave like `ask`.
+        Argument of the verb. True shows a bar of tqdm on standard error or in the notebook, which disappears when the
+        verb ends. Without tqdm, a line is printed for each stage, and one with the completed share every five seconds.
+        Without a progress function, the function of an enclosing `answering` block is called. A time limit is also
+        checked with each report.
 
     Raises
     ------
     InvalidInput
-        If it is not a function, True, False or None.
+        The argument is not a function, True, False or None.
 
     """
     watch = _choose(progress)
@@ -101,7 +102,7 @@ def listen(progress: Progress | bool | None) -> Progress | None:
 
 def _choose(progress: Progress | bool | None) -> Progress | None:
     if progress is None or progress is False:
-        # Find the listener here, because another block of `answering` would hide it.
+        # Look up the enclosing block now, because an inner block of `answering` could hide it later.
         asked = _ASKED.get()
         return None if asked is None else lambda stage, share: _tell(asked)
     if progress is True:
@@ -113,7 +114,7 @@ def _choose(progress: Progress | bool | None) -> Progress | None:
 
 
 def show_lines(write: Callable[[str], object]) -> Progress:
-    """Return a callback that prints a line at the start of each stage, and regularly its completed share."""
+    """Return a progress function that prints a line when a stage starts, and its completed share at intervals."""
     last, since = "", 0.0
 
     def show(stage: str, share: float) -> None:
@@ -127,7 +128,7 @@ def show_lines(write: Callable[[str], object]) -> Progress:
 
 
 def _make_bar() -> Progress | None:
-    """Return a callback that moves a bar, or None without tqdm. The bar is closed when the callback is released."""
+    """Return a progress function that moves a bar of tqdm, or None if tqdm is not installed."""
     try:
         from tqdm.auto import tqdm
     except ImportError:

@@ -1,4 +1,4 @@
-"""Display of results: one line in the console, an image in a notebook."""
+"""Display results: as one line in the console, and as an image in a notebook."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from texrs._arrays import to_unit
 from texrs._typing import Array
 
 LONG = 60
-"""Maximum characters of a value that is written in full."""
+"""Maximum number of characters of a value that is written in full."""
 FEW = 8
 """Maximum number of list entries that are written."""
 
 
 def brief(thing: Any) -> str:
-    """Return a dataclass on one line: arrays by dtype and size, without default values.
+    """Describe a dataclass in one line, with the dtype and size of arrays and without default values.
 
     Use it as ``__repr__ = brief`` in the class.
 
@@ -45,7 +45,7 @@ def brief(thing: Any) -> str:
 
 
 def spell(value: object) -> str:
-    """Return a value in few words."""
+    """Describe a value in a few words."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype} of {' x '.join(map(str, value.shape))}" if value.ndim else repr(value.item())
     if isinstance(value, Mapping):
@@ -60,20 +60,20 @@ def spell(value: object) -> str:
 
 
 def spell_list(several: Sequence[object]) -> str:
-    """Return a list on one line: its first entries and its length."""
+    """Describe a list in one line: its first entries and its length."""
     shown = ", ".join(map(repr, several[:FEW]))
     return f"[{shown}, ... {len(several)} in all]" if len(several) > FEW else f"[{shown}]"
 
 
 def measure(image: Array, axes: int) -> str:
-    """Return the size, channels and dtype of an image or a volume."""
+    """Describe the size, channels and dtype of an image or a volume."""
     count = image.shape[axes] if image.ndim > axes else 1
     sides = " x ".join(map(str, image.shape[:axes]))
     return f"{sides}, {count} channel{'s' * (count > 1)} of {image.dtype}"
 
 
 def preview(image: Array) -> Array:
-    """Return an 8-bit grey, RGB or RGBA version of an image for display."""
+    """Convert an image to 8-bit grey, RGB or RGBA for display."""
     if image.dtype == np.bool_:
         return image.astype(np.uint8) * np.uint8(255)
     seen = image if image.ndim == 2 or image.shape[-1] in (3, 4) else image[..., 0]

@@ -1,4 +1,4 @@
-"""Number of threads of the kernels, and parallel work in as many threads."""
+"""Set the number of threads of the kernels, and run Python tasks in as many threads."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from texrs.errors import Cancelled
 T = TypeVar("T")
 R = TypeVar("R")
 Watch: TypeAlias = Callable[[float], object]
-"""Called with the completed share of one task. It raises to stop the work."""
+"""Function that a task calls with its completed share. It raises an exception to stop the work."""
 PAUSE = 0.05
-"""Seconds between two checks of progress."""
+"""Seconds between two checks of the progress of tasks."""
 
 
 @contextmanager
 def threads(count: int | None = None) -> Iterator[None]:
-    """Use ``count`` threads in the kernels that this thread calls inside the ``with`` block.
+    """Set the number of threads of the kernels that this thread calls inside a ``with`` block.
 
-    Results do not depend on it.
+    The number of threads does not change results.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ def threads(count: int | None = None) -> Iterator[None]:
     Yields
     ------
     None
-        The block restores the former number.
+        The previous number is restored at the end of the block.
 
     Raises
     ------
     InvalidInput
-        If the count is not an integer from 1 to 1024.
+        ``count`` is not an integer from 1 to 1024.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def threads(count: int | None = None) -> Iterator[None]:
 
 
 def count_threads() -> int:
-    """Return the number of threads in force, as the kernels count them."""
+    """Return the number of threads that the kernels currently use."""
     count = _rust.set_threads(0)
     _rust.set_threads(count)
     said = os.environ.get("RAYON_NUM_THREADS", "")
@@ -70,9 +70,9 @@ def count_threads() -> int:
 
 
 class SideBySide:
-    """Run independent tasks in as many threads as are in force. The threads are reused.
+    """Pool that runs independent tasks in as many threads as the kernels use. The threads are reused.
 
-    Use it in a ``with`` block. Results do not depend on the number of threads if the tasks do not.
+    Use it in a ``with`` block. If the tasks do not depend on the number of threads, the results do not either.
     """
 
     def __init__(self, most: int) -> None:
@@ -96,21 +96,22 @@ class SideBySide:
         items: Sequence[T],
         watch: Callable[[int, float], object] | None = None,
     ) -> list[R]:
-        """Return the results of the tasks, in order.
+        """Run the tasks and return their results in order.
 
         Parameters
         ----------
         work : callable
-            Called with an item and a function that it calls with the completed share.
+            Function of one task. It gets an item, and a function to call with the completed share of the task.
         items : sequence
-            Items. Each is an independent task.
+            Items, each for an independent task.
         watch : callable, optional
-            Called only from this thread, with the number of a running task and its share. An exception stops the work.
+            Function that is called, always from this thread, with the index of a running task and its completed share.
+            An exception that it raises stops the work.
 
         Raises
         ------
         BaseException
-            Exception of the first failed task in order. No other task continues.
+            The exception of the first failed task, in the order of the items. The other tasks are stopped.
 
         """
         if self._pool is None or len(items) < 2:
@@ -126,12 +127,12 @@ class SideBySide:
                     raise Cancelled("stopped, because another task failed")
                 shares[number] = share
 
-            # A task that starts after a failure stops here.
+            # Stop here if another task has already failed.
             tell(0.0)
             with threads(self._count):
                 return work(item, tell)
 
-        # Copy the context, so that limits and listeners of this thread also apply to the tasks.
+        # Copy the context, so that the limits and progress functions of this thread also apply to the tasks.
         futures: list[Future[R]] = []
         try:
             for number, item in enumerate(items):
@@ -149,7 +150,7 @@ class SideBySide:
             for each in futures:
                 each.cancel()
             wait(futures)
-        # Raise the error of a task before the cancellations that followed from it.
+        # Raise the original error of a task, not the cancellations that it caused in others.
         failed = [error for each in futures if not each.cancelled() and (error := each.exception()) is not None]
         for error in sorted(failed, key=lambda e: isinstance(e, Cancelled)):
             raise error

@@ -1,4 +1,4 @@
-"""Names for the types that appear in signatures."""
+"""Type names that appear in signatures."""
 
 from __future__ import annotations
 
@@ -14,18 +14,21 @@ Floats: TypeAlias = NDArray[np.float32]
 Bools: TypeAlias = NDArray[np.bool_]
 Labels: TypeAlias = NDArray[np.int32]
 Matrix: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
-"""Linear map of two axes, as rows."""
+"""Linear map in two dimensions, given by its rows."""
 Path: TypeAlias = str | PathLike[str]
 Interpolation: TypeAlias = Literal["nearest", "linear", "cubic"]
 Progress: TypeAlias = Callable[[str, float], object]
-"""Called with the name of the stage and its completed share. An exception stops the work."""
+"""Function that is called with the name of the stage and its completed share, 0 to 1.
+
+An exception that it raises stops the work.
+"""
 
 
 @runtime_checkable
 class Frames(Protocol):
-    """A frame for each point of a lattice, as in `texrs.fields`."""
+    """Object that gives a frame at each point of a grid, as in `texrs.fields`."""
 
     axes: int
 
     def lattice(self, shape: Sequence[int], *, origin: Any = 0, step: float = 1) -> Floats:
-        """Return the Jacobians (..., A, A) of a lattice of that shape."""
+        """Return the Jacobians (..., A, A) at the points of a grid of the given shape."""

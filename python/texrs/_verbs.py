@@ -1,4 +1,4 @@
-"""Decorator for verbs that take materials in place of examples."""
+"""Decorator with which verbs accept materials in place of images."""
 
 from __future__ import annotations
 
@@ -33,29 +33,31 @@ def takes_materials(
     analysed: bool = False,
     check: Callable[[dict[str, Any]], None] = lambda given: None,
 ) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Let a verb take materials as examples. It decides from their colours, and all their maps follow.
+    """Let a verb take materials as examples. It decides from their guide images, and all maps follow the result.
 
     Parameters
     ----------
     *names : str
-        Parameters that the source map of the verb refers to, in the order of its exemplars. One may contain a list.
+        Names of the parameters that are exemplars of the verb's source map, in the order of their index. One of them
+        can be a list.
     beside : tuple of str
-        Parameters that only serve as a reference for appearance.
+        Names of the parameters that are used only as a reference for appearance.
     analysed : bool
-        If True, the verb needs the elements of its input. The colours of a material may show them best.
+        If True, the verb needs the elements of its input, which are found in the material.
     check : callable
-        Called with the arguments of a call with materials. It refuses arguments that only an image can have.
+        Function that gets the arguments of a call with materials. It raises an error for arguments that are only valid
+        for images.
 
     Returns
     -------
     callable
-        Decorator of a function that returns a `texrs.Synthesis` or an iterator of them. It sets ``material``, and
-        ``image`` to the map that represents it.
+        Decorator for functions that return a `texrs.Synthesis` or an iterator of them. It sets ``material``, and sets
+        ``image`` to the map that represents the material.
 
     Raises
     ------
     InvalidInput
-        If some exemplars are materials and others are not, or their maps differ.
+        Some exemplars are materials and others are not, or their maps differ.
 
     """
 
@@ -65,7 +67,7 @@ def takes_materials(
 
         @wraps(verb)
         def run(*args: P.args, **kwargs: P.kwargs) -> T:
-            # The report contains these notices even if the input was read earlier.
+            # Repeat these notices, so that the report contains them even if the input was read earlier.
             with collect() as notices:
                 for value in (*args, *kwargs.values()):
                     for each in _as_list(value):
@@ -87,7 +89,7 @@ def takes_materials(
                 if isinstance(given.arguments.get(name), Material):
                     other = given.arguments[name]
                     given.arguments[name] = _analyse(other, other.guide, name, watch) if analysed else other.guide
-            # Replace materials by guide images, which combine all their maps.
+            # Replace each material by its guide image, which combines all its maps.
             used = [name for name in names if given.arguments.get(name) is not None]
             several = [m for name in used for m in _as_list(given.arguments[name])]
             if not any(isinstance(m, Material) for m in several):
@@ -105,14 +107,14 @@ def takes_materials(
                         [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
                     )
             if lit is True:
-                # The guide image is already in even light.
+                # The guide image already has even light.
                 given.arguments["flatten_lighting"] = False
             made: Any = verb(*given.args, **given.kwargs)
             if lit is True:
                 made = replace(
                     made, source_map=_flattened(made.source_map), report={**made.report, "flatten_lighting": True}
                 )
-            # Render all maps of the materials through the source map of the guide images.
+            # Apply the source map of the guide images to all maps of the materials.
             if isinstance(made, Synthesis):
                 return cast(T, finish(made, materials, watch))
             return cast(T, (finish(one, materials, watch) for one in made))
@@ -124,7 +126,7 @@ def takes_materials(
 
 
 def finish(made: Synthesis, materials: list[Material], progress: Progress | None) -> Synthesis:
-    """Return the result of a verb on guide images as the result on their materials."""
+    """Convert the result of a verb on guide images to the result on their materials."""
     made = _palettes.keep_material(made, materials)
     material = apply_materials(materials, made.source_map, progress)
     stages = {"guide" if name == "before_blending" else name: stage for name, stage in made.stages.items()}
@@ -139,16 +141,16 @@ def finish(made: Synthesis, materials: list[Material], progress: Progress | None
 
 
 def _report(made: Any, notices: Notices) -> Any:
-    """Return results whose reports contain the notices."""
+    """Add notices to the reports of results."""
     if isinstance(made, Synthesis):
         return replace(made, report=notices.add_to(made.report)) if notices else made
     return _report_each(made, notices)
 
 
 def _report_each(made: Iterator[Any], notices: Notices) -> Iterator[Any]:
-    """Return results one by one. Each report contains the notices of the call and of its own work."""
+    """Yield results one by one. Each report contains the notices of the call and of the result itself."""
     while True:
-        # A block must not be open while the caller works with a result.
+        # Close the block before yielding, so that it does not collect notices of the caller.
         with collect() as own:
             one = next(made, None)
         if one is None:
@@ -158,7 +160,7 @@ def _report_each(made: Iterator[Any], notices: Notices) -> Iterator[Any]:
 
 def _analyse(material: object, guide: Array, name: str, progress: Progress | None) -> ElementAnalysis:
     """Return the elements of a material, compared by all its maps."""
-    # Most verbs do not need elements.
+    # Import elements only here, because most verbs do not need them.
     from texrs.elements import analyse
 
     try:
@@ -170,7 +172,7 @@ def _analyse(material: object, guide: Array, name: str, progress: Progress | Non
 
 
 def _flattened(source: SourceMap) -> SourceMap:
-    """Return a source map that also evens the light."""
+    """Return a copy of a source map whose finish also removes uneven light."""
     assert source.finish is not None
     return replace(source, finish=replace(source.finish, flatten_lighting=True))
 
@@ -180,12 +182,12 @@ def _as_list(value: object) -> list[object]:
 
 
 def _holds(value: object) -> bool:
-    """Return whether a value is a material, or a list with one."""
+    """Return True if a value is a material, or a list that contains one."""
     return any(isinstance(each, Material) for each in _as_list(value))
 
 
 def _check(several: list[object], names: list[str]) -> list[Material]:
-    """Check that all exemplars are materials."""
+    """Check that all exemplars are materials, and return them."""
     materials = [each for each in several if isinstance(each, Material)]
     if len(materials) < len(several):
         raise InvalidInput(

@@ -1,4 +1,4 @@
-"""Version of the package, taken from the compiled kernels so that the two cannot differ."""
+"""Version of the package. It is read from the compiled kernels, so that the two cannot differ."""
 
 from texrs._rust import VERSION as __version__
 

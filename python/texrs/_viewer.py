@@ -1,7 +1,7 @@
-"""A volume in an HTML page: a slice along each axis with sliders, without a kernel or a library.
+"""Show a volume on an HTML page: a slice and a slider for each axis, without a kernel or a library.
 
-The voxels are stored as one image of all planes, and a few lines of JavaScript cut slices from it. Without scripts, as
-in previews of notebooks, three fixed slices are shown.
+All planes are stored as one image, from which a few lines of JavaScript cut the slices. If scripts are disabled, as in
+previews of notebooks, three fixed slices are shown.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from texrs.io._pillow import encode
 MOST = 2**20
 """Approximate maximum number of characters of the page."""
 _STEPS = 12
-"""Number of attempts to stay below the limit, each with fewer voxels."""
+"""Maximum number of attempts to stay below the limit. Each attempt uses fewer voxels."""
 _SIDE = 260
-"""Screen pixels of the longest side of a volume."""
+"""Length on the screen of the longest side of a volume, in pixels."""
 _NAMES = ("plane", "row", "column")
 
 _PAGE = """\
@@ -79,7 +79,7 @@ for (const box of document.querySelectorAll('[id="{id}"]:not([data-on])')) {{
 def as_page(volume: Array) -> str:
     """Return HTML that shows a volume (D, H, W, C), with less than about a million characters.
 
-    Larger volumes are shown at every second voxel or fewer.
+    In larger volumes, only every second voxel or fewer are shown.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def as_page(volume: Array) -> str:
 
     """
     sides = volume.shape[:3]
-    # Divide the sides by the cube root of 2, which halves the voxels.
+    # Divide each side by the cube root of 2, which halves the number of voxels.
     for attempt in range(_STEPS):
         least = 2 ** (attempt / 3)
         step = tuple(max(1, math.floor(least * max(1.0, n / 128))) for n in sides)
@@ -116,14 +116,14 @@ def as_page(volume: Array) -> str:
 
 
 def _as_bytes(volume: Array) -> Array:
-    """Return colours of 8 bits, (D, H, W, 3 or 4). Other numbers of channels show the first one."""
+    """Return 8-bit colours, (D, H, W, 3 or 4). If there are not 3 or 4 channels, only the first is shown, as grey."""
     seen = preview(volume) if volume.shape[-1] in (3, 4) else preview(volume[..., :1])
     seen = seen if seen.ndim == 4 else seen[..., np.newaxis]
     return np.repeat(seen, 3, axis=-1) if seen.shape[-1] == 1 else seen
 
 
 def _pack(seen: Array) -> tuple[bytes, int]:
-    """Return a lossless image of all planes in rows, and the number of planes in a row."""
+    """Return a lossless image that contains all planes in a grid, and the number of planes per row."""
     planes, rows, columns, channels = seen.shape
     wide = min(planes, max(1, round(math.sqrt(planes * rows / columns))))
     tall = -(-planes // wide)
@@ -135,7 +135,7 @@ def _pack(seen: Array) -> tuple[bytes, int]:
 
 
 def _show_still(seen: Array) -> Array:
-    """Return the middle slices side by side, 2 pixels apart."""
+    """Return the three middle slices side by side, 2 pixels apart."""
     cuts = [np.take(seen, n // 2, axis=axis) for axis, n in enumerate(seen.shape[:3])]
     height, width = max(c.shape[0] for c in cuts), sum(c.shape[1] for c in cuts) + 4
     out, left = np.full((height, width, seen.shape[3]), 255, np.uint8), 0

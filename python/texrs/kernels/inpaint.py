@@ -96,7 +96,7 @@ def inpaint(
     count : int
         Maximum number of matches to compare, 1 to 1000.
     separation : int
-        Minimum distance between matches in one exemplar, in pixels, 0 to 2^31.
+        Distance in pixels, 0 to 2^31. The rows or the columns of two matches in one exemplar differ by more than this.
     ratio : float
         Maximum cost of a match, as a multiple of the best one, 1 to 1e9.
     wrap : bool or (rows, columns)

@@ -193,8 +193,8 @@ class PatchIndex:
         count : int
             Maximum number of matches, 1 to 2^31 - 1.
         separation : int
-            Minimum distance between matches in one image, in pixels, 0 to 2^31 - 1. Matches are far enough apart if
-            their rows or their columns differ by this.
+            Distance in pixels, 0 to 2^31 - 1. The rows or the columns of two matches in one image differ by more than
+            this.
         ratio : float
             Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed.
 
@@ -245,8 +245,8 @@ class PatchIndex:
         count : int
             Maximum number of matches, 1 to 2^31 - 1.
         separation : int
-            Minimum distance between matches in one image, in pixels, 0 to 2^31 - 1. Matches are far enough apart if
-            their rows or their columns differ by this.
+            Distance in pixels, 0 to 2^31 - 1. The rows or the columns of two matches in one image differ by more than
+            this.
         ratio : float
             Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed.
 

@@ -32,7 +32,7 @@ def felzenszwalb(
     """Segment an image into regions of similar colour.
 
     Adjacent pixels (eight neighbours) are merged in the order of their colour difference. Two regions are merged if
-    the difference at their border is at most the tolerance of both. The tolerance of a region is the largest
+    the difference at their border is less than the tolerance of both. The tolerance of a region is the largest
     difference inside it, plus ``scale`` divided by its area (Felzenszwalb and Huttenlocher [1]_). The regions are the
     same as those of ``skimage.segmentation.felzenszwalb``, with the same numbers if no two differences are equal.
     Equal differences are processed in the order of their pixels, so the result does not depend on the processor or the
