@@ -1,53 +1,55 @@
-"""SOLID: textures of two and three dimensions under a frame field.
+"""SOLID: synthesis of images and volumes that follow a frame field (`texrs.synthesize` and `texrs.solid`).
 
 Y.-L. Su, C.-C. Chang, Z.-C. Shih and W.-K. Tai, "Vector-field-based deformations for three-dimensional texture
-synthesis" (appearance vectors, similarity sets and a pyramid of corrections after Lefebvre and Hoppe, SIGGRAPH 2005
-and 2006). The steps are:
+synthesis". The paper's appearance vectors, similarity sets and pyramid of corrections follow Lefebvre and Hoppe,
+SIGGRAPH 2005 and 2006. The steps are:
 
-1. Analyse the exemplar: its separate elements, and its adjacent colours (`texrs.Exemplar.stitcher`).
-2. Map patches of it into the output through the field around their centres.
-3. Cut each in at the best of several places, and repair torn elements (`texrs._engine.stitcher`).
-4. Look the exemplar up through the coordinates.
+1. Analyse the exemplar: find its separate elements, and which colours are adjacent (`texrs.Exemplar.stitcher`).
+2. Map patches of the exemplar into the output, rotated and scaled by the field at their centres.
+3. Cut each patch in along minimum cuts, from the best of several source positions, and repair torn elements
+   (`texrs._engine.stitcher`).
+4. Look up the exemplar at the resulting coordinates.
 
-With ``quality="fast"`` steps 2 and 3 are those of the paper. Coordinates are upsampled from level to level with the
-field's Jacobian (Eq. 1 and 2). They are corrected by the windows around each point, warped by the field (Eq. 3 and 4).
-Both are the engine of `texrs.growth`. Unbounded textures place patches over each other in tilings of the world
-(`texrs.papers.solid.layers`), so that a patch depends on few others. With ``quality="fast"`` they are a chain of
-corrections (`texrs.papers.solid.world`).
+With ``quality="fast"`` steps 2 and 3 are the steps of the paper. Coordinates are upsampled from level to level with
+the field's Jacobian (Eq. 1 and 2). They are corrected by comparing the windows around each point, which the field
+warps (Eq. 3 and 4). The engine of `texrs.growth` does both. Unbounded textures place patches over each other in
+shifted tilings (`texrs.papers.solid.layers`), so that a patch depends on few others. With ``quality="fast"`` they are
+a chain of corrections (`texrs.papers.solid.world`).
 
-Departures, with their reasons:
+Departures from the paper, with their reasons:
 
 - Patches stitched along minimum cuts replace the pyramid of corrections. Correcting single points tears and fuses
-  elements larger than a window. When the particles of `texrs.samples.particles` are wound round an axis, 29 % of them
-  were torn, and none are torn now (`texrs.volume.integrity`). Cells in walls gain more.
-- The cost of a cut depends on the resulting pair: the old voxel at p next to the new one at q. It does not depend on
-  the difference of the two textures at both.
-- Patches of separate elements are rotated as a whole, and patches of textures with a direction bend with the field.
-- The elements of an image may be unreliable, as in a heap. The elements of `texrs.exemplar.segmentation` then still
-  have a cost for cuts, but are not repaired. The length of seams inside them falls to a quarter.
-- More patches are tried at the most visible seams, half as many as before. They need not fit the existing patches,
-  and are used if the seams become less visible.
-- Places that were shown often and overrepresented classes of colour have a cost, because cuts are cheapest if rare
-  elements are left out.
+  elements that are larger than a window. Example: the particles of `texrs.samples.particles` in a field that rotates
+  around an axis. Corrections tore 29 % of them, and patches none (`texrs.volume.integrity`). Textures of cells gain
+  more.
+- The cost of a cut depends on the two voxels that become neighbours: the old voxel at p and the new one at q. It does
+  not depend on the difference of the two textures at both places.
+- Patches of separate elements are rotated as a whole. Patches of textures with a direction bend with the field.
+- The elements of some images are unreliable, for example in a heap. The elements of `texrs.exemplar.segmentation` are
+  then used for the costs of cuts, but are not repaired. This reduces the length of seams inside elements to a quarter.
+- More patches, half as many as in the first round, are tried at the most visible seams. They need not fit the existing
+  patches, and are used if the seams become less visible.
+- Source positions that were used often have a cost, and so have overrepresented classes of colour. Without it rare
+  elements disappear, because cuts are cheapest without them.
 
-Departures of the corrections:
+Departures from the paper in the corrections (``quality="fast"``):
 
-- The start is a lattice of hashed coherent blocks that fit each other, not one coordinate with jitter at every level.
-  From jitter, sparse particles never form, whatever the correction does.
-- The cost of a block is divided by its own contrast. With squared differences alone blocks of low contrast win, and
-  rare elements become rarer.
-- The correction changes a point to a random match only if the gain is more than twice the exemplar's own spacing.
-  Otherwise repeated corrections remove rare elements.
+- Synthesis starts from a lattice of coherent blocks that fit each other, instead of one coordinate with jitter at
+  every level. Starting from jitter, sparse particles never form, whatever the correction is.
+- The cost of a block is divided by its own contrast. With plain squared differences, blocks of low contrast are
+  preferred, and rare elements become rarer.
+- The correction changes a point to a random match only if the gain is large. It must be more than twice the median
+  distance from a window of the exemplar to the nearest other one. Otherwise repeated corrections remove rare elements.
 - A pass corrects every other point, as on a chess board, and only where pieces of the exemplar meet. If all points
-  change at once, neighbours on both sides of a seam swap and nothing is gained. Votes, which solved this, cost a third
-  of the low-frequency features.
-- Windows are compensated for the offset of the lattice (o - J step), which the paper omits. Without it rotated
-  textures have the wrong scale (``method="paper-compensated"`` adds only this).
+  change at once, the two sides of a seam exchange their values and nothing is gained. Votes also solve this, but
+  remove a third of the low-frequency features.
+- The paper omits to compensate windows for the offset of the lattice (o - J step), so rotated textures have the wrong
+  scale. Here windows are compensated (``method="paper-compensated"`` adds only this).
 - A row vector in Eq. 1 and a column vector in Eq. 3 rotate in opposite directions. Here J is the inverse of the frame
-  in both.
-- The pyramid is decimated, windows are 5^3 at each level, and full colour windows are compared. The paper's eight
-  diagonal neighbours separate into lattices that exchange nothing.
-- If the exemplar is measured to be periodic, its coordinates are periodic.
+  in both equations.
+- The pyramid is decimated, windows are 5^3 at each level, and full colour windows are compared. With the paper's eight
+  diagonal neighbours, points separate into lattices that do not exchange anything.
+- If the exemplar is found to be periodic, its coordinates are periodic.
 
 ``method="paper"`` omits the departures (`texrs.papers.solid.literal`).
 """
@@ -106,7 +108,7 @@ def solid(
         ``axes=3`` states whether its values are labels and along which axes it is periodic, which are otherwise
         measured.
     size : int or (planes, rows, columns)
-        Size of the result in voxels. One number is a cube.
+        Size of the result in voxels. One number gives a cube.
     field : Field, str, array_like or path_like, optional
         Field that rotates and scales the texture at each voxel (`texrs.fields`). Python accepts a field or its words.
         Python also accepts directions (P, R, C, 3) or frames (P, R, C, 3, 3) over the output, as an array or a file.
@@ -124,10 +126,10 @@ def solid(
         whole, as separate elements need. Default: False if the exemplar has separate elements.
     method : {None, "paper", "paper-compensated"}
         Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
-        Lefebvre and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and
-        look up the nearest sample by default. Default: the algorithm with departures from the paper.
+        Lefebvre and Hoppe, which the paper omits. Neither can be combined with ``quality``, constraints or a guide,
+        and both look up the nearest sample by default. Default: the algorithm with departures from the paper.
     constraints : Constraints, optional
-        Given voxels, by their values or by their source coordinates (`texrs.Constraints`).
+        Given voxels, specified by their values or by their source coordinates (`texrs.Constraints`).
     guide : Guide, optional
         A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
         (`texrs.Guide`).
@@ -141,8 +143,8 @@ def solid(
     memory_limit : int, optional
         Maximum memory of the work in bytes. Default: the limits in force (`texrs.limits`).
     progress : callable or True, optional
-        Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
-        the work. True shows a bar.
+        Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
+        raises stops the work. True shows a progress bar.
 
     Returns
     -------
@@ -152,35 +154,36 @@ def solid(
 
         Stages:
 
-        - ``patches``: Patches in their first places. For quality "preserve" and "optimise".
-        - ``blocks``: Blocks in their first places. For quality "fast" and the paper.
+        - ``patches``: The patches in their first places, for quality "preserve" and "optimise".
+        - ``blocks``: The blocks in their first places, for quality "fast" and for ``method="paper"``.
         - ``level N``: The middle plane after level N, counted from 1.
-        - ``before_blending``: The result before known voxels are set.
+        - ``before_blending``: The result before the values of given voxels are set.
 
         Report:
 
         - ``method``: "default", "paper" or "paper-compensated".
-        - ``quality``: "preserve", "fast" or "optimise"; None for the paper.
+        - ``quality``: "preserve", "fast" or "optimise"; None for ``method="paper"``.
         - ``seed``: The seed.
         - ``field``: The field in words, or None.
-        - ``periodic_axes``: Axes along which the example repeats.
-        - ``interpolation``: Interpolation between samples of the example.
+        - ``periodic_axes``: For each axis, True if the exemplar is periodic along it.
+        - ``interpolation``: Interpolation between samples of the exemplar.
         - ``constrained_points``: Number of constrained points.
-        - ``guided``: Whether a guide was given.
-        - ``elements``: Number of separate elements that were found, or None.
-        - ``stitched``: Number of ``patches``, whether they were ``bent``, mean cost of the ``seams`` and number of
-          ``healed`` patches; None if points were corrected.
-        - ``levels``: For each level: its ``shape``, number of ``passes`` and the share of points that ``changed``.
-        - ``spacing``: (plane, row, column) distances, if they were given.
-        - ``patches``: How patches were chosen; only if they were.
-        - ``candidates``: The figures of each method that was tried, or None. They are ``score`` (0 is best), ``torn``,
-          ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
+        - ``guided``: True if a guide was given.
+        - ``elements``: Number of separate elements that were found in the exemplar, or None if they were not searched.
+        - ``stitched``: Number of ``patches``, whether they are ``bent`` with the field, mean cost of the ``seams`` per
+          point, and number of ``healed`` patches. None for quality "fast".
+        - ``levels``: One entry per level: its ``shape``, number of ``passes``, and share of points that the last
+          passes ``changed``.
+        - ``spacing``: (plane, row, column) voxel size, if it was given.
+        - ``patches``: Method of stitching; None for quality "fast".
+        - ``candidates``: The measures of each method that was tried, or None. They are ``score`` (0 is best),
+          ``torn``, ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
 
     Raises
     ------
     InvalidInput
-        If the exemplar is too small or not finite, or a field has other axes or is singular somewhere. Also if
-        constraints or maps have other shapes, or an option is out of its range.
+        If the exemplar is too small or not finite, or a field has another number of axes or is singular somewhere.
+        Also if constraints or maps have the wrong shape, or an option is out of its range.
     LimitExceeded
         If the work would take more memory than allowed.
     Cancelled
@@ -252,7 +255,7 @@ def synthesize(
         Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
         whether its values are labels and along which axes it is periodic, which are otherwise measured.
     size : int or (int, int)
-        Size of the result in pixels. One number is a square.
+        Size of the result in pixels. One number gives a square.
     field : Field, str, array_like or path_like, optional
         Field that rotates and scales the texture at each pixel (`texrs.fields`). Python accepts a field or its words.
         Python also accepts directions (R, C, 2) or frames (R, C, 2, 2) over the output, as an array or a file. None
@@ -271,14 +274,14 @@ def synthesize(
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         Method of stitching. "large": patches a quarter larger than the default, which tear fewer elements but copy
         larger parts. "unmasked": seams may cross elements. "unmasked-large": both. "auto": each method is tried twice
-        at the exemplar's size and evaluated (`texrs.metrics`). A clearly better one replaces the default. The report
-        key "candidates" contains the figures of each. Default: "default".
+        on a small image and evaluated (`texrs.metrics`), and a clearly better one replaces the default. The report key
+        "candidates" contains the measures of each. Default: "default".
     method : {None, "paper", "paper-compensated"}
         Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
-        Lefebvre and Hoppe, which the paper omits. Both have no ``quality``, take neither constraints nor a guide, and
-        look up the nearest sample by default. Default: the algorithm with departures from the paper.
+        Lefebvre and Hoppe, which the paper omits. Neither can be combined with ``quality``, constraints or a guide,
+        and both look up the nearest sample by default. Default: the algorithm with departures from the paper.
     constraints : Constraints, optional
-        Given pixels, by their values or by their source coordinates (`texrs.Constraints`).
+        Given pixels, specified by their values or by their source coordinates (`texrs.Constraints`).
     guide : Guide, optional
         A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
         (`texrs.Guide`).
@@ -288,8 +291,8 @@ def synthesize(
     memory_limit : int, optional
         Maximum memory of the work in bytes. Default: the limits in force (`texrs.limits`).
     progress : callable or True, optional
-        Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
-        the work. True shows a bar.
+        Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
+        raises stops the work. True shows a progress bar.
 
     Returns
     -------
@@ -300,8 +303,8 @@ def synthesize(
     Raises
     ------
     InvalidInput
-        If the exemplar is too small or not finite, or a field has other axes or is singular somewhere. Also if
-        constraints or maps have other shapes, or an option is out of its range.
+        If the exemplar is too small or not finite, or a field has another number of axes or is singular somewhere.
+        Also if constraints or maps have the wrong shape, or an option is out of its range.
     LimitExceeded
         If the work would take more memory than allowed.
     Cancelled
@@ -347,7 +350,7 @@ def synthesize(
 
 
 def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
-    """Compute the source map, coarse to fine or from patches, and look the exemplar up through it."""
+    """Synthesise an image or a volume: compute its source map, and look up the exemplar."""
     said: dict[str, Any] = {"patches": None, "candidates": None}
     show = partial(show_places, asked.exemplar.pixels)
     if asked.method is not None:
@@ -374,7 +377,7 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
 
 
 def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown, dict[str, Any]]:
-    """Stitch patches along minimum cuts, at full resolution, without corrections. Return the method too."""
+    """Stitch patches along minimum cuts, at full resolution. Return the result, and report keys of the method."""
     name, tried = choose_plan(asked.exemplar, asked.patches, asked.quality, partial(try_plan, asked, progress))
     start = PLANS[name].start(asked.exemplar, asked.seed, asked.quality, asked.bend_patches)
     frames = partial(to_fixed, asked.field)
@@ -383,7 +386,7 @@ def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown
 
 
 def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:
-    """Make an image of the exemplar's size by a method, without a field or constraints."""
+    """Synthesise an image of the exemplar's size by one method, without a field or constraints."""
     stage(progress, "try")
     region = Region.whole(asked.exemplar.shape, (False, False))
     grown = grow(region, 1, plan.start(asked.exemplar, seed, asked.quality, None), keep, partial(to_fixed, None))
@@ -391,12 +394,12 @@ def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -
 
 
 def analyse(asked: Request) -> Windows:
-    """Return the exemplar's pyramid of windows, and the settings of each level."""
+    """Return the start and corrector of quality "fast": windows of the exemplar at each level, with their settings."""
     return Windows(asked.exemplar.analyse(FAST.radii).levels, FAST, asked.seed, asked.field)
 
 
 def as_source(asked: Request, grown: Grown) -> SourceMap:
-    """Return places as a source map, with the frames of rigid patches or of the field."""
+    """Return a source map from fixed-point coordinates, with the Jacobians of rigid patches or of the field."""
     coordinates, shape = as_coordinates(grown.places, asked.region), asked.exemplar.shape
     if grown.patches is None:
         return SourceMap.from_coordinates(coordinates, shape, jacobian=asked.field)
@@ -407,13 +410,13 @@ def as_source(asked: Request, grown: Grown) -> SourceMap:
 
 
 def as_coordinates(places: Places, region: Region) -> Array:
-    """Return places in fixed point as coordinates (..., A) float32."""
+    """Convert fixed-point coordinates to an array (..., A) of float32, in samples."""
     shape = (*region.shape, len(region.shape))
     return (places.reshape(shape) / np.float32(ONE)).astype(np.float32, copy=False)
 
 
 def show_places(image: Array, places: Places, region: Region, spacing: int) -> Array:
-    """Return an image of places: a whole image, or the middle plane of a volume, looked up in the exemplar."""
+    """Look up the exemplar at some coordinates: return the whole image, or the middle plane of a volume."""
     axes = len(region.shape)
     shown = places.reshape(*region.shape, axes)
     if axes == 3:
@@ -424,7 +427,7 @@ def show_places(image: Array, places: Places, region: Region, spacing: int) -> A
 
 
 def describe(asked: Request, grown: Grown) -> dict[str, Any]:
-    """Return the report as JSON types."""
+    """Return the report of a synthesis, in JSON types."""
     levels = [done.report() for done in grown.levels]
     if asked.method is not None:
         levels = [{"shape": level["shape"], "passes": level["passes"]} for level in levels]
@@ -448,7 +451,7 @@ def describe(asked: Request, grown: Grown) -> dict[str, Any]:
 
 
 def _count_elements(asked: Request) -> int | None:
-    """Return the number of separate elements, if they were searched for."""
+    """Return the number of separate elements in the exemplar, or None if they were not searched."""
     if asked.method is not None or asked.quality == "fast":
         return None
     found = asked.exemplar.instances

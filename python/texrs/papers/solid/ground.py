@@ -1,4 +1,4 @@
-"""Lowest layer of an unbounded texture: boxes of the exemplar, each from a hashed place."""
+"""Lowest layer of an unbounded texture: boxes of the exemplar from hashed source positions."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from texrs.growth.engine import Places
 __all__ = ["Ground"]
 
 BENT = 0.7
-"""Maximum difference of frames in a box before it is divided: root mean square over the axes."""
+"""Maximum difference of frames within a box, as the root mean square over the axes. Boxes above it are divided."""
 LEAST = 4
-"""Side of the smallest boxes, which are not divided for this reason."""
+"""Side below which boxes are not divided for this reason, in voxels."""
 
 Row = tuple[tuple[int, ...], tuple[int, ...], NDArray[np.int64]]
-"""Centre of a box, its source coordinates, and the Jacobian there."""
+"""Centre of a box, its source coordinates in fixed point, and the Jacobian there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,16 +92,16 @@ class Ground:
 
     @property
     def _varying(self) -> Field | None:
-        """Return the field, or None if all boxes have one frame."""
+        """Return the field if it varies, or None if all boxes have the same frame."""
         return None if self.field is None or self.field.constant is not None else self.field
 
     def _divide(
         self, low: tuple[int, ...], high: tuple[int, ...]
     ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], NDArray[np.int64], list[tuple[int, int]]]]:
-        """Return the parts of a box, with their centres, frames, and the allowed samples of the centre.
+        """Divide a box; return the parts with their centres, frames, and ranges of source positions for the centre.
 
-        A box whose frames differ is cut in two, across the axis of the largest difference: at a fold, or in the
-        middle.
+        A box with different frames is divided across the axis along which they differ most: at a fold, or in the
+        middle. A box that does not fit into the exemplar is divided across its longest side.
         """
         axes = len(low)
         sides = [b - a for a, b in zip(low, high, strict=True)]
@@ -129,7 +129,7 @@ class Ground:
     def _frames(
         self, low: tuple[int, ...], high: tuple[int, ...], centre: tuple[int, ...]
     ) -> tuple[NDArray[np.int64], list[float], list[int]]:
-        """Return the Jacobian in the middle of a box, the maximum difference along each axis, and the place for a cut."""
+        """Return the Jacobian at a box's centre, the maximum difference from it along each axis, and the cuts."""
         axes, varying = len(low), self._varying
         if varying is None:
             frame = to_fixed(self.field, Region.whole((1,) * axes))[0]
@@ -142,23 +142,23 @@ class Ground:
             frame = along[centre[axis] - low[axis]]
             apart.append(float(_measure(along - frame).max()))
             jumps = _measure(np.diff(along, axis=0))
-            # Frames change little from one voxel to the next, unless there is a fold.
+            # Cut at a fold if there is one. Otherwise frames change little from one voxel to the next.
             sharp = len(jumps) > 0 and jumps.max() > 0.5 * BENT
             folds.append(low[axis] + 1 + int(jumps.argmax()) if sharp else centre[axis])
         return frame, apart, folds
 
 
 def _measure(frames: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the root mean square of differences of frames over the axes."""
+    """Return the root mean square of each frame difference over the axes."""
     return np.asarray(np.sqrt((frames**2).sum(axis=(1, 2)) / frames.shape[-1]) / ONE)
 
 
 def _step_in(
     place: tuple[int, ...], ahead: NDArray[np.int64], lattice: NDArray[np.int64], ends: list[tuple[int, int]]
 ) -> tuple[int, ...]:
-    """Return the nearest place in step with the lattice, if there is one.
+    """Return the nearest source position that continues the lattice of the other boxes, or ``place`` if there is none.
 
-    It is a multiple of the lattice away from the place that a frame predicts.
+    It differs by a lattice vector from the position that the frame predicts (``ahead``).
     """
     near = np.rint(np.linalg.solve(lattice.T.astype(np.float64), (np.array(place) - ahead).astype(np.float64)))
     steps = np.array(list(product((-1, 0, 1), repeat=len(place))))

@@ -1,15 +1,15 @@
-"""Unbounded textures assembled from patches: tilings of the world by boxes, each placed over the previous one.
+"""Unbounded textures from patches: layers of boxes that tile the plane or space, each cut into the layer below.
 
-The lowest layer consists of boxes of the exemplar from hashed places (`texrs.papers.solid.ground`). Each higher layer
-is the same tiling, shifted. Its boxes are patches. The best of several places is cut into the content of the previous
-layer (`Stitcher.cover`). The last layer covers the worst seams inside a box again, and repairs torn elements. The
-borders of a box stay unchanged, so that boxes of a layer are independent. A box depends only on the 2^A boxes of the
-previous layer that it meets, and on the field inside. Any part can therefore be computed by itself, and is always the
-same.
+The lowest layer consists of boxes of the exemplar from hashed source positions (`texrs.papers.solid.ground`). Each
+higher layer is the same tiling, shifted. Its boxes are patches. The best of several source positions is cut into the
+content of the previous layer (`Stitcher.cover`). The last layer also replaces the worst seams inside a box, and
+repairs torn elements. The borders of a box do not change, so boxes of a layer are independent. A box depends only on
+the 2^A boxes of the previous layer that it meets, and on the field inside. Any part can therefore be computed alone,
+and is always the same.
 
-A patch would depend on many more boxes in rows and columns, or in classes of centres such as corners, edges and
-interiors. A window of 32^3 would depend on about 900 instead of 75. Cuts into covered areas are not worse, because a
-patch may cover the parts where it fits, and leave the others.
+Other orders would make a patch depend on many more boxes: rows and columns, or classes such as corners, edges and
+interiors. A window of 32^3 would depend on about 900 boxes instead of 75. The cuts are not worse, because a patch can
+cover only the parts where it fits.
 """
 
 from __future__ import annotations
@@ -42,29 +42,29 @@ SHIFTS = {
     2: ((0.0, 0.0), (0.5, 0.5), (0.5, 0.0), (0.0, 0.5)),
     3: ((0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (0.25, 0.25, 0.25)),
 }
-"""Shift of each layer, as a share of a side: the borders of one layer are in the middle of others.
+"""Shift of each layer, as a share of a box side. The borders of one layer are in the middle of the boxes of others.
 
-Each further layer doubles the boxes that a window of a volume depends on.
+Each further layer doubles the number of boxes that a window of a volume depends on.
 """
 LARGER = 1.2
-"""Factor on the side of boxes compared with patches in rows, because less of each remains."""
+"""Side of boxes relative to patches in `synthesize`. It is larger because later layers cover more of a box."""
 RECOVER = {2: 2.0, 3: 0.5}
-"""Number of patches that cover the worst seams of a box again, as a share of the patches that fill it.
+"""Number of patches that replace the worst seams of a box, as a share of the patches that fill it, by number of axes.
 
-More patches gain nothing in volumes.
+More patches do not improve volumes.
 """
 LARGEST = {2: 512, 3: 80}
-"""Maximum side of a box where a field enlarges."""
+"""Maximum side of a box in voxels, by number of axes. It applies if a field enlarges the texture."""
 FITS = 0.9
-"""Maximum side of a patch as a share of the exemplar, so that there are several places to choose from."""
+"""Maximum side of a patch, as a share of the exemplar's shortest side, so that it has several source positions."""
 WORK = 256 << 20
-"""Approximate bytes of boxes that a window keeps while it is computed."""
+"""Approximate memory of the boxes that are kept while a window is computed, in bytes."""
 BESIDE = 8
-"""Number of boxes that are computed in parallel. Each takes memory of its own."""
+"""Number of boxes that are computed in parallel. Each needs memory of its own."""
 _PROBES, _FAR = 64, 512
 
 Key: TypeAlias = tuple[int, ...]
-"""A layer, and the number of a box along each axis."""
+"""Number of a layer, followed by the number of a box along each axis."""
 
 
 class Seen(NamedTuple):
@@ -73,11 +73,11 @@ class Seen(NamedTuple):
     Attributes
     ----------
     places : (..., A) int32
-        Source coordinates, in units of 1/4096 of a sample.
+        Source coordinates of each point, in units of 1/4096 of a sample.
     labels : (...) uint32
         Patch of each point, counted within the window.
     frames : (patches, A, A) float32
-        Jacobian in the middle of each patch.
+        Jacobian at the centre of each patch.
 
     """
 
@@ -94,13 +94,13 @@ class Layers:
     exemplar : Exemplar
         Exemplar that patches are cut from.
     field : Field, optional
-        Rotation and scale of the texture. None leaves it as it is.
+        Rotation and scale of the texture. None leaves the texture as it is.
     seed : int
         Seed of the random choices.
     candidates : int
-        Number of places that are tried for each patch.
+        Number of source positions that are tried for each patch.
     cache_bytes : int
-        Memory for finished boxes.
+        Maximum memory for finished boxes, in bytes.
 
     """
 
@@ -125,7 +125,7 @@ class Layers:
         self._kept.clear()
 
     def read(self, box: Region, progress: Progress | None = None) -> Places:
-        """Return the coordinates of a box, (..., A) int32."""
+        """Return the source coordinates of a box, (..., A) int32."""
         out = np.empty((*box.shape, self.axes), np.int32)
         for part in self._make_all(self._meeting(len(self.shifts) - 1, box), progress):
             here, there = intersect(box, part.region)
@@ -133,7 +133,7 @@ class Layers:
         return self._bring_around(out)
 
     def look(self, box: Region, progress: Progress | None = None) -> Seen:
-        """Return the coordinates of a box with their patches."""
+        """Return the source coordinates of a box, with the patch of each point."""
         parts = list(self._make_all(self._meeting(len(self.shifts) - 1, box), progress))
         shown = join(box, parts)
         frames = shown.table[:, 2 * self.axes : -2].reshape(-1, self.axes, self.axes) / np.float32(ONE)
@@ -141,7 +141,7 @@ class Layers:
         return Seen(places, shown.patches.reshape(box.shape), frames.astype(np.float32))
 
     def pick(self, points: NDArray[np.int64], progress: Progress | None = None) -> Places:
-        """Return the exemplar coordinates, (N, A) int32, at N points (N, A) of the unbounded texture."""
+        """Return the source coordinates, (N, A) int32, of N points (N, A) of the unbounded texture."""
         last = len(self.shifts) - 1
         cells, number = np.unique((points - np.array(self.shifts[last])) // self.side, axis=0, return_inverse=True)
         number = number.reshape(-1)
@@ -156,7 +156,7 @@ class Layers:
         return self._bring_around(out)
 
     def _make_all(self, keys: Sequence[Key], progress: Progress | None) -> Iterator[Box]:
-        """Return some boxes one after the other. Those of a layer are computed in parallel."""
+        """Yield some boxes one after the other. Boxes of one layer are computed in parallel."""
         advance = stage(progress, "patches")
         total = len(self._find_missing(keys)) if advance else 0
         work: Cache[Key, Box] = Cache(WORK, lambda box: box.nbytes)
@@ -177,7 +177,7 @@ class Layers:
             for start in range(0, len(keys), BESIDE):
                 some = keys[start : start + BESIDE]
                 missing = self._find_missing(some)
-                # Compute lower layers first, so that no two boxes of a layer wait for the same one.
+                # Compute lower layers first, so that two boxes of a layer never wait for the same box below.
                 for layer in sorted({key[0] for key in missing}):
                     group = sorted(key for key in missing if key[0] == layer and work.get(key) is None)
                     beside.do(make, group, watch)
@@ -186,7 +186,7 @@ class Layers:
                     yield self._get(key, work, lambda share: watch(0, 0.0))
 
     def _find_missing(self, keys: Sequence[Key]) -> set[Key]:
-        """Return the boxes that are needed for some boxes and are missing."""
+        """Return the keys of all boxes, including lower layers, that must be computed for some boxes."""
         found: set[Key] = set()
         todo = list(keys)
         while todo:
@@ -197,7 +197,7 @@ class Layers:
         return found
 
     def _get(self, key: Key, work: Cache[Key, Box], advance: Callable[[float], object]) -> Box:
-        """Return a box from memory, or computed from the boxes below it."""
+        """Return a box from the cache, or compute it from the boxes below it."""
         box = work.get(key) or self._kept.get(key)
         if box is None:
             below = [self._get(k, work, advance) for k in self._below(key)]
@@ -207,10 +207,10 @@ class Layers:
         return box
 
     def _make(self, key: Key, below: Sequence[Box], advance: Callable[[float], object]) -> Box:
-        """Cut a patch into the content of the layer below in a box."""
+        """Compute a box: cut a patch into the content of the layer below."""
         region = self._region(key)
         frames, last = to_fixed(self.field, region), key[0] == len(self.shifts) - 1
-        # A box is finished before a kernel would check for cancellation.
+        # Check for cancellation here, because a box is finished before a kernel would check for it.
         advance(0.0)
         with answering(advance, 0.0):
             stitcher = self.exemplar.stitcher
@@ -231,7 +231,7 @@ class Layers:
 
     def _show_ground(self, region: Region) -> Shown:
         """Return the content of the lowest layer, with its seams."""
-        # Take one point more to get the seams at the far borders.
+        # Use one point more along each axis, to get the seams at the far borders.
         larger = Region(tuple(n + 1 for n in region.shape), region.origin, region.wrap)
         places, boxes, table = self.ground.show(larger)
         seams = self.exemplar.stitcher.judge(larger, places, boxes, weights_of(self.exemplar))
@@ -241,11 +241,11 @@ class Layers:
         return Shown(shown, boxes.reshape(larger.shape)[here].reshape(-1), near, np.zeros(0, np.float32), table)
 
     def _below(self, key: Key) -> list[Key]:
-        """Return the boxes of the layer below that a box is cut into, or none above the ground."""
+        """Return the keys of the boxes below a box. The first layer above the ground has none."""
         return [] if key[0] == 1 else self._meeting(key[0] - 1, self._region(key))
 
     def _meeting(self, layer: int, box: Region) -> list[Key]:
-        """Return the boxes of a layer that have points in a region."""
+        """Return the keys of the boxes of a layer that have points in a region."""
         ends = [
             range((o - shift) // self.side, (o + n - 1 - shift) // self.side + 1)
             for o, n, shift in zip(box.origin, box.shape, self.shifts[layer], strict=True)
@@ -257,7 +257,7 @@ class Layers:
         return Region((self.side,) * self.axes, origin, (False,) * self.axes)
 
     def _bring_around(self, places: Places) -> Places:
-        """Wrap coordinates along the periodic axes of the exemplar."""
+        """Wrap source coordinates along the periodic axes of the exemplar."""
         for axis, (n, closed) in enumerate(zip(self.exemplar.shape, self.exemplar.repeat, strict=True)):
             if closed:
                 places[..., axis] = (places[..., axis] + ONE // 2) % (n * ONE) - ONE // 2
@@ -265,9 +265,10 @@ class Layers:
 
 
 def _find_side(exemplar: Exemplar, field: Field | None, seed: int) -> int:
-    """Return the side of the boxes: the side of a patch, scaled by the field at most places around the origin.
+    """Return the side of the boxes in voxels: the side of a patch, scaled by the field.
 
-    Boxes are divided where the field reduces, if needed. Boxes that are too small would tear elements.
+    The scale is the 90 % quantile at places around the origin. Boxes are divided if the field is smaller at their
+    place. Boxes that are generally too small would tear elements.
     """
     side, axes = LARGER * patch_side(exemplar.shape), exemplar.axes
     if field is not None:
@@ -278,7 +279,7 @@ def _find_side(exemplar: Exemplar, field: Field | None, seed: int) -> int:
 
 
 def _find_rows(exemplar: Exemplar, field: Field | None) -> NDArray[np.int64] | None:
-    """Return the lattice vectors of an exemplar if boxes can be in step, which needs one frame for all."""
+    """Return the lattice vectors of an image, or None. Boxes can only continue a lattice if all have the same frame."""
     if exemplar.axes != 2 or (field is not None and field.constant is None):
         return None
     lattice = find_lattice(exemplar.guidance)

@@ -1,19 +1,19 @@
-"""SOLID as printed (``method="paper"``): one coordinate, upsampled, jittered and corrected level by level.
+"""SOLID as printed (``method="paper"``): coordinates are upsampled, jittered and corrected level by level.
 
 Section 3 of Su, Chang, Shih and Tai, with its misprints corrected:
 
-- Eq. 1 has a row vector, Delta A, and Eq. 3 a column vector, A^-1 Delta. For a rotation these turn in opposite
-  directions. Both are columns here, J Delta in Eq. 1 and F Delta in Eq. 3. F is the frame of the field and J,
-  the paper's A, its inverse.
+- Eq. 1 has a row vector, Delta A, and Eq. 3 a column vector, A^-1 Delta. For a rotation, these turn in opposite
+  directions. Both are columns here, J Delta in Eq. 1 and F Delta in Eq. 3. F is the frame of the field. J, the paper's
+  A, is its inverse.
 - H: Z^2 -> [-1, +1]^2 of Eq. 2 is H: Z^3 -> [-1, +1]^3, and has two axes in an image.
-- The paper searches similar voxels within the n^3 neighbourhood of p, and forbids all of them. Here the whole exemplar
-  is searched, outside the neighbourhoods of all chosen voxels.
+- The paper searches similar voxels within the n^3 neighbourhood of p, and also forbids all voxels of this
+  neighbourhood. Here the whole exemplar is searched, except the neighbourhoods of all voxels that were chosen before.
 
-The paper leaves other details open. The appearance space is that of the level (C^l and A_l have a level, V' has none).
-The coarsest level of the pyramid has 16 samples a side, so coarser levels are only upsampled and jittered. Warped
-neighbours are rounded to the lattice. A coordinate that leaves the exemplar, without the border that the paper drops,
-returns on the other side. A candidate that leaves it is not used. There are two passes of 2^D classes of points, one
-for each parity.
+The paper leaves other details open, which are filled in as follows. The appearance space is the space of the level
+(C^l and A_l have a level, V' does not). The coarsest level of the pyramid has 16 samples along each axis, so coarser
+levels of the output are only upsampled and jittered. Warped neighbours are rounded to the lattice. The paper omits a
+border of the exemplar. A coordinate that leaves the rest returns on the other side, and a candidate that leaves it is
+not used. There are two passes of 2^D classes of points, one for each parity.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ K, N = 3, 7
 NUMBERS = 8
 """Number of components of an appearance vector (section 4)."""
 JITTER = 0.7
-"""Jitter r_l at every level (section 4)."""
+"""Jitter r_l at every level, in samples (section 4)."""
 PASSES = 2
-"""Number of corrections at each level, as Lefebvre and Hoppe do. The paper does not state it."""
+"""Number of corrections at each level, as in Lefebvre and Hoppe. The paper does not state it."""
 
 
 def grow_as_printed(
@@ -57,14 +57,14 @@ def grow_as_printed(
     compensated: bool = False,
     progress: Progress | None = None,
 ) -> Grown:
-    """Synthesise S_0, of one voxel, to S_L (section 3.2).
+    """Synthesise the levels S_0, which is one voxel, to S_L (section 3.2).
 
-    Eq. 1, S_l[p] = S_(l-1)[p - Delta] + h_l J_l(p) Delta, is the upsampling of the engine.
+    The engine upsamples by Eq. 1, S_l[p] = S_(l-1)[p - Delta] + h_l J_l(p) Delta.
 
     Parameters
     ----------
     exemplar : Exemplar
-        Exemplar analysed with windows of 5^D.
+        Exemplar with an analysis by windows of 5^D samples.
     field : Field, optional
         Frame field. None leaves the texture as it is.
     seed : int
@@ -72,12 +72,12 @@ def grow_as_printed(
     region : Region
         Region of the output.
     show : callable
-        Function that makes images of the corrected levels.
+        Function that returns the stage image of a level.
     compensated : bool
-        If True, windows are compensated for the offset of the lattice, as Lefebvre and Hoppe (2006) do and the paper
-        does not.
+        If True, windows are compensated for the offset of the lattice, as in Lefebvre and Hoppe (2006). The paper does
+        not do this.
     progress : callable, optional
-        Called with the stage and its completed share.
+        Function called with the stage and its completed share.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def grow_as_printed(
         first, coarsest = first - 1, coarsest.parents()
     zero = np.zeros(coarsest.points * len(region.shape), np.int32)
     start = Start(first, lambda region, frames, asked, progress: (zero, None))
-    # A_l: the field at the places of the level's points.
+    # A_l is the field at the positions of the level's points.
     frames = partial(to_fixed, field)
     correction = Correction(exemplar, seed, first, compensated)
     return grow(region, levels, start, correction, frames, show=show, progress=progress)
@@ -103,7 +103,7 @@ class Correction:
     exemplar: Exemplar
     seed: int
     first: int
-    """Number of the coarsest level of the output. Below zero if the exemplar has no level as coarse."""
+    """Number of the coarsest level of the output. It is below 0 if the exemplar does not have a level this coarse."""
     compensated: bool
 
     def __call__(
@@ -115,15 +115,15 @@ class Correction:
         asked: Asked,
         progress: Progress | None,
     ) -> Corrected:
-        """Return the coordinates of a level. Levels coarser than all levels of the exemplar are only jittered."""
+        """Jitter and correct a level. Levels coarser than all levels of the exemplar are only jittered."""
         levels = self.exemplar.analyse().levels
         if level > self.first:
-            # Eq. 2: S_l[p] = S_l[p] + h_l H(p) r_l; here h_l is the unit.
+            # Eq. 2: S_l[p] = S_l[p] + h_l H(p) r_l. Here h_l is 1.
             places = jitter(places, region, JITTER, seed=self.seed, level=level - self.first)
         places = bring_inside(places, levels[max(level, 0)], max(-level, 0))
         if level < 0:
             return Corrected(places, 0, 0.0)
-        # With Eq. 3, phi(Delta) = F Delta, and the sets of section 3.1.
+        # Correct by Eq. 3, phi(Delta) = F Delta, with the sets of section 3.1.
         of = f"level {level + 1} of {len(levels)}"
         sets = self.exemplar.similarity(
             level, k=K, n=N, numbers=NUMBERS, progress=stage(progress, f"similarity sets, {of}")
@@ -142,7 +142,7 @@ class Correction:
 
 
 def bring_inside(places: Places, exemplar: Appearance, above: int) -> Places:
-    """Wrap coordinates that leave the exemplar, at a number of levels above the given one."""
+    """Wrap coordinates that leave the exemplar. They belong to a level that is ``above`` levels coarser."""
     axes = len(exemplar.shape)
     out = places.reshape(-1, axes)
     for axis, (n, closed) in enumerate(zip(exemplar.shape, exemplar.wrap, strict=True)):

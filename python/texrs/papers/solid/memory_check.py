@@ -1,4 +1,4 @@
-"""Memory of a synthesis, estimated in advance."""
+"""Estimate the memory of a synthesis before it begins."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ LARGER = {
     2: "texrs.PlaneTexture.to_zarr and to_dask make it in parts",
     3: "texrs.SolidTexture.to_zarr and to_dask make it in parts",
 }
-"""Methods for larger results, by the number of axes."""
+"""Advice in error messages, by the number of axes: methods for larger results."""
 
 
 def estimate_bytes(image: Array, region: Region, field: Field | None, quality: str) -> int:
-    """Return the approximate bytes of a synthesis."""
+    """Return the approximate memory that a synthesis needs, in bytes."""
     verb = "solid" if len(region.shape) == 3 else "synthesize"
     varies = field is not None and field.constant is None
     return estimate_memory(verb, image.shape, region.shape, dtype=image.dtype, method=quality, field=varies)
@@ -27,7 +27,7 @@ def estimate_bytes(image: Array, region: Region, field: Field | None, quality: s
 def check_region(
     image: Array, region: Region, field: Field | None, quality: str, limit: object, beside: int = 0
 ) -> None:
-    """Refuse a synthesis that would take more memory than allowed, before anything is allocated."""
+    """Raise an error if a synthesis would need more memory than allowed, before anything is allocated."""
     most = None if limit is None else as_int(limit, "memory_limit", 1, 1 << 62)
     needed = estimate_bytes(image, region, field, quality) + beside
     check_memory(needed, "size", limit=most, way=LARGER[len(region.shape)])

@@ -1,4 +1,4 @@
-"""Packed finished boxes of an unbounded texture: their content follows from the patches and their table."""
+"""Compact storage of finished boxes of an unbounded texture, without coordinates that can be computed again."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ __all__ = ["Box", "intersect", "join"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
-    """Content of a box.
+    """Content of a box in compact form.
 
     Attributes
     ----------
     region : Region
         Region of the box.
     patches : (...) array
-        Patch of each point, in as few bytes as possible.
+        Patch of each point, in the smallest dtype that fits.
     table : (patches, K) int32
-        Table as in `texrs._engine.stitcher.Shown`, with centres relative to the first point.
+        Table of patches as in `texrs._engine.stitcher.Shown`, with centres relative to the first point.
     cut : (M,) uint32
-        Flat positions of all seams with a cost.
+        Flat positions of all seams with a cost above 0.
     costs : (M,) float32
-        Their costs.
+        Costs of these seams.
     places : (..., A) int32
-        Coordinates of each point. Empty if all patches are rigid, because they follow from their frames.
+        Source coordinates of each point. Empty if all patches are rigid, because the table then determines the
+        coordinates.
     distortion : (...) float32
-        Distortion of each point. Empty in the same case.
+        Distortion of each point. Empty if all patches are rigid.
 
     """
 
@@ -48,7 +49,7 @@ class Box:
 
     @classmethod
     def pack(cls, region: Region, shown: Shown, *, bent: bool) -> Box:
-        """Return a box in few bytes. The table does not determine bent patches."""
+        """Store a box compactly. Coordinates of bent patches are stored, because the table does not determine them."""
         cut = np.flatnonzero(shown.seams)
         kind = np.min_scalar_type(len(shown.table))
         return cls(
@@ -63,18 +64,18 @@ class Box:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays."""
+        """Size of all arrays, in bytes."""
         return sum(a.nbytes for a in (self.patches, self.table, self.cut, self.costs, self.places, self.distortion))
 
     def show(self, there: tuple[slice, ...]) -> Places:
-        """Return the coordinates of a part, (..., A) int32."""
+        """Return the source coordinates of a part of the box, (..., A) int32."""
         if self.places.size:
             return self.places[there]
         patches = self.patches[there]
         axes = patches.ndim
         centre, place = self.table[:, :axes], self.table[:, axes : 2 * axes]
         frame = self.table[:, 2 * axes : -2].reshape(-1, axes, axes)
-        # S(p) = place + J (p - centre). Everything except J p is constant within a patch.
+        # Compute S(p) = place + J (p - centre). Everything except J p is constant within a patch.
         out: Places = (place - np.einsum("kij,kj->ki", frame, centre)).astype(np.int32)[patches]
         for axis in range(axes):
             line = np.arange(there[axis].start, there[axis].stop, dtype=np.int32)
@@ -94,7 +95,7 @@ class Box:
 
 
 def join(box: Region, parts: Sequence[Box]) -> Shown:
-    """Return the content of a box assembled from parts. Equal patches of several parts become one."""
+    """Assemble the content of a box from parts. A patch that is in several parts becomes one patch."""
     axes = len(box.shape)
     places: Places = np.empty((*box.shape, axes), np.int32)
     seams: NDArray[np.float32] = np.empty((*box.shape, axes), np.float32)
@@ -121,7 +122,7 @@ def join(box: Region, parts: Sequence[Box]) -> Shown:
 
 
 def intersect(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Return the intersection of two regions as slices of both."""
+    """Return the intersection of two regions, as slices of the first and of the second."""
     starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
     stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
     here, there = (

@@ -26,7 +26,7 @@ IMAGE = "image"
 
 
 class Endless(InParts):
-    """A texture that can be read in parts of any size, chunk by chunk."""
+    """An unbounded texture that can be read in parts of any size, chunk by chunk."""
 
     @property
     @abstractmethod
@@ -41,18 +41,18 @@ class Endless(InParts):
     @property
     @abstractmethod
     def key(self) -> str | None:
-        """Digest of all data that determine the texture."""
+        """Digest of all data that determine the texture, or None if there is none."""
 
     @abstractmethod
     def __getitem__(self, index: Any) -> Array:
-        """Return a part."""
+        """Return a window of the texture, as an array."""
 
     @abstractmethod
     def _look_up(self, origin: Sequence[int], size: Sequence[int], names: Sequence[str]) -> Material:
         """Return some maps of a material in a window."""
 
     def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
-        """Check that a part begins within the world. Return its reader."""
+        """Return the reader of a part, after checking that the part is within the allowed coordinates."""
         start, sides = as_origin(origin, self.axes), as_sides(shape, "shape", self.axes)
         if any(o + n > MAX_COORDINATE for o, n in zip(start, sides, strict=True)):
             raise InvalidInput(f"origin, shape: must be within {MAX_COORDINATE}, got {start} and {sides}")
@@ -61,7 +61,7 @@ class Endless(InParts):
 
 @dataclass(frozen=True)
 class _Windows:
-    """Reads parts of a texture with its first sample at an origin."""
+    """Reader of parts of a texture, with indices relative to an origin."""
 
     texture: Endless
     origin: tuple[int, ...]
@@ -80,11 +80,11 @@ class _Windows:
 
     @property
     def key(self) -> str | None:
-        """Digest of the texture and the origin."""
+        """Digest of the texture and the origin, or None if the texture does not have one."""
         return None if self.texture.key is None else content_hash(self.texture.key, self.origin).hex()
 
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
-        """Return a part of some maps."""
+        """Return some maps in a box of indices."""
         start = tuple(s.start + o for s, o in zip(box, self.origin, strict=True))
         size = tuple(s.stop - s.start for s in box)
         if self.texture.material is None:

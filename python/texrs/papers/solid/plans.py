@@ -1,8 +1,8 @@
-"""Methods of stitching an image from patches, each tried at a small size and evaluated.
+"""Methods of stitching an image from patches. With "auto", each is tried at a small size and evaluated.
 
-Larger patches tear fewer elements, and copy more of the exemplar in one piece. Seams that avoid supposed elements are
-longer than necessary if there are none. The evaluation of small results (`texrs.metrics`) shows which of the two
-matters more.
+Larger patches tear fewer elements, but copy more of the exemplar in one piece. Seams that avoid elements are longer
+than necessary if the elements were found by mistake. The evaluation of small results (`texrs.metrics`) shows which
+effect is stronger.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ class Plan:
     """A method of cutting and stitching patches."""
 
     larger: float = 1.0
-    """Factor on the usual side of the patches."""
+    """Factor on the usual side of the patches; 1 is the usual side."""
     plain: bool = False
     """If True, elements do not change the costs of seams."""
 
     def start(self, exemplar: Exemplar, seed: int, quality: Quality, bend: bool | None) -> Start:
-        """Return the start from patches."""
+        """Return the start of the engine that stitches patches by this method."""
         return from_patches(
             exemplar,
             0,
@@ -50,7 +50,10 @@ class Plan:
 
 
 LARGE = 1.25
-"""Patches half as large again copy more than a fifth of the result in one piece."""
+"""Factor on the patch side in the "large" methods.
+
+Patches 1.5 times as large copy more than a fifth of the result in one piece.
+"""
 PLANS: Mapping[str, Plan] = {
     "default": Plan(),
     "large": Plan(LARGE),
@@ -58,13 +61,16 @@ PLANS: Mapping[str, Plan] = {
     "unmasked-large": Plan(LARGE, plain=True),
 }
 TRIALS = (0, 1)
-"""Seeds of the textures that evaluate a method. A single one depends more on chance than on the method."""
+"""Seeds of the small textures that evaluate a method.
+
+The result of a single seed depends more on chance than on the method.
+"""
 CLEARLY = 0.85
-"""Share of the default method's score below which another method is used."""
+"""Maximum score, relative to the default method's score, of a method that replaces it. Lower scores are better."""
 
 
 def check_plan(patches: object, method: object, quality: Quality) -> Choice:
-    """Check the name of a method, and that patches are used."""
+    """Check the name of a method, and that the synthesis uses patches at all."""
     name: Choice = as_choice(patches, "patches", (*PLANS, "auto"))  # type: ignore[assignment]
     if name != "default" and (method is not None or quality == "fast"):
         what = f"method={method!r}" if method is not None else "quality='fast'"
@@ -75,22 +81,22 @@ def check_plan(patches: object, method: object, quality: Quality) -> Choice:
 def choose_plan(
     exemplar: Exemplar, patches: Choice, quality: Quality, make: Callable[[Plan, int], SourceMap]
 ) -> tuple[str, Mapping[str, Mapping[str, float]] | None]:
-    """Return the name of the method, as given or best evaluated, and the figures of each that was tried.
+    """Return the name of the method to use, and the measures of each method that was tried.
 
     Parameters
     ----------
     exemplar : Exemplar
-        Exemplar.
+        Exemplar of the synthesis.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
-        The given name.
+        The requested method. "auto" chooses the best.
     quality : {"preserve", "optimise"}
-        Number of places that are tried for a patch.
+        Amount of work, which is the number of source positions that are tried for each patch.
     make : callable
-        Function that makes a small texture by a method and a seed. It does not depend on the seed or the size of the
-        result, so that all textures of an exemplar use the same method.
+        Function that returns the source map of a small texture for a method and a seed. It must not depend on the seed
+        or the size of the result, so that all textures of an exemplar use the same method.
 
     """
-    # Unordered classes have no colours to evaluate.
+    # Labels have no colours that could be evaluated.
     if patches != "auto" or exemplar.labels:
         return ("default" if patches == "auto" else patches), None
     stitcher = exemplar.stitcher
@@ -104,6 +110,6 @@ def choose_plan(
 
 
 def average(judgements: Sequence[TextureQuality]) -> Mapping[str, float]:
-    """Return the mean of each figure."""
+    """Return the mean of each measure over several evaluations."""
     reports = [j.report() for j in judgements]
     return {name: round(float(np.mean([r[name] for r in reports])), 4) for name in reports[0]}

@@ -1,4 +1,4 @@
-"""Indices of an unbounded texture: the ranges between brackets."""
+"""Check the indices of an unbounded texture, such as ``texture[0:64, -32:32]``."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from texrs.papers.solid.memory_check import LARGER
 __all__ = ["MAX_COORDINATE", "as_origin", "as_region"]
 
 MAX_COORDINATE = 10**9
-"""Maximum absolute coordinate of the world, in voxels."""
+"""Maximum absolute coordinate of an unbounded texture, in voxels."""
 _ORDER = {2: "[y0:y1, x0:x1]", 3: "[z0:z1, y0:y1, x0:x1]"}
 
 
 def as_origin(origin: object, axes: int) -> tuple[int, ...]:
-    """Check the first voxel of a window: one number, or one per axis."""
+    """Check the first voxel of a window: one integer for all axes, or one per axis."""
     values = [origin] * axes if isinstance(origin, numbers.Integral) else origin
     if isinstance(values, Sequence | np.ndarray) and getattr(values, "ndim", 1) > 0 and len(values) == axes:
         ends = [_as_end(v) for v in values]
@@ -30,7 +30,7 @@ def as_origin(origin: object, axes: int) -> tuple[int, ...]:
 
 
 def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
-    """Return the region of an index, and a mask of the axes that a single number removes."""
+    """Return the region of an index, and True for each axis that a single number removes."""
     parts = index if isinstance(index, tuple) else (index,)
     if len(parts) != axes:
         raise InvalidInput(f"texture: must have {axes} ranges, {_ORDER[axes]}; got {len(parts)}")
@@ -63,7 +63,7 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
 
 
 def _as_end(value: object) -> int | None:
-    """Return an integer of the world, or None for other values."""
+    """Return a value as an integer, or None if it is not an integer within the allowed coordinates."""
     if (
         isinstance(value, bool)
         or not isinstance(value, numbers.Integral)

@@ -1,4 +1,4 @@
-"""Arguments of `texrs.solid` and `texrs.synthesize`, checked before the work begins."""
+"""Check the arguments of `texrs.solid` and `texrs.synthesize` before the work begins."""
 
 from __future__ import annotations
 
@@ -35,27 +35,27 @@ class Request:
     Attributes
     ----------
     exemplar : Exemplar
-        Exemplar.
+        Analysed exemplar.
     region : Region
-        Region of the output.
+        Shape and periodic axes of the output.
     field : Field, optional
-        Frame field over the output. None is the identity.
+        Frame field over the output. None leaves the texture as it is.
     seed : int
         Seed of the random choices.
     quality : {"preserve", "fast", "optimise"}
         Amount of work.
     bend_patches : bool, optional
-        If True, patches bend with the field. None: chosen by the exemplar.
+        If True, patches bend with the field. None: depends on the exemplar.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         Method of stitching.
     method : {None, "paper", "paper-compensated"}
-        Algorithm.
+        Algorithm: with departures from the paper, as printed, or as printed with compensated windows.
     conditions : Conditions
         Constraints and guide.
     interpolation : {"nearest", "linear", "cubic"}
         Interpolation between the exemplar's samples in the final look-up.
     spacing : sequence of float, optional
-        Distances between voxels.
+        Voxel size along each axis.
 
     """
 
@@ -91,7 +91,7 @@ class Request:
         patches: Choice = "default",
         spacing: Sequence[float] | None = None,
     ) -> Request:
-        """Return the checked arguments of a call, or raise an error."""
+        """Check the arguments of a call, and return them as a request."""
         spacing = find_distances(spacing, exemplar, axes)
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
         region = Region.whole(as_size(size, axes=axes, way=LARGER[axes]), as_wrap(wrap, axes=axes, usual=False))
@@ -127,7 +127,7 @@ class Request:
 def as_field(
     field: object, axes: int, extent: Sequence[int] | None = None, spacing: Sequence[float] | None = None
 ) -> Field | None:
-    """Check a field, or make it from a value, for voxels of a spacing. The identity gives None."""
+    """Check a field, or create it from words or an array and a voxel ``spacing``. The identity gives None."""
     as_distances(spacing, axes)
     known = make_field(field, axes, extent, spacing=spacing)
     still = known is None or (
@@ -137,7 +137,7 @@ def as_field(
 
 
 def as_interpolation(value: Interpolation | None, exemplar: Exemplar, default: Interpolation) -> Interpolation:
-    """Check the interpolation. Labels always use the nearest sample."""
+    """Check the interpolation, or return the default. Labels always use the nearest sample."""
     if value is not None:
         as_choice(value, "interpolation", ("nearest", "linear", "cubic"))
     return "nearest" if exemplar.labels else value or default

@@ -1,4 +1,4 @@
-"""Amount of work of each quality at each level."""
+"""Settings for each quality: number of passes, reaches and candidates."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ __all__ = ["CANDIDATES", "FAST", "ON_DEMAND", "Quality", "as_quality"]
 Quality: TypeAlias = Literal["preserve", "fast", "optimise"]
 
 FAST = replace(Settings(), passes=(4, 2, 2), reaches=(2, 2, 1), rounds=4, candidates=256, settled=0.0)
-"""Fixed numbers of passes, so that a point depends only on its surroundings."""
+"""Settings for quality "fast". The number of passes is fixed, so that a point depends only on its surroundings."""
 
 ON_DEMAND = replace(FAST, passes=(2, 1, 2), reaches=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
-"""Settings for windows. The reach of a point is computed again at the border of every window, so it is small."""
+"""Settings for windows of unbounded textures.
+
+Points around a window are computed in addition, so their number is kept small.
+"""
 
 CANDIDATES: dict[Quality, int] = {"preserve": 4, "optimise": 12}
-"""Number of places that are tried for each patch."""
+"""Number of source positions that are tried for each patch, by quality."""
 
 
 def as_quality(quality: object) -> Quality:

@@ -1,4 +1,4 @@
-"""A field relative to a window."""
+"""Fields with coordinates relative to a window of an unbounded texture."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = ["Translated"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Translated(Field):
-    """A field relative to the first voxel of a window."""
+    """A field whose coordinates are relative to the first voxel of a window."""
 
     field: Field
     by: tuple[int, ...]
 
     @property
     def axes(self) -> int:  # type: ignore[override]
-        """Axes of the field."""
+        """Number of axes of the field."""
         return self.field.axes
 
     @property
@@ -36,5 +36,5 @@ class Translated(Field):
         return None if self.field.key is None else (self.field.key, self.by)
 
     def describe(self) -> str:
-        """Return the description of the field and of the window's origin."""
+        """Return the words for the field and the window's origin."""
         return f"{self.field.describe()}; seen from ({', '.join(map(str, self.by))})"

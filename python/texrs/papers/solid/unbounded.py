@@ -1,4 +1,4 @@
-"""Common part of unbounded textures: any part and any point on request, in any process."""
+"""Common part of unbounded textures: windows and points on request, in any process."""
 
 from __future__ import annotations
 
@@ -41,8 +41,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["Texture"]
 
 ARRIVED = 4
-"""Textures received from another process. They are kept, because parallel work receives the same one with every part.
-"""
+"""Number of cached textures from other processes. Parallel work sends the same texture with every part."""
 _BAND = 1 << 20
 
 
@@ -84,17 +83,17 @@ class Texture(Endless):
 
     @property
     def exemplar(self) -> Exemplar:
-        """Exemplar with its analysis."""
+        """Exemplar of the texture, with its analysis."""
         return self._exemplar
 
     @property
     def material(self) -> Material | None:
-        """Material of the texture, if it is made from one."""
+        """Material of the texture, or None if it is made from an array."""
         return self._material
 
     @property
     def field(self) -> Field | None:
-        """Frame field. None is the identity."""
+        """Frame field of the texture. None leaves the texture as it is."""
         return self._field
 
     @property
@@ -104,11 +103,11 @@ class Texture(Endless):
 
     @property
     def cached(self) -> int:
-        """Bytes of finished coordinates in memory, at most ``cache_bytes``."""
+        """Memory of finished coordinates in bytes, at most ``cache_bytes``."""
         return self._world.cached
 
     def clear(self) -> None:
-        """Drop the finished parts. They are computed again on request.
+        """Delete the finished parts from memory. They are computed again on request.
 
         Examples
         --------
@@ -123,16 +122,16 @@ class Texture(Endless):
         self._world.clear()
 
     def __repr__(self) -> str:
-        """Return a description of the texture."""
+        """Return a short description of the texture: exemplar, seed and field."""
         shape = " x ".join(map(str, self._exemplar.shape))
         how = "" if self._field is None else f", {self._field.describe()}"
         return f"<unbounded texture from {shape}, seed {self._seed}{how}>"
 
     @cached_property
     def key(self) -> str | None:
-        """Digest of all data that determine the texture: the same key means the same bytes.
+        """Digest of all data that determine the texture. Textures with the same key have the same bytes.
 
-        None if its field calls a function.
+        The key is None if the field calls a function.
         """
         if self._field is not None and self._field.key is None:
             return None
@@ -142,13 +141,13 @@ class Texture(Endless):
         return content_hash(*said).hex()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle as the exemplar's pixels and the options. See `Exemplar` for the data that are computed again."""
+        """Pickle the exemplar's pixels and the options. `Exemplar` lists the data that are computed again."""
         spacing, limits = self._spacing, (self._cache_bytes, self._memory_limit)
         options = (self._field, self._seed, self._quality, self._how, spacing, *limits)
         return _restore, (type(self), self._material or self._exemplar, options, self.key)
 
     def __getitem__(self, index: Any) -> Array:
-        """Return a part: ``texture[z0:z1, y0:y1, x0:x1]``, with any integers. A single number removes its axis."""
+        """Return a window: ``texture[z0:z1, y0:y1, x0:x1]``, with any integers. A single number removes its axis."""
         region, single = as_region(index, self.axes)
         self._check(region)
         if self._material is None:
@@ -160,23 +159,23 @@ class Texture(Endless):
     def window(
         self, origin: int | Sequence[int], size: int | Sequence[int], *, progress: Progress | bool | None = None
     ) -> Synthesis:
-        """Return a part with its source map.
+        """Return a window with its source map.
 
         Parameters
         ----------
         origin : int, or one per axis
-            First voxel in the world: integers from -10^9 to 10^9.
+            First pixel or voxel of the window: integers from -10^9 to 10^9.
         size : int, or one per axis
-            Number of voxels along each axis.
+            Number of pixels or voxels along each axis.
         progress : callable or True, optional
-            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
-            bar.
+            Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
+            raises stops the work. True shows a progress bar.
 
         Returns
         -------
         Synthesis
-            The image, and all maps of a material; its source map; and a report. The labels of the source map are the
-            patches, counted within the window. Its frames are those of rigid patches, or the field over the window.
+            The image, all maps of a material, the source map and a report. Labels of the source map are patches,
+            counted within the window. Its Jacobians are those of rigid patches, or of the field over the window.
 
             Stages:
 
@@ -184,12 +183,12 @@ class Texture(Endless):
 
             Report:
 
-            - ``quality``: "preserve" or "fast".
+            - ``quality``: "preserve", "fast" or "optimise".
             - ``seed``: The seed.
             - ``origin``: First pixel or voxel of the window.
             - ``field``: The field in words, or None.
-            - ``periodic_axes``: Axes along which the example repeats.
-            - ``interpolation``: Interpolation between samples of the example.
+            - ``periodic_axes``: For each axis, True if the exemplar is periodic along it.
+            - ``interpolation``: Interpolation between samples of the exemplar.
 
         Raises
         ------
@@ -234,26 +233,27 @@ class Texture(Endless):
         interpolation: Interpolation | None = None,
         progress: Progress | bool | None = None,
     ) -> Array:
-        """Return the texture at any points, such as the points of a mesh, a path or a ray.
+        """Return the values of the texture at any points, such as the points of a mesh, a path or a ray.
 
-        The source coordinates are interpolated between voxels, not the colours. A point q looks up S(p) + J(p) (q -
-        p), where p is the nearest voxel. Whole coordinates give the pixel of any window.
+        Source coordinates are interpolated between voxels, not colours. A point q looks up S(p) + J(p) (q - p), where
+        p is the nearest voxel. A point with integer coordinates has the value of that pixel in any window.
 
         Parameters
         ----------
         points : (..., 2) or (..., 3) array_like
-            (row, column) or (plane, row, column), in voxels of the world with centres at the integers, from -10^9 to 10^9.
+            Points as (row, column) or (plane, row, column) in voxels, from -10^9 to 10^9. Centres of voxels are at
+            integers.
         interpolation : {"nearest", "linear", "cubic"}, optional
-            Interpolation between the exemplar's samples. None is the texture's own. Labels always use the nearest
-            sample.
+            Interpolation between the exemplar's samples. Labels always use the nearest sample. Default: the
+            interpolation of the texture.
         progress : callable or True, optional
-            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
-            bar.
+            Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
+            raises stops the work. True shows a progress bar.
 
         Returns
         -------
         (...[, C]) array
-            Values in the exemplar's dtype. A material returns the map that represents it.
+            Values in the exemplar's dtype. For a material, they are values of the map that represents it.
 
         Raises
         ------
@@ -291,7 +291,7 @@ class Texture(Endless):
         interpolation: Interpolation | None = None,
         progress: Progress | bool | None = None,
     ) -> dict[str, Array]:
-        """Return all maps of a material at any points, as `sample` does. Vectors rotate with the texture.
+        """Return the values of all maps of a material at any points, as `sample` does. Vectors rotate with the texture.
 
         Parameters
         ----------
@@ -300,18 +300,18 @@ class Texture(Endless):
         interpolation : {"nearest", "linear", "cubic"}, optional
             Interpolation, as for `sample`. Labels are never interpolated.
         progress : callable or True, optional
-            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
-            bar.
+            Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
+            raises stops the work. True shows a progress bar.
 
         Returns
         -------
         dict of str to (...[, C]) array
-            Values by the names of the maps.
+            Values at the points, by the names of the maps.
 
         Raises
         ------
         InvalidInput
-            If the texture is not made from a material, or an argument is invalid for `sample`.
+            If the texture is not made from a material, or an argument is invalid as for `sample`.
         Cancelled
             If the work was stopped.
 
@@ -336,19 +336,19 @@ class Texture(Endless):
         points : (..., 2) or (..., 3) array_like
             Points, as for `sample`.
         progress : callable or True, optional
-            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
-            bar.
+            Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
+            raises stops the work. True shows a progress bar.
 
         Returns
         -------
         SourceMap
-            Source map of an image or a volume of one row, a pixel for each point. `texrs.apply` interpolates as
-            `sample` does.
+            Source map of an image or a volume with a single row, with one pixel per point. `texrs.apply` interpolates
+            with it as `sample` does.
 
         Raises
         ------
         InvalidInput
-            If an argument is invalid for `sample`.
+            If an argument is invalid as for `sample`.
         Cancelled
             If the work was stopped.
 
@@ -366,17 +366,17 @@ class Texture(Endless):
         return source.with_finish((False,) * self.axes, interpolation=self._how)
 
     def estimate_memory(self, size: int | Sequence[int]) -> int:
-        """Return the approximate maximum bytes of a process that makes windows, in addition to Python.
+        """Return the approximate maximum memory of a process that computes windows, in bytes, without Python itself.
 
         Parameters
         ----------
         size : int, or one per axis
-            Size of a window or a chunk.
+            Size of a window or a chunk, in pixels or voxels.
 
         Returns
         -------
         int
-            Bytes of the window, of the exemplar's analysis, and ``cache_bytes``.
+            Bytes for the window, the exemplar's analysis, and the cache (``cache_bytes``).
 
         Examples
         --------
@@ -408,7 +408,7 @@ class Texture(Endless):
         *,
         only_base: bool = False,
     ) -> dict[str, Array]:
-        """Return maps at points, as those of an image of one row."""
+        """Return values of maps at points, which are treated as an image with a single row."""
         assert self._material is not None
         source = self._trace(at, progress)
         name, whole = self._material.base_name, self._material
@@ -417,7 +417,7 @@ class Texture(Endless):
         return {n: m.pixels.reshape((*at.shape[:-1], *m.pixels.shape[self.axes :])) for n, m in made.items()}
 
     def _trace(self, at: NDArray[np.float64], progress: Progress | None) -> SourceMap:
-        """Return the source of points, as the source map of an image of one row."""
+        """Return the source map of points, which are treated as an image with a single row."""
         places, frames = self._carry_on(at.reshape(-1, self.axes), progress)
         row = (*(1,) * (self.axes - 1), len(places))
         frame = None if frames is None else frames.reshape(*row, self.axes, self.axes)
@@ -426,9 +426,9 @@ class Texture(Endless):
     def _carry_on(
         self, at: NDArray[np.float64], progress: Progress | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-        """Return the coordinates of points between voxels, S(p) + J(p) (q - p), and the Jacobians.
+        """Return the source coordinates of points between voxels, S(p) + J(p) (q - p), and the Jacobians.
 
-        None if J is the identity.
+        The Jacobians are None if J is the identity.
         """
         if len(at) and np.abs(at).max() > MAX_COORDINATE:
             raise InvalidInput(f"points: must be within {MAX_COORDINATE} of the origin, got {np.abs(at).max():g}")
@@ -449,7 +449,8 @@ class Texture(Endless):
         return self._how if interpolation is None else as_interpolation(interpolation, self._exemplar, "cubic")
 
     def _look(self, region: Region, progress: Progress | None) -> tuple[Places, SourceMap]:
-        """Return the coordinates of a window, and its source map with the frames of rigid patches or of the field."""
+        """Return the source coordinates of a window, and its source map with the Jacobians of patches or of the field.
+        """
         field, start = self._field, region.origin
         varies = field is not None and field.constant is None
         if field is not None and varies and any(start):
@@ -468,7 +469,7 @@ class Texture(Endless):
         check_region(self._exemplar.pixels, region, self._field, self._quality, self._memory_limit, beside)
 
     def _show(self, places: Places) -> Array:
-        """Look the exemplar up, a band of points at a time."""
+        """Look up the exemplar at source coordinates, a band of points at a time."""
         image = self._exemplar.image
         channels = image.shape[self.axes :]
         out = np.empty((*places.shape[:-1], *channels), image.dtype)
@@ -481,7 +482,7 @@ class Texture(Endless):
 
 
 def _restore(kind: type[Texture], exemplar: Exemplar | Material, options: tuple[Any, ...], key: str | None) -> Texture:
-    """Return a received texture, or the equal one that was received before with its finished parts."""
+    """Return an unpickled texture, or an equal one from the cache, which has finished parts already."""
     names = ("field", "seed", "quality", "interpolation", "spacing", "cache_bytes", "memory_limit")
     given = dict(zip(names, options, strict=True))
 

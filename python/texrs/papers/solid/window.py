@@ -1,4 +1,4 @@
-"""Unbounded textures of `texrs.papers.solid`: any part on request."""
+"""Unbounded textures of images and volumes: `texrs.PlaneTexture` and `texrs.SolidTexture`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from texrs.volume.rendering import as_steps
 __all__ = ["PlaneTexture", "SolidTexture"]
 
 TILE = 128
-"""Side of the parts of a slice that are looked up together."""
+"""Side of the tiles of a slice that are computed one after the other, in pixels."""
 
 
 class PlaneTexture(Texture):
-    """An unbounded texture of the plane. Any window of it can be computed.
+    """An unbounded image texture. Any window of it can be computed.
 
-    Every pixel is the same in all windows, for any number of threads. The pixels differ from those of
-    `texrs.synthesize`, whose borders are free. The object can be pickled, and is the same in every process.
+    A pixel is the same in all windows and for any number of threads. The pixels differ from the result of
+    `texrs.synthesize`, which has free borders. The object can be pickled, and gives the same pixels in every process.
 
     Parameters
     ----------
@@ -34,31 +34,33 @@ class PlaneTexture(Texture):
         Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
         whether its values are labels and along which axes it is periodic, which are otherwise measured.
     field : Field, str, array_like or path_like, optional
-        Frame field with two axes: rotation and scale of the texture at each point of the world (`texrs.fields`). A
-        centre or length that is not given takes the default of the unbounded field. None leaves the texture as it is.
+        Frame field with two axes: rotation and scale of the texture at each point (`texrs.fields`). A centre or length
+        that is not given has the default of the unbounded field. None leaves the texture as it is.
     seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     quality : {"preserve", "fast", "optimise"}
         Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
         without elements. The three give different textures. Default: "preserve".
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Interpolation between the exemplar's samples. None is "cubic", or "nearest" for an exemplar of few colours, so
-        that no colours are added. Labels always use the nearest sample.
+        Interpolation between the exemplar's samples. Labels always use the nearest sample. Default: "nearest" for an
+        exemplar of few colours, so that no colours are added, else "cubic".
     spacing : sequence of 2 float, optional
-        Distances between rows and columns, in any unit. The field rotates in space, where pixels need not be squares.
-        Its places and lengths are in the same unit. Windows and points stay in pixels. Default: 1.
+        Distances between rows and columns, in any unit. The field rotates in space, where pixels can be rectangles.
+        Its places and lengths are in the same unit. Windows and points are still in pixels. Default: 1.
     cache_bytes : int
-        Memory for finished parts in bytes, 0 or more. Neighbours of computed parts are then cheap.
+        Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
+        MiB.
     memory_limit : int, optional
         Maximum memory of one window in bytes. Default: the limits in force (`texrs.limits`).
 
     Raises
     ------
     InvalidInput
-        If the exemplar is too small or not finite, a field has other axes, or an option is out of its range.
+        If the exemplar is too small or not finite, a field has another number of axes, or an option is out of its
+        range.
     LimitExceeded
-        If the exemplar alone would take more memory than allowed.
+        If the analysis of the exemplar would take more memory than allowed.
 
     Examples
     --------
@@ -75,10 +77,10 @@ class PlaneTexture(Texture):
 
 
 class SolidTexture(Texture):
-    """An unbounded texture of space. Any window and any slice of it can be computed.
+    """An unbounded volume texture. Any window and any slice of it can be computed.
 
-    Every voxel is the same in all windows, for any number of threads. The voxels differ from those of `texrs.solid`,
-    whose borders are free. The object can be pickled, and is the same in every process.
+    A voxel is the same in all windows and for any number of threads. The voxels differ from the result of
+    `texrs.solid`, which has free borders. The object can be pickled, and gives the same voxels in every process.
 
     Parameters
     ----------
@@ -87,10 +89,10 @@ class SolidTexture(Texture):
         ``axes=3`` states whether its values are labels and along which axes it is periodic, which are otherwise
         measured.
     field : Field, str, array_like or path_like, optional
-        Frame field with three axes: rotation and scale of the texture at each point of the world (`texrs.fields`). A
-        centre or length that is not given takes the default of the unbounded field. None leaves the texture as it is.
+        Frame field with three axes: rotation and scale of the texture at each point (`texrs.fields`). A centre or
+        length that is not given has the default of the unbounded field. None leaves the texture as it is.
     seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes.
+        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     quality : {"preserve", "fast", "optimise"}
         Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
@@ -99,19 +101,21 @@ class SolidTexture(Texture):
         Interpolation between the exemplar's samples. Labels always use the nearest sample. Default: "cubic".
     spacing : (plane, row, column) float, optional
         Voxel size along each axis, in any unit. The field rotates in space, where voxels need not be cubes. Its places
-        and lengths are in the same unit. Windows and points stay in voxels. Default: the spacing that
-        the exemplar's file states, else 1.
+        and lengths are in the same unit. Windows and points are still in voxels. Default: the spacing that the
+        exemplar's file states, else 1.
     cache_bytes : int
-        Memory for finished parts in bytes, 0 or more. Neighbours of computed parts are then cheap.
+        Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
+        MiB.
     memory_limit : int, optional
         Maximum memory of one window in bytes. Default: the limits in force (`texrs.limits`).
 
     Raises
     ------
     InvalidInput
-        If the exemplar is too small or not finite, a field has other axes, or an option is out of its range.
+        If the exemplar is too small or not finite, a field has another number of axes, or an option is out of its
+        range.
     LimitExceeded
-        If the exemplar alone would take more memory than allowed.
+        If the analysis of the exemplar would take more memory than allowed.
 
     Examples
     --------
@@ -135,24 +139,25 @@ class SolidTexture(Texture):
         size: int | Sequence[int],
         progress: Progress | bool | None = None,
     ) -> Array:
-        """Cut the texture along any plane.
+        """Cut the texture along any plane, and return the cut as an image.
 
-        The source coordinates are interpolated between voxels, not the colours. A point q looks up S(p) + J(p) (q -
-        p), where p is the nearest voxel. An oblique slice is therefore as sharp as the exemplar.
+        Source coordinates are interpolated between voxels, not colours. A point q looks up S(p) + J(p) (q - p), where
+        p is the nearest voxel. An oblique slice is therefore as sharp as the exemplar.
 
         Parameters
         ----------
         point : sequence of 3 float
-            (plane, row, column) of the middle of the image, in voxels of the world.
+            (plane, row, column) of the middle of the image, in voxels.
         normal : sequence of 3 float, optional
-            Normal of the cut, (plane, row, column), of any length.
+            Normal of the plane, (plane, row, column), of any length.
         axes : (2, 3) array_like, optional
-            The steps of the image's rows and columns in voxels, instead of ``normal``.
+            Steps from one row and from one column of the image to the next, each (plane, row, column) in voxels.
+            Replaces ``normal``.
         size : int or (rows, columns)
             Size of the image, in pixels.
         progress : callable or True, optional
-            Called with the stage and its completed share. An exception that it raises stops the work. True shows a
-            bar.
+            Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
+            raises stops the work. True shows a progress bar.
 
         Returns
         -------

@@ -1,9 +1,9 @@
-"""Unbounded textures by corrections, which can be computed in parts.
+"""Unbounded textures by corrections (quality "fast"), computed window by window.
 
-A point depends only on its surroundings, so an unbounded texture can be computed where it is requested. The work is a
-chain of stages: the blocks, then one pass of the correction after the other, each on the lattice of its level. A box
-of a stage is computed from a box of the stage before. The latter is larger by the distance that one point depends on,
-its reach:
+A point depends only on its surroundings, so any window of an unbounded texture can be computed alone. The work is a
+chain of stages: the blocks, then each pass of the correction, on the lattice of its level. A box of a stage is
+computed from a larger box of the stage before. The difference on each side is the distance up to which one point
+depends on others, the reach of the stage:
 
     blocks      2 e + rounds (2 e + 1), where e is the maximum distance of a point from the centre of its cell
     pass        vote + max(n, w), where n is the distance of the neighbours whose matches are tried,
@@ -11,7 +11,7 @@ its reach:
                 of the output, over all frames F in the region
 
 Coordinates within the reach of a box's border are wrong and are cut off. The others are the same in every box.
-Finished parts of every stage are kept in a bounded memory, so that neighbours of computed parts are cheap.
+Finished parts of every stage are cached in a limited memory, so that windows next to them are faster.
 """
 
 from __future__ import annotations
@@ -38,27 +38,26 @@ __all__ = ["World", "blocks_reach", "window_reach"]
 MOST = 1 << 21
 """Maximum number of points of a box that is computed at once.
 
-It bounds the memory, and the margin is small compared with it.
+The number limits the memory. The margin is still small compared with such a box.
 """
 _SIDES = {2: (8, 64), 3: (4, 16)}
-"""Sides of the kept cells of all stages except the last, and of the last stage. The first is about the reach of a pass,
-because each pass rounds up.
+"""Side of cached cells in points, by the number of axes: for all stages except the last, and for the last stage.
+
+The first is about the reach of a pass, because each pass extends its region to whole cells.
 """
 _STRAY = 0.4
-"""Maximum distance of a cell's centre from the middle, as a share of the cell, as in
-`texrs._engine.appearance.Appearance.blocks`.
-"""
+"""Maximum distance of a cell's random centre from its middle, as a share of its side, as in `Appearance.blocks`."""
 
 Key: TypeAlias = tuple[int, ...]
 
 
 def blocks_reach(cell: int, rounds: int, repetition: float = 0.0) -> int:
-    """Return the reach of the blocks at a point, in points.
+    """Return the distance, in points, up to which the block at a point depends on other points.
 
-    A point is within e of the centre of its cell, because it falls into this cell. A cell is chosen by its shell, at
-    the distance e + 1 from its centre. Points of the shell are within e of the centres of their own cells. Each round
-    adds the same. All points of the last cells are needed, because they determine where the cell may be. If repetition
-    has a cost, cells two steps away count too.
+    A point belongs to a cell, whose centre is at most at the distance e. A block is chosen by comparing a shell of
+    points around its cell, at the distance e + 1 from its centre. Points of the shell are within e of the centres of
+    their own cells. Each round adds the same distance. All points of the last cells are needed, because they limit the
+    source position of a block. If repetition has a cost, cells two steps away are needed as well.
     """
     far = max(int((0.5 + _STRAY) * cell + 1e-6), cell - 1 - int((0.5 - _STRAY) * cell - 1e-6))
     steps = ceil(2 * (1 + _STRAY) * cell) if repetition else 0
@@ -66,9 +65,9 @@ def blocks_reach(cell: int, rounds: int, repetition: float = 0.0) -> int:
 
 
 def window_reach(frames: NDArray[np.int16], radius: int) -> int:
-    """Return the reach of windows along an axis of the output: they round F o, for offsets o up to the radius.
+    """Return the extent of windows along an output axis: the maximum of round(F o) over offsets o up to the radius.
 
-    The frames are J, in fixed point. Their inverses are rounded by less than 1/64 in total.
+    ``frames`` are the Jacobians J in fixed point. Their inverses F are rounded by less than 1/64 in total.
     """
     inverses = np.linalg.inv(frames.astype(np.float64) / ONE)
     return int(radius * float(np.abs(inverses).sum(axis=2).max()) + 0.5 + 1 / 64)
@@ -84,7 +83,7 @@ class _Stage:
 
 
 class World:
-    """Source coordinates of an unbounded texture, stage by stage."""
+    """Source coordinates of an unbounded texture, computed stage by stage."""
 
     def __init__(self, windows: Windows, cache_bytes: int) -> None:
         self.windows = windows
@@ -92,14 +91,15 @@ class World:
         small, large = _SIDES[self.axes]
         chain = [(0, -1)] + [(v, i) for v in range(len(windows.levels)) for i in range(windows.step(v).passes)]
         self.stages = [_Stage(*s, large if s == chain[-1] else small) for s in chain]
-        # The stages before the last are small and expensive: the last one must not displace them.
+        # Cache the last stage separately. Earlier stages are small and expensive, and the last one would displace
+        # them.
         self._kept: tuple[Cache[Key, Places], ...] = tuple(
             Cache(cache_bytes // 2, lambda p: p.nbytes) for _ in range(2)
         )
 
     @property
     def cached(self) -> int:
-        """Bytes of finished coordinates in memory."""
+        """Memory of finished coordinates, in bytes."""
         return sum(kept.used for kept in self._kept)
 
     def clear(self) -> None:
@@ -108,7 +108,10 @@ class World:
             kept.clear()
 
     def reach(self, stage: int, window: int) -> int:
-        """Return the reach of a stage in the stage before, in points. Windows have this reach."""
+        """Return the distance in points up to which a stage reads the previous stage.
+
+        Windows have the extent ``window``.
+        """
         if stage == 0:
             settings = self.windows.settings
             return blocks_reach(settings.cell, settings.rounds, settings.repetition)
@@ -118,7 +121,7 @@ class World:
         return min(step.vote, radius) + max(step.reach, window)
 
     def read(self, box: Region, progress: Progress | None = None, stage: int = -1) -> Places:
-        """Return the coordinates of a box, (..., A) int32."""
+        """Return the source coordinates of a box, (..., A) int32."""
         stage %= len(self.stages)
         out = np.empty((*box.shape, self.axes), np.int32)
         side = self.stages[stage].side
@@ -131,7 +134,7 @@ class World:
         return out
 
     def pick(self, points: NDArray[np.int64], progress: Progress | None = None) -> Places:
-        """Return the exemplar coordinates, (N, A) int32, at N points (N, A) of the unbounded texture."""
+        """Return the source coordinates, (N, A) int32, of N points (N, A) of the unbounded texture."""
         stage = len(self.stages) - 1
         side = self.stages[stage].side
         cells = points // side
@@ -139,7 +142,7 @@ class World:
         wanted = np.zeros(tuple((cells.max(axis=0) - low + 1).tolist()), bool)
         number = np.ravel_multi_index(tuple((cells - low).T), wanted.shape)
         wanted.reshape(-1)[number] = True
-        # Process the points of each cell of the kept lattice, one cell after the other.
+        # Sort the points by their cached cell, to process cell after cell.
         order = np.argsort(number, kind="stable")
         first = np.searchsorted(number[order], np.arange(wanted.size + 1))
         out = np.empty((len(points), self.axes), np.int32)
@@ -155,9 +158,9 @@ class World:
     def parts(
         self, low: Sequence[int], wanted: Bools, progress: Progress | None, stage: int
     ) -> Iterator[tuple[Region, Places]]:
-        """Return boxes of coordinates that together contain the requested cells of the kept lattice.
+        """Yield boxes of coordinates that together contain all requested cells.
 
-        Cells are counted from a first one.
+        ``wanted`` is True for requested cells, and its first cell has the number ``low``.
         """
         side, kept = self.stages[stage].side, self._kept[stage == len(self.stages) - 1]
         missing = wanted.copy()
@@ -169,7 +172,7 @@ class World:
         radius = self.windows.levels[self.stages[stage].level].radius
         boxes = list(_divide_missing(missing, side, self.reach(stage, radius)))
         if len(boxes) > 1 and self.stages[stage].level:
-            # The reach of the coarsest level around each box is larger than the box.
+            # Compute the coarsest level once for all boxes, because its margin around each box is larger than the box.
             self._prepare(missing, low, stage, progress)
         for start, stop in boxes:
             first = [a + b for a, b in zip(start, low, strict=True)]
@@ -183,7 +186,7 @@ class World:
             yield part, places
 
     def make(self, box: Region, stage: int, progress: Progress | None = None) -> Places:
-        """Compute a box of a stage from the stage before."""
+        """Compute a box of a stage from a larger box of the stage before."""
         here, windows = self.stages[stage], self.windows
         if stage == 0:
             margin = self.reach(0, 0)
@@ -203,9 +206,9 @@ class World:
         return places.reshape(*region.shape, self.axes)[box.inside(region)]
 
     def _find_region(self, box: Region, stage: int) -> tuple[Region, NDArray[np.int16]]:
-        """Return the region that a box of a stage is computed from, with its frames.
+        """Return the region of the stage before that a box is computed from, with its frames.
 
-        The reach depends on the frames in the region, so the region grows until it contains the reach.
+        The reach depends on the frames in the region, so the region grows until it contains its own reach.
         """
         level = self.stages[stage].level
         radius = self.windows.levels[level].radius
@@ -219,7 +222,7 @@ class World:
             window = needed
 
     def _prepare(self, missing: Bools, low: Sequence[int], stage: int, progress: Progress | None) -> None:
-        """Compute the coarsest level below all missing parts at once."""
+        """Compute the coarsest level for all missing parts at once."""
         at = np.argwhere(missing)
         first, last = at.min(axis=0), at.max(axis=0) + 1
         region = self._make_region((first + np.array(low)).tolist(), (last - first).tolist(), self.stages[stage].side)
@@ -232,15 +235,15 @@ class World:
         self.read(region, progress, stage)
 
     def _make_region(self, first: Sequence[int], counts: Sequence[int], side: int) -> Region:
-        """Return the region of some cells of the kept lattice."""
+        """Return the region that some cached cells cover."""
         return Region(tuple(n * side for n in counts), tuple(i * side for i in first), (False,) * self.axes)
 
 
 def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Return a few boxes, as first and last cells, that together contain all missing cells and little else.
+    """Return a few boxes, as first and last cells, that together contain all missing cells and few others.
 
-    The cost of a box is its points, and the points of its margin. A box is divided if two halves, each reduced to its
-    missing cells, cost less. It is also divided if it is too large.
+    The cost of a box is its number of points, including its margin. A box is divided if two halves, each reduced to
+    its missing cells, cost less, or if it is too large.
     """
     found = _find_bounds(missing)
     if found is None:
@@ -253,7 +256,7 @@ def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tu
     best, halves = cost(found), None
     too_large = prod((b - a) * side for a, b in zip(start, stop, strict=True)) > MOST
     longest = max(range(missing.ndim), key=lambda axis: stop[axis] - start[axis])
-    # Try to halve the box along each axis, and take the cheapest pair of halves.
+    # Halve the box along each axis, and use the cheapest pair of halves.
     for axis in range(missing.ndim):
         middle = (start[axis] + stop[axis]) // 2
         if middle == start[axis]:
@@ -268,7 +271,7 @@ def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tu
     if halves is None:
         yield start, stop
         return
-    # Divide the halves again. Their boxes are relative to the half.
+    # Divide the halves again. The resulting boxes are relative to the half.
     for half in halves:
         offset = [s.start for s in half]
         for a, b in _divide_missing(missing[half], side, margin):
@@ -279,7 +282,7 @@ def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tu
 
 
 def _find_bounds(missing: Bools) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
-    """Return the first missing cell and the one after the last, along each axis."""
+    """Return the first missing cell, and the cell after the last missing one, along each axis."""
     start, stop = [], []
     for axis in range(missing.ndim):
         line = np.flatnonzero(missing.any(axis=tuple(a for a in range(missing.ndim) if a != axis)))
