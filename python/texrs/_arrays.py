@@ -104,8 +104,8 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     Raises
     ------
     InvalidInput
-        The values are not numbers, not finite or masked, the image is too small or has the wrong number of axes, or
-        its channels are the first axis.
+        The values are not numbers, not finite or masked. Also if the image is too small, has the wrong number of axes,
+        or its channels are the first axis.
     FileError
         A path cannot be read.
     LimitExceeded

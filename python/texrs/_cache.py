@@ -1,4 +1,4 @@
-"""Cache recent results by the values from which they were computed."""
+"""Cache recent results by the values that they were computed from."""
 
 from __future__ import annotations
 

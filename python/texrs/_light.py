@@ -24,9 +24,9 @@ FULL = 0.25
 FEWEST = 24
 """Minimum number of squares for a fit."""
 BETTER = 0.75
-"""Maximum ratio of the squared residuals to those of the next lower degree, for a higher degree to be used."""
+"""Maximum ratio of the squared residuals to those of the next lower degree. Otherwise the lower degree is used."""
 ROUNDS, FAR = 6, 4.0
-"""Number of steps of the robust fit, and deviation in standard deviations at which a value is an outlier."""
+"""Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
 DIGITS = 8
 """Number of decimal places to which coefficients are rounded, because the last bits of a fit depend on the processor.
 """

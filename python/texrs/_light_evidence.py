@@ -21,14 +21,14 @@ SQUARES = 32
 MOST = 8
 """Maximum degree of polynomials. It is also twice the maximum number of waves."""
 BETTER = 0.75
-"""Maximum ratio of the residual variance to that of the next lower degree, for a higher degree to be used.
+"""Maximum ratio of the residual variance to that of the next lower degree. Otherwise the lower degree is used.
 
 The variance is that of typical squares.
 """
 CHANCE = 2.0
 """Minimum gain of each further term, as a multiple of the gain of one term by chance."""
 ROUNDS, FAR = 6, 4.0
-"""Number of steps of the robust fit, and deviation in standard deviations at which a value is an outlier."""
+"""Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
 DIGITS = 8
 """Number of decimal places to which the fit is rounded, because its last bits depend on the processor."""
 
@@ -53,7 +53,7 @@ class Slow:
         for degree in np.unique(degrees)[1:].tolist():
             used = degrees <= degree
             found, left, _ = _fit(terms[used], means)
-            # Require more than the gain that so many terms would have by chance.
+            # Require more than the gain that this number of terms would have by chance.
             chance = 1 + CHANCE * (np.count_nonzero(used) - np.count_nonzero(degrees <= best)) / told
             if left * chance < BETTER ** (degree - best) * least:
                 best, factors, least = degree, found, left

@@ -15,7 +15,7 @@ from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 
 FINE, COARSE = 256, 96
-"""Number of samples along the longer side, for the separation of elements and for the light, which is smoother."""
+"""Numbers of samples along the longer side for the separation of elements, and for the light, which is smoother."""
 SHARE = 0.25
 """Minimum size of light variations, as a fraction of the shorter side."""
 LEAST = 0.02
@@ -158,7 +158,7 @@ def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[
 
 
 def reduce(shape: tuple[int, int]) -> tuple[int, int]:
-    """Return the size of the coarse grid on which the light is computed."""
+    """Return the size of the coarse grid of samples of the light."""
     rows, columns = (min(max(1, ceil(n * COARSE / max(shape))), n) for n in shape)
     return rows, columns
 

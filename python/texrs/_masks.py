@@ -1,4 +1,4 @@
-"""Read masks, in any form in which users mark pixels or voxels."""
+"""Read masks from any form of marks for pixels or voxels."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Mask:
     grow : int
         Growth of the marked area on all sides in pixels, -4096 to 4096. A negative number shrinks it. Default: 0.
     feather : int
-        Width in pixels of a band around the marked area in which the filling fades into the image, 0 to 4096. The
+        Width in pixels of the band around the marked area where the filling fades into the image, 0 to 4096. The
         marked area is replaced completely. It can only be used for holes that are filled. Default: 0.
 
     Raises

@@ -49,8 +49,8 @@ def _read_limits() -> list[int]:
 def _read_groups(root: Path, own: Path) -> list[int]:
     """Return the memory limits of the Linux control groups (versions 1 and 2) of the process and of all parent groups.
 
-    In a container, the group names can be those of the host, for which there are no files. The limit of the container
-    is then at the root.
+    Group names in a container can be names of the host, whose files do not exist there. The limit of the container is
+    then at the root.
     """
     try:
         lines = own.read_text(encoding="utf-8").splitlines()

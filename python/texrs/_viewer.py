@@ -1,7 +1,7 @@
 """Show a volume on an HTML page: a slice and a slider for each axis, without a kernel or a library.
 
-All planes are stored as one image, from which a few lines of JavaScript cut the slices. If scripts are disabled, as in
-previews of notebooks, three fixed slices are shown.
+All planes are stored as one image, and a few lines of JavaScript cut the slices from it. If scripts are disabled, as
+in previews of notebooks, three fixed slices are shown.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ for (const box of document.querySelectorAll('[id="{id}"]:not([data-on])')) {{
 def as_page(volume: Array) -> str:
     """Return HTML that shows a volume (D, H, W, C), with less than about a million characters.
 
-    In larger volumes, only every second voxel or fewer are shown.
+    Only every second voxel or fewer of larger volumes are shown.
 
     Examples
     --------

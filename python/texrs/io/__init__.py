@@ -384,9 +384,9 @@ def write_volume(
     overwrite : bool
         If True, an existing file is replaced. Default: True.
     spacing : sequence of 3 float, optional
-        Distances between planes, rows and columns, in any unit. .nrrd, .nii, .nii.gz, .vti and .zarr store them. So
-        does .tif, as ImageJ does, for uint8, uint16 or float32. `read_spacing` reads them. Default: the spacing of
-        ``like``, or 1.
+        Distances between planes, rows and columns, in any unit. The formats .nrrd, .nii, .nii.gz, .vti and .zarr store
+        it. .tif files store it as ImageJ does, if the dtype is uint8, uint16 or float32. `read_spacing` reads it.
+        Default: the spacing of ``like``, or 1.
     like : path_like, optional
         Volume whose spacing is copied. Orientation, origin and units are also copied between two NRRD files, two NIfTI
         files or two TIFF files of ImageJ. Default: None.

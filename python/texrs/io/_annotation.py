@@ -68,8 +68,8 @@ def read_metadata(path: PathLike) -> Metadata:
     Returns
     -------
     texrs.io.Metadata
-        Metadata of the file. The record of how texrs made it is read from the file, or else from a sidecar: a file of
-        the same name with ``.json`` appended.
+        Metadata of the file. The record of how texrs made it is read from the file, or else from a file of the same
+        name with ``.json`` appended.
 
     Raises
     ------

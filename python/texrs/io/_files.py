@@ -1,4 +1,4 @@
-"""Check paths, translate errors, and write files atomically, for all formats."""
+"""Check paths, translate errors, and write files of all formats atomically."""
 
 from __future__ import annotations
 

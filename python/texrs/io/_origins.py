@@ -1,4 +1,4 @@
-"""Remember from which file an array was read, and whether the file has a palette, for notices."""
+"""Remember the file that an array was read from, and whether it has a palette, so that notices can name it."""
 
 from __future__ import annotations
 

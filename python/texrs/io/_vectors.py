@@ -20,8 +20,8 @@ def read_vectors(path: PathLike, *, limit: int | None = None) -> tuple[Array, bo
     Parameters
     ----------
     path : path_like
-        .npy file, .npz file (with a single array), Zarr store, NRRD or NIfTI file, .vti file (its vectors, if there
-        are several arrays), or TIFF file with one channel per component.
+        File in .npy, .npz (with a single array), NRRD, NIfTI, .vti or TIFF (with one channel per component), or Zarr
+        store. If a .vti file has several arrays, its vectors are read.
     limit : int, optional
         Maximum number of bytes, divided by 16. Default: the voxels that `texrs.limits` allows.
 

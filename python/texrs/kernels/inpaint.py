@@ -87,7 +87,7 @@ def inpaint(
     known : (H, W) array_like of bool
         Mask of the known pixels, False in the holes.
     index : PatchIndex
-        Index of the exemplars from which patches are copied. They must have C channels.
+        Index of the exemplars that patches are copied from. They must have C channels.
     patch_size : int or (rows, columns)
         Size of a patch in pixels, from 1 to the minimum of the image size, the largest exemplar and
         ``index.max_patch``.
@@ -110,8 +110,8 @@ def inpaint(
         ``count=1`` this is their completion.
     shown : int, optional
         Index in ``index`` of the exemplar that is this image itself, if there is one. Surroundings of a hole are then
-        not copied or mirrored into it from there. In any case, patches do not repeat their neighbours, and mirror
-        images in ``index`` are recognised.
+        not copied or mirrored into it from there. Patches never repeat their neighbours, and mirror images in
+        ``index`` are recognised.
     progress : callable, optional
         Function that is called with the filled fraction of the holes, 0 to 1. An exception that it raises stops the
         work.

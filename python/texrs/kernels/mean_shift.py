@@ -34,8 +34,8 @@ def mean_shift(
 
     Each pixel starts at its position and colour, and moves repeatedly to the mean of the pixels in a square window
     around it. Only pixels whose colour differs by at most ``range`` count (Comaniciu and Meer [1]_, flat kernels). The
-    result is close to ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. In addition, all real dtypes and numbers of
-    channels are supported, and the result does not depend on the number of threads or the processor.
+    result is close to ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. Unlike there, any number of channels is
+    supported, and the result does not depend on the number of threads or the processor.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def mean_shift(
     max_iterations : int
         Maximum number of steps per pixel, 0 to 2^31 - 1. For most pixels, five steps are enough, as in OpenCV.
     tolerance : float, optional
-        Maximum colour change, 0 to 1e15, at which a pixel stops, if its rounded position also does not change. A value
-        of 0.05 times ``range`` continues until the colour has converged too, which takes about twice the time.
+        Maximum colour change, 0 to 1e15, of a pixel that has converged. Its rounded position must also not change. A
+        value of 0.05 times ``range`` continues until the colour has converged too, which takes about twice the time.
         Default: only the position counts, as in OpenCV.
     wrap : bool or (bool, bool)
         Axes along which the image is periodic. One value for both axes, or one for each.

@@ -63,12 +63,12 @@ class Match:
 
 
 class PatchIndex:
-    """Index of images in which many patches can be searched for.
+    """Index of images for the search of many patches.
 
     The cost of a position is ``sum(weight * (patch - window) ** 2)`` over the pixels and channels. Approximate costs
     of all positions are computed by Fourier correlation, as in Kwatra et al. [1]_. Positions that could be the
     minimum, given the error of the approximation, are then computed exactly in float64. Results are therefore exact,
-    and the same for any number of threads and any processor. Of equal costs, the lowest (exemplar, row, column) is
+    and the same for any number of threads and any processor. If costs are equal, the lowest (exemplar, row, column) is
     first.
 
     Parameters
@@ -86,8 +86,8 @@ class PatchIndex:
     Raises
     ------
     InvalidInput
-        There are no images, values exceed the range of float32, numbers of channels differ, or a mask does not have
-        the size of its image.
+        Images are missing, values exceed the range of float32, numbers of channels differ, or a mask does not fit its
+        image.
 
     References
     ----------

@@ -47,8 +47,8 @@ def solve(
         Finite image of any real dtype except 64-bit integers. The result is close to it, and fixed pixels have its
         values.
     gradient_rows, gradient_columns : array_like
-        Requested difference of each pixel to the next row and to the next column, in the shape of the image. The last
-        row and the last column are only used if the axis is periodic.
+        Requested difference of each pixel to the next row and to the next column, of the image's shape. The last row
+        and the last column are only used if the axis is periodic.
     screening : float
         Weight of the image compared with the gradients, at least 0. With 0 this is the Poisson equation. Changes of
         colour fade over about ``screening ** -0.5`` pixels.

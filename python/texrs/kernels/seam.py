@@ -92,7 +92,7 @@ class Labels:
     Attributes
     ----------
     mask : (H, W) or (D, H, W) bool
-        Labels. Of several optimal solutions, the labels with the fewest True.
+        Labels. If several solutions are optimal, the labels with the fewest True.
     energy : float
         Sum of the costs of all points and pairs, in the units of the costs.
 
@@ -128,8 +128,8 @@ def cut(
     Pixels that only one image covers take that image. The cores are hard constraints: their pixels take the image of
     the core. Next, neighbours of pixels that only A covers take A, and then neighbours of pixels that only B covers
     take B. The other pixels are chosen so that the sum of the costs of all separated pairs of neighbours is minimal.
-    Of several optimal solutions, the one with the fewest pixels of B is returned. If no pixel is constrained to B, no
-    pixel takes B.
+    If several choices are minimal, the choice with the fewest pixels of B is returned. If no pixel is constrained to
+    B, no pixel takes B.
 
     Parameters
     ----------
@@ -139,10 +139,11 @@ def cut(
     mask_a, mask_b : (H, W) or (D, H, W) array_like of bool
         Masks of the pixels that A and B cover.
     core_a, core_b : array_like of bool, optional
-        Masks of pixels that must keep A or take B. Each core must be inside the mask of its image. Default: none.
+        Masks, of the masks' shape, of the pixels that must keep A or take B. Each core must be inside the mask of its
+        image. Default: none.
     penalty : float or array_like of float, optional
-        Penalty of each pixel, at least 0. The cost of a pair is multiplied by one plus the mean penalty of its two
-        pixels. Penalties keep seams out of elements that should stay whole.
+        Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean
+        penalty of its two pixels. Penalties keep seams out of elements that should stay whole.
     old : OldSeams, optional
         Costs of seams that A already contains, which B can cover. If an old seam costs more than the two seams that
         replace it, this sum is used instead. That only occurs with a cost that violates the triangle inequality.
@@ -168,9 +169,9 @@ def cut(
     Notes
     -----
     Costs are rounded to multiples of 2^-16, or of a larger power of two if the largest cost exceeds 2^10. The time
-    grows with the bounding box of the overlap. If a single connected core of B in an image is surrounded by pixels
-    constrained to A, the seam is found as a shortest closed path on the dual of the grid [2]_. The result is the same
-    as by maximum flow, but several times faster.
+    grows with the bounding box of the overlap. One connected core of B in an image can be surrounded by pixels
+    constrained to A. The seam is then found as a shortest closed path on the dual of the grid [2]_. The result is the
+    same as by maximum flow, but several times faster.
 
     References
     ----------
@@ -372,9 +373,9 @@ def binary_labels(
         Costs of the labels False and True at each point. Infinity forbids a label.
     pairwise : float or sequence
         Cost of neighbours with different labels, at least 0: a single number, or a sequence with one entry for each
-        axis. An entry is a number, or an array of the grid's shape, whose value at ``p`` is for the pair of ``p`` and
-        the next point. An entry can also be a tuple of two arrays: for False followed by True, and for True followed
-        by False.
+        axis. An entry is a number or an array of the grid's shape. Its value at ``p`` is for the pair of ``p`` and the
+        next point. An entry can also be a tuple of two arrays: for False followed by True, and for True followed by
+        False.
     wrap : bool or sequence of bool
         Axes along which the grid is periodic. One value for all axes, or one for each.
 

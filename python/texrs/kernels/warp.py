@@ -31,8 +31,8 @@ class Warp:
     covered : (rows, columns) bool
         Mask of the pixels that a triangle covers. The other pixels are holes.
     triangles, flipped, flipped_heavy : int
-        Number of triangles that were drawn, of triangles that are turned over or have no area, and of turned-over
-        triangles whose three corners have a weight.
+        Numbers of triangles: drawn triangles; triangles that are turned over or without area; and turned-over
+        triangles whose corners all have a weight.
 
     Examples
     --------
@@ -59,10 +59,10 @@ def mesh(
     size: int | Sequence[int] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Warp:
-    """Warp an image in which every pixel moves: return the source coordinates of each output pixel.
+    """Warp an image whose pixels all move: return the source coordinates of each output pixel.
 
     Each cell of four pixels is drawn as two triangles, with barycentric interpolation. If several triangles cover a
-    pixel, the triangle whose corners have the largest weight is visible. Of equal weights, triangles that are not
+    pixel, the triangle whose corners have the largest weight is visible. If weights are equal, triangles that are not
     turned over have priority, then the first triangle.
 
     Parameters
@@ -159,8 +159,8 @@ def from_points(
     Parameters
     ----------
     source, target : (n, 2) array_like
-        Positions (row, column) of the points in the image, and their new positions, in pixels. At least three finite
-        points of any real dtype.
+        Positions (row, column) of the points in the image, and their new positions, in pixels. Any real dtype, finite.
+        There must be at least three points.
     shape : int or (rows, columns)
         Size of the image in pixels.
     size : int or (rows, columns), optional

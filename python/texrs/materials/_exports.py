@@ -37,7 +37,7 @@ class Exports(Mapping[str, Map]):
     ) -> NDArray[np.uint8]:
         """Render an image of the lit material, seen from straight above.
 
-        The image shows colours, normals (or heights if there are no normals), roughness, metallic, occlusion, emission
+        The image shows colours, normals (or heights if normals are missing), roughness, metallic, occlusion, emission
         and opacity. Without colours the surface is grey. A flat, rough surface shows exactly its colours. Transparent
         parts are shown over a checkerboard.
 
@@ -270,8 +270,8 @@ class Exports(Mapping[str, Map]):
         """Write a MaterialX document with a standard surface. Its inputs are the maps, which are written next to it.
 
         Normals have y up: DirectX normals are converted, and heights replace missing normals. Heights displace the
-        surface. Their scale is fitted to the normals, for a surface that is one repetition wide. Occlusion, which
-        renderers compute themselves, and maps without an input in the standard surface are omitted.
+        surface. Their scale is fitted to the normals and assumes that the surface is one repetition wide. Occlusion,
+        which renderers compute themselves, and maps without an input in the standard surface are omitted.
 
         Parameters
         ----------

@@ -3,9 +3,9 @@
 ================ ================================ ===========================================================
 Role             Channels of the layer            Values
 ================ ================================ ===========================================================
-colours, others  R G B, R G B A, Y, Y A           linear light, multiplied by alpha; integers as shares of their range
-normals, vectors X Y, X Y Z, X Y Z A              integers as -1 to 1, y as the role specifies
-labels           Y                                whole numbers of 32 bit
+colours, others  R G B, R G B A, Y, Y A           linear light, multiplied by alpha; integers as 0 to 1
+normals, vectors X Y, X Y Z, X Y Z A              integers as -1 to 1; the role gives the direction of y
+labels           Y                                32-bit integers
 more than 4      0, 1, 2, ...                     as above, also normals without z that have 3 or 4 channels
 ================ ================================ ===========================================================
 

@@ -40,7 +40,7 @@ CHANNELS = 3
 LEAST = 1e-3
 """Minimum fraction of the total variance that a component must explain."""
 SAMPLES = 1 << 18
-"""Approximate number of pixels from which the components are computed."""
+"""Approximate number of pixels that determine the components."""
 
 
 def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:

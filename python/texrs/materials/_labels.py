@@ -21,7 +21,7 @@ Images with fewer values are masks, phases or palettes, whose steps resemble lab
 UNRELATED = 0.9
 """Minimum mean step between different neighbours, in ranks, divided by the mean step between random pixels.
 
-In photographs it is 0.76.
+Photographs have 0.76.
 """
 UNIFORM, LARGELY = 0.9, 0.6
 """Minimum fractions of pixels in 2 x 2 squares of one value, for solid regions and for regions with holes.
@@ -47,8 +47,8 @@ def holds_labels(pixels: Array, axes: int) -> bool:
 
     This was measured on 106 images in 14 versions each (smoothed, posterised, doubled, 8 and 16 bits) and on 9
     segmentations. One half was used to choose the thresholds: none of its 742 images is taken for labels, and 474 of
-    its 477 segmentations are. In the other half, 1 of 742 images is, with doubled pixels, and 474 of 477 segmentations
-    are. The six missed segmentations have fewer than eight labels.
+    its 477 segmentations are. The other half has 1 of 742 images taken for labels, which has doubled pixels, and 474
+    of 477 segmentations. The six missed segmentations have fewer than eight labels.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class Material(Exports):
     Raises
     ------
     InvalidInput
-        There are no maps, sizes differ, a name gives no role, or a map does not fit its role.
+        Maps are missing, sizes differ, a name gives no role, or a map does not fit its role.
 
     Examples
     --------

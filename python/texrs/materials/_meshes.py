@@ -1,4 +1,4 @@
-"""Meshes on which materials are shown: a plane and a sphere, with normals, tangents and texture coordinates."""
+"""Meshes that show materials: a plane and a sphere, with normals, tangents and texture coordinates."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Mesh:
     positions, normals : (N, 3) float32 array
         Vertices, and unit normals that point outwards.
     tangents : (N, 4) float32 array, optional
-        Unit tangent along the rows of the image, in the direction of increasing columns, and a sign w: 1, or -1 if the
-        image is mirrored.
+        Unit tangent in the direction of increasing columns of the image, and a sign w: 1, or -1 if the image is
+        mirrored.
     places : (N, 2) float32 array, optional
         Texture coordinates (column, row), where 1 is the width or the height of one image.
     faces : (M, 3) uint16 or uint32 array

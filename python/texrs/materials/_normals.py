@@ -22,7 +22,7 @@ __all__ = ["settle_normals"]
 CUT = 512
 """Side in pixels of the central part that is examined."""
 ENOUGH, STRONG = 0.1, 0.3
-"""Minimum correlations at which values decide the direction of y, and at which they contradict a stated role.
+"""Minimum correlations of values that decide the direction of y, and of values that contradict a stated role.
 
 On photographs and scans, slopes with the right direction of y correlate by 0.11 to 0.55, and slopes with the wrong
 direction by the negative value.

@@ -25,7 +25,7 @@ ROLES = {role.value: role for role in Role}
 USUAL = {"occlusion": 1.0, "roughness": ROUGH, "smoothness": 1 - ROUGH, "metallic": METAL, "emissiveness": 1.0}
 """Values for quantities without a map, 0 to 1. Other quantities are 0."""
 METALS = 230
-"""Minimum code of metals in the reflectance of labPBR, 0 to 255. At 255, the metal has the colour of its albedo."""
+"""Minimum code of metals in the reflectance of labPBR, 0 to 255. A metal with code 255 has the colour of its albedo."""
 
 
 def unpack_maps(maps: Mapping[str, Map]) -> dict[str, Map]:

@@ -37,7 +37,7 @@ def list_signed(maps: Mapping[str, Map]) -> dict[str, bool]:
 
 
 def take_colour(each: Map | None, shape: tuple[int, ...]) -> Floats:
-    """Return linear colours (..., 3) without alpha, or grey if there is no colour map."""
+    """Return linear colours (..., 3) without alpha, or grey if the colour map is missing."""
     if each is None:
         return np.full((*shape, 3), GREY, np.float32)
     pixels = each.pixels[..., np.newaxis] if each.pixels.ndim == 2 else each.pixels

@@ -7,17 +7,17 @@ label. `cubes` converts volumes to cubic voxels.
 Statistics: each function can be used alone, and most of them also accept images. `compare` reports all of them:
 
 ===========================  ===============================================================
-`classes`                    colours of a texture's materials, and their shares
-`two_point_correlation`      arrangement of a material along the axes
-`lineal_path_function`       lengths of lines within one material
-`component_statistics`       number and sizes of the pieces of a material
-`autocorrelation`            autocorrelation of values along the axes
-`frequency`                  mean spectral frequency: fineness of a texture
-`orientation_errors`         angles between layers and their directions after a field
-`seam_planes` `speckle`      traces of an algorithm: its lattice, and single voxels
-`slice_distances`            difference of the values of each slice from the exemplar's
-`coherence` `cell_reuse`     parts of the exemplar that are used, and size of their copies
-`integrity`                  share of elements that are whole, separate, and of one colour
+`classes`                    colours of the materials of a texture, and their fractions
+`two_point_correlation`      probability that two points at a distance are in a material
+`lineal_path_function`       probability that a whole segment is in a material
+`component_statistics`       number and sizes of the connected components of a material
+`autocorrelation`            correlation of values at a distance along the axes
+`frequency`                  mean spectral frequency, which measures how fine a texture is
+`orientation_errors`         angles between layers and their directions under a field
+`seam_planes` `speckle`      artefacts: steps between planes, and isolated voxels
+`slice_distances`            distance between the values of each slice and the exemplar's
+`coherence` `cell_reuse`     parts of the exemplar that are used, and sizes of the patches
+`integrity`                  whether elements are whole, separate, and of one colour
 ===========================  ===============================================================
 """
 

@@ -41,9 +41,9 @@ class Comparison:
     two_point : (2, A, 13) float64
         Two-point correlation of the chosen classes along each of A axes, for steps of 0 to 12.
     lineal_path : (2, A, 13) float64
-        Lineal path function of the chosen classes, for the same axes and steps.
+        Lineal path function of the chosen classes along the same axes, by the same steps.
     autocorrelation : (2, A, 13) float64
-        Autocorrelation of the lightness, for the same axes and steps.
+        Autocorrelation of the lightness along the same axes, by the same steps.
     isolated : tuple of float
         Fraction of the points that differ from the median of their neighbourhood (`speckle`).
     values : float
@@ -56,8 +56,8 @@ class Comparison:
         expected direction is the exemplar's own normal in the first row, and the normal rotated by the field in the
         second row (the output). None without a field.
     turned : float or None
-        Mean angle in degrees by which the field rotates the exemplar's normal. If it is 0, the field does not affect
-        the orientation. None without a field.
+        Mean angle in degrees between the exemplar's normal before and after its rotation by the field. If it is 0, the
+        field does not affect the orientation. None without a field.
     reuse : CellReuse or None
         How much of the exemplar the output uses, and how often. None without a source map.
     integrity : Integrity or None
@@ -277,7 +277,7 @@ def compare(
 def _turn_normal(
     field: Field, shape: tuple[int, ...], normal: NDArray[np.float64], spacing: Sequence[float] | None
 ) -> float:
-    """Return the mean angle in degrees by which a field rotates the exemplar's normal."""
+    """Return the mean angle in degrees between the exemplar's normal before and after its rotation by a field."""
     lines = [np.linspace(0, n - 1, min(n, 16)) for n in shape]
     frames = turn_in_space(field, np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1), spacing)
     there = np.einsum("...ji,j->...i", frames, normal)

@@ -41,7 +41,7 @@ class Integrity:
         Fraction of the connected parts that contain elements of several colours.
     density : tuple of float
         Number of connected parts per 100 000 points. Parts that a border cuts are excluded, and the others are
-        weighted to compensate (Miles and Lantuéjoul), so that the size of the output has no influence.
+        weighted to compensate (Miles and Lantuéjoul). The size of the output therefore has no influence.
     torn : float
         Fraction of the points in elements of the output whose piece is less than 0.9 of its element. Pieces at a
         border of the output are excluded.
@@ -73,7 +73,7 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
     Parameters
     ----------
     exemplar : (D, H, W), (D, H, W, C), (H, W) or (H, W, C) array, or Exemplar
-        Exemplar from which the result was synthesised.
+        Exemplar of the result.
     source : SourceMap
         Source map of an image or a volume that was synthesised from this exemplar only.
     axes : int
@@ -148,7 +148,7 @@ class _Shown:
 
         total = 0.0
         for size, box in zip(self.sizes, ndimage.find_objects(self.parts), strict=True):
-            # Count the positions of the part in the output at which it would not touch a border.
+            # Count the positions in the output where the part would not touch a border.
             places = 1 if size >= LEAST else 0
             for side, length, cyclic in zip(box, self.parts.shape, self.wrap, strict=True):
                 whole = side.start > 0 and side.stop < length

@@ -169,14 +169,14 @@ def render_block(
     Parameters
     ----------
     volume : array_like
-        Volume of shape (D, H, W) or (D, H, W, C). Transparent voxels are shown over mid grey. Of more than 4 channels,
-        only the first 3 are shown.
+        Volume of shape (D, H, W) or (D, H, W, C). Transparent voxels are shown over mid grey. If there are more than 4
+        channels, only the first 3 are shown.
     size : int
         Longer side of the image in pixels, 16 to 4096. Default: 512.
     azimuth : float
-        Angle from which the block is seen, to the right of its front, in degrees. If 0, the right face is not visible.
+        Angle of the view to the right of the front, in degrees. If 0, the right face is not visible.
     elevation : float
-        Angle from which the block is seen, above its front, in degrees, -90 to 90. Default: 30.
+        Angle of the view above the front, in degrees, -90 to 90. Default: 30.
     interpolation : {"linear", "cubic", "nearest"}
         Interpolation between voxels. "nearest" shows each voxel as a square.
 
@@ -226,8 +226,8 @@ def turntable(
     Parameters
     ----------
     volume : array_like
-        Volume of shape (D, H, W) or (D, H, W, C). Transparent voxels are shown over mid grey. Of more than 4 channels,
-        only the first 3 are shown.
+        Volume of shape (D, H, W) or (D, H, W, C). Transparent voxels are shown over mid grey. If there are more than 4
+        channels, only the first 3 are shown.
     path : path_like
         File with the suffix .gif. If writing fails, an existing file is unchanged.
     frames : int
@@ -235,7 +235,7 @@ def turntable(
     size : int
         Side of the image in pixels, 16 to 1024.
     elevation : float
-        Angle from which the block is seen, above its front, in degrees, -90 to 90.
+        Angle of the view above the front, in degrees, -90 to 90.
     seconds : float
         Duration of a turn in seconds, 0.1 to 600. Default: 4.
     background : sequence of 3 int

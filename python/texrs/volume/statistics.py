@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 _SAMPLE = 2**15
-"""Number of pixels from which classes are computed."""
+"""Number of pixels that classes are computed from."""
 _RESTARTS, _TURNS = 6, 40
 
 

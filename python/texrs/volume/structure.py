@@ -215,7 +215,7 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
     values : array_like
         Values of the output, (H, W) or (D, H, W), whose slices are compared.
     quantiles : int
-        Number of quantiles at which the distributions are compared, 2 to 2^16.
+        Number of compared quantiles of the distributions, 2 to 2^16.
 
     Returns
     -------
@@ -246,7 +246,7 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
 
 
 def texture_normal(values: ArrayLike, *, spacing: Sequence[float] | None = None) -> NDArray[np.float64]:
-    """Return the direction in which an exemplar changes most, which is the normal of its layers.
+    """Return the direction of the largest change in an exemplar, which is the normal of its layers.
 
     Parameters
     ----------

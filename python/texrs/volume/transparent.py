@@ -57,19 +57,19 @@ def render_volume(
     Parameters
     ----------
     volume : array_like
-        Volume of shape (D, H, W) or (D, H, W, C). A fourth channel is alpha. Of more than 4 channels, only the first 3
-        are shown.
+        Volume of shape (D, H, W) or (D, H, W, C). A fourth channel is alpha. If there are more than 4 channels, only
+        the first 3 are shown.
     size : int
         Longer side of the image in pixels, 16 to 4096.
     azimuth : float
-        Angle from which the volume is seen, to the right of its front, in degrees. If 0, it is seen from the front.
+        Angle of the view to the right of the front, in degrees. If 0, it is seen from the front.
     elevation : float
-        Angle from which the volume is seen, above its front, in degrees, -90 to 90.
+        Angle of the view above the front, in degrees, -90 to 90.
     transfer : str or sequence of (value, colour, alpha), optional
         Stops of the transfer function, with increasing values, 1 to 256. Colour and alpha are interpolated linearly
         between stops. The value is the lightness, 0 to 1: integers are scaled by their full range, and floats outside
         0 to 1 by their own range. The colour is "#rrggbb", three numbers from 0 to 255, or None for the colour of the
-        voxel. Alpha, 0 to 1, is the opacity of one voxel. As text: ``value:colour:alpha,...``, such as
+        voxel. Alpha, 0 to 1, is the opacity of one voxel. A text has the form ``value:colour:alpha,...``, such as
         ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. Default: voxels that differ from the most frequent colour are shown in
         their own colour.
     shading : bool

@@ -1,4 +1,4 @@
-"""Measure which parts of the exemplar a synthesis uses, how often, and in patches of which size."""
+"""Measure which parts of the exemplar a synthesis uses, how often, and how large its coherent patches are."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
 
 
 def _count_cell_use(source: SourceMap, number: int, side: int) -> Floats:
-    """Return how often a voxel is used on average, for each cell of an exemplar."""
+    """Return for each cell of an exemplar how often its voxels are used on average."""
     shape = np.array(source.shapes[number])
     cells = -(-shape // side)
     place = np.floor(source.coordinates[source.exemplar == number] + np.float32(0.5)).astype(np.int64)
