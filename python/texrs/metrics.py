@@ -3,13 +3,13 @@
 The figures measure torn elements, lines that break off at seams, blur along seams, repeated places, and parts of the
 exemplar that are never shown.
 
-The source map gives the seams, so only these are examined. The exemplar gives the usual values: each figure counts the
-excess over the exemplar, so a crop of it scores 0. Two figures measure tears. One uses the elements of a segmentation.
-The other one measures lines that break off, without elements. A cut along wrongly segmented outlines is therefore not
-rewarded by itself: an edge of the exemplar that meets a seam must continue beyond it.
+Only seams are examined, which the source map contains. Each figure is relative to the usual value in the exemplar, so
+that a crop of the exemplar scores 0. Two figures measure tears. ``torn`` uses the elements of a segmentation.
+``broken`` measures lines that break off, without elements: an edge of the exemplar that meets a seam must continue
+beyond it. A cut along wrongly segmented outlines is therefore not rewarded by itself.
 
-The distance of windows at seams to the nearest windows of the exemplar is not a useful figure, because it is smallest
-for fused elements.
+The distance of windows at seams to the nearest windows of the exemplar is not used, because it is smallest for fused
+elements.
 """
 
 from __future__ import annotations
@@ -35,23 +35,21 @@ def __dir__() -> list[str]:
 
 
 REACH, INSIDE = 8.0, 1 / 8
-"""Depth in pixels of a pixel fully inside an element, and the share of this depth that counts as inside."""
+"""Depth in pixels of a pixel fully inside an element, and share of this depth above which a pixel counts as inside."""
 VISIBLE, UNSEEN = 90, 0.25
-"""Percentile of the exemplar's own differences above which a difference is visible, and the weight of an invisible
-tear.
+"""Percentile of the exemplar's differences above which a difference is visible, and weight of an invisible tear.
 """
 EDGE, TURNED = 85, 0.6
-"""Percentile of the exemplar's gradients above which one belongs to a line, and the share of it that must be missing
-for a broken line.
+"""Percentile of gradients above which a pixel is on a line, and the missing share of a gradient that breaks the line.
 """
 BAND = 3
 """Width in pixels on both sides of a seam for the measurement of blur."""
 CELL = 8
 """Side of the cells for which use and repetition are counted, in pixels."""
 GROUND = 0.1
-"""Weight of the background if there are elements."""
+"""Weight of the background relative to elements when repetition is measured."""
 ALIKE = 4
-"""Steps per unit for the comparison of frames. Frames with equal steps count as equal."""
+"""Number of steps per unit to which frames are rounded before they are compared."""
 TORN, BROKEN, BLUR, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.1, 0.1
 """Weights of the figures in the score."""
 
@@ -66,15 +64,15 @@ class Quality:
         Length of seams that cross elements, divided by the expected total outline length: 0 or more. Invisible
         seams have a weight of 0.25.
     broken : float
-        Length of lines that break off at seams, divided by the length of such lines, minus the usual share in the
-        exemplar.
+        Length of lines that break off at seams, beyond the usual amount in the exemplar: 0 or more. It is divided by
+        the expected total length of lines.
     seam_blur : float
-        Share of the detail that is missing next to seams, compared with the exemplar; 0 to 1.
+        Share of the detail of the exemplar that is missing next to seams, 0 to 1.
     repetition : float
         Amount of exact repetition compared with random patches, weighted by how conspicuous the places are. It is 0 if
         nothing repeats, 1 if patches are random, and 0.25 if they are also mirrored.
     coverage : float
-        Share of the exemplar that is shown, 0 to 1, relative to the available area.
+        Share of the exemplar that is shown, 0 to 1, relative to the share that a texture of this size can show.
 
     Examples
     --------
@@ -123,7 +121,7 @@ def evaluate(
     elements: ElementOptions = ElementOptions(),
     wrap: bool | tuple[bool, bool] = False,
 ) -> Quality:
-    """Evaluate a texture that was synthesised from one exemplar.
+    """Measure the quality of a texture that was synthesised from one exemplar.
 
     Parameters
     ----------
@@ -132,11 +130,11 @@ def evaluate(
     source : SourceMap
         Source of each pixel, shape (h, w).
     image : (h, w) or (h, w, C) array, optional
-        The texture, if its colours were corrected. It is used to measure blur.
+        The texture, if its colours were corrected. It is used to measure blur. Default: blur is not measured.
     elements : ElementOptions
-        Options of the segmentation of the exemplar.
+        Options that control how elements of the exemplar are found. Default: the default options.
     wrap : bool or (rows, columns)
-        Axes along which the texture is periodic.
+        Axes along which the texture is periodic. Default: none.
 
     Returns
     -------
@@ -145,7 +143,7 @@ def evaluate(
     Raises
     ------
     InvalidInput
-        If the source map has several exemplars or one of another shape, or the image has another shape.
+        If the source map refers to several exemplars or to one of another shape, or the image has another shape.
 
     Examples
     --------
@@ -182,18 +180,18 @@ def evaluate(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Traits:
-    """Usual values of an exemplar.
+    """Usual values within an exemplar, to which textures are compared.
 
     Attributes
     ----------
     colours : (H, W, C) float32
-        Colours for comparison.
+        Colours that are compared.
     depth : (H, W) float32
         Depth of each pixel inside an element, 0 to 1.
     outlines : float
-        Number of pairs of neighbours that an outline separates, divided by the pixels.
+        Number of pairs of neighbours that an outline separates, divided by the number of pixels.
     step : float
-        Difference of neighbours above which it is visible.
+        Difference between neighbours above which it is visible.
     slopes : (H, W, 2 C) float32
         Gradients of all channels along rows, then along columns.
     line : float
@@ -246,8 +244,8 @@ def _measure_traits(exemplar: Exemplar, elements: ElementOptions) -> _Traits:
 def _measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
     """Return how conspicuous each cell is.
 
-    The value is the deviation of its mean and contrast from the medians of all cells, in standard deviations. If there
-    are elements, the background counts little, because its repetition is not noticed.
+    The value is the deviation of a cell's mean colour and contrast from the medians of all cells, in standard
+    deviations. If there are elements, the background has a low weight, because its repetition is not noticed.
     """
     rows, columns = (-(-n // CELL) for n in colours.shape[:2])
     fill = ((0, rows * CELL - colours.shape[0]), (0, columns * CELL - colours.shape[1]), (0, 0))
@@ -263,7 +261,7 @@ def _measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seam:
-    """Pairs of neighbours along an axis that do not come from neighbouring places."""
+    """Pairs of neighbouring pixels along an axis whose sources are not neighbours."""
 
     source: SourceMap
     axis: int
@@ -271,13 +269,13 @@ class _Seam:
     after: tuple[NDArray[np.intp], ...]
 
     def look_across(self, image: Floats) -> tuple[Floats, Floats]:
-        """Return the values of an image of the exemplar on both sides."""
+        """Return the values of an image of the exemplar at the sources of the pixels on both sides."""
         first, second = (gather(image, self.source.coordinates[at], interpolation="nearest") for at in self.sides)
         return first, second
 
     @property
     def sides(self) -> tuple[tuple[NDArray[np.intp], ...], tuple[NDArray[np.intp], ...]]:
-        """Pixels on both sides."""
+        """Pixels before and after the seam."""
         return self.at, self.after
 
 
@@ -288,7 +286,7 @@ def _list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[n
 
 
 def _find_seam(source: SourceMap, axis: int, wrap: bool) -> _Seam:
-    """Find the seams that cross an axis."""
+    """Return the pairs of neighbours along an axis that a seam separates."""
     parted = ~source.is_coherent(axis, wrap=wrap)
     if not wrap:
         np.moveaxis(parted, axis, 0)[-1] = False
@@ -309,7 +307,7 @@ def _measure_tears(traits: _Traits, seams: list[_Seam], area: int) -> float:
 
 
 def _measure_breaks(traits: _Traits, seams: list[_Seam], area: int) -> float:
-    """Return the share of lines that break off at seams, minus the usual share."""
+    """Return the length of lines that break off at seams, minus the usual length, divided by the length of all."""
     found, _ = _find_breaks(traits.slopes, traits.line, seams)
     excess = float(found.sum()) - traits.broken * len(found)
     return max(0.0, excess) / max(traits.lines * area, 1.0)
@@ -318,9 +316,9 @@ def _measure_breaks(traits: _Traits, seams: list[_Seam], area: int) -> float:
 def _find_breaks(slopes: Floats, line: float, seams: list[_Seam]) -> tuple[Bools, Bools]:
     """Return masks of the pairs with a broken crossing line, and of the pairs with any line.
 
-    A crossing line is a strong gradient along the seam. Beyond the seam there must be a similar one, at most a pixel
-    aside. An edge along the seam on one side is an exception: there an element ends, and the line continues hidden
-    below it.
+    A line crosses a seam if there is a strong gradient along the seam. It is broken if the other side does not have a
+    similar gradient, at most a pixel aside. An edge along the seam on one side is an exception, because an element
+    ends there, and the line continues hidden below the element.
     """
     ends = np.zeros(seams[0].source.shape, bool)
     for seam in seams:

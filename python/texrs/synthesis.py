@@ -1,4 +1,4 @@
-"""Result of a verb: the image, its source map, the stages and a report."""
+"""Result of a synthesis: the image, its source map, images of the stages, and a report."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Synthesis:
         Parameters
         ----------
         folder : path_like
-            Folder, created if needed. Files with these names are replaced.
+            Folder for the files. It is created if needed, and files with the same names are replaced.
 
         Returns
         -------

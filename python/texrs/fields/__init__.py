@@ -1,9 +1,10 @@
 """Frame fields: rotation, scale and shear of a texture at each point of the output.
 
-A `Field` gives a frame F for any point. Its columns are the directions of the exemplar's axes in the output, so a
-column of length 2 means features twice as large. J = F^-1 converts steps in the output to steps in the exemplar;
-source maps store J. Points are (row, column) or (plane, row, column) in voxels of the output, with centres at the
-integers. The letters x, y and z name the axes of columns, rows and planes.
+A `Field` gives a matrix F, the frame, for any point of the output. The columns of F are the directions of the
+exemplar's axes in the output. A column of length 2 means features twice as large along this axis. The inverse J = F^-1
+converts steps in the output to steps in the exemplar, and source maps store J. Points are (row, column) or (plane,
+row, column) in voxels of the output, with centres at the integers. The letters x, y and z name the axes of columns,
+rows and planes.
 
 ===================  ==========================================================================
 `identity`           the orientation of the exemplar
@@ -24,11 +25,12 @@ integers. The letters x, y and z name the axes of columns, rows and planes.
 `read`               vectors or frames from a file
 ===================  ==========================================================================
 
-Every parameter for a field also takes its words, an array of vectors or frames, or a file of one (`as_field`).
+Functions that accept a field also accept a text that describes it, an array of vectors or frames, or its file
+(`as_field`).
 
-A field is stored as a formula, not as a dense array of frames: its value at a point depends only on this point.
-`parse` makes a field from a text (``zigzag:period=64,angle=30``), `names` lists them, `check` finds singular frames
-before long work.
+A field is stored as a formula instead of a dense array of frames. Its frame at a point depends only on this point.
+`parse` creates a field from a text (``zigzag:period=64,angle=30``), `names` lists the texts, and `check` finds
+singular frames before a long computation.
 """
 
 from texrs.fields._directions import from_directions, from_gradient, from_structure

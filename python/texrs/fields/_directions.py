@@ -1,4 +1,4 @@
-"""Fields from directions of simulations, scans or strokes: one vector per place, completed to frames."""
+"""Fields from directions, such as vectors of a simulation, a scan or strokes, which are completed to frames."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from texrs.fields._sampled import make_grid
 __all__ = ["from_directions", "from_gradient", "from_structure"]
 
 SMALLEST = 1e-9
-"""Length below which a vector has no direction, as a share of the longest."""
+"""Length below which a vector does not count as a direction, as a share of the longest vector."""
 DIGITS = 6
-"""Digits of directions. Solvers on different processors differ in later digits."""
+"""Number of digits to which directions are rounded. Solvers on different processors differ in later digits."""
 _LETTERS = "yx", "zyx"
 
 
@@ -33,27 +33,28 @@ def from_directions(
 ) -> Field:
     """Return a field that turns one axis of the exemplar into given directions.
 
-    The other two axes are completed in volumes: one is as near to ``up`` as possible, and the last is perpendicular to
-    both. Lengths do not count. A place without a direction takes the nearest one. The same is done where neighbours
-    point in opposite directions, as around a vortex.
+    The other two axes of a volume are completed: one is as near to ``up`` as possible, and the last is perpendicular
+    to both. Lengths of vectors are ignored. A place without a direction gets the nearest direction. Where neighbours
+    point in opposite directions, as around a vortex, the nearest frame replaces the interpolated one.
 
     Parameters
     ----------
     directions : (R, C, 2) or (P, R, C, 3) array_like
-        Vectors in voxels of the output.
+        Vectors in voxels of the output, one for each place.
     extent : sequence of int, optional
-        Voxels that the array covers, as for `from_array`. Default: one for each vector.
+        Size of the box that the array covers, in voxels, as for `from_array`. Default: one voxel for each vector.
     along : {"x", "y", "z"}
-        Axis of the exemplar that is turned into the directions: columns, rows or planes.
+        Axis of the exemplar that is turned into the directions: columns, rows or planes. Default: "x".
     up : (3,) or (P, R, C, 3) array_like, optional
         Up direction in volumes, (plane, row, column), one for all or one per place, such as the normals of a surface.
         Default: the axis least parallel to the directions.
     order : {"zyx", "xyz", "yx", "xy"}, optional
         Order of the components. Default: the order of array axes, (plane, row, column).
     signed : bool
-        If False, v and -v are the same, as for fibres, and neighbours are brought into agreement.
+        If False, v and -v mean the same direction, as for fibres, and neighbours are flipped until they agree.
+        Default: True.
     origin : sequence of float, optional
-        First voxel. Default: 0.
+        First voxel of the box, (row, column) or (plane, row, column). Default: 0.
 
     Returns
     -------
@@ -63,7 +64,7 @@ def from_directions(
     Raises
     ------
     InvalidInput
-        If the array has another form, has no direction anywhere, or an option is invalid.
+        If the array has another shape, has no direction anywhere, or an option is invalid.
 
     Examples
     --------
@@ -105,13 +106,13 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
     Parameters
     ----------
     volume : (R, C) or (P, R, C) array_like
-        The map.
+        Image or volume whose gradient is followed.
     along : {"x", "y", "z"}
-        Axis of the exemplar that follows the gradient.
+        Axis of the exemplar that follows the gradient: columns, rows or planes. Default: "x".
     sigma : float
-        Standard deviation of the smoothing, in samples, 0 to 100.
+        Standard deviation of the smoothing, in samples, 0 to 100. Default: 2.
     across : bool
-        For images: if True, the axis follows contours, a quarter turn from the gradient.
+        If True, the axis follows the contours of an image, which are perpendicular to the gradient. Default: False.
 
     Returns
     -------
@@ -120,7 +121,7 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
     Raises
     ------
     InvalidInput
-        If the array has another form, or is constant.
+        If the array has another shape, or is constant.
 
     Examples
     --------
@@ -147,9 +148,10 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
     volume : (R, C) or (P, R, C) array_like
         Image or volume with a grain, such as wood or fibres.
     along : {"x", "y", "z"}
-        Axis of the exemplar that follows the grain.
+        Axis of the exemplar that follows the grain: columns, rows or planes. Default: "x".
     sigma : float
-        Standard deviation of the smoothing of the tensor, in samples, 0 to 100. Gradients use half of it.
+        Standard deviation of the smoothing of the tensor, in samples, 0 to 100. Gradients are smoothed by half of it.
+        Default: 2.
 
     Returns
     -------
@@ -158,7 +160,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
     Raises
     ------
     InvalidInput
-        If the array has another form, or is constant.
+        If the array has another shape, or is constant.
 
     Examples
     --------
@@ -204,7 +206,7 @@ def _smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
 
 
 def _fill(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit vectors. Places without one take the nearest."""
+    """Return vectors of length 1. Places without a direction get the nearest direction."""
     from scipy.ndimage import distance_transform_edt
 
     length = np.sqrt((vectors**2).sum(axis=-1))
@@ -219,7 +221,7 @@ def _fill(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _agree(unit: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return lines as vectors that agree with previous neighbours, along one axis after the other."""
+    """Return vectors that are flipped to agree with the previous neighbour, along one axis after the other."""
     out = unit.copy()
     for axis in reversed(range(out.ndim - 1)):
         line = np.moveaxis(out, axis, 0)
@@ -235,7 +237,7 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
     frames = np.empty((*unit.shape, axes))
     frames[..., along] = unit
     if axes == 2:
-        # The other column is a quarter turn away, so that nothing is mirrored.
+        # Turn the other column by a quarter turn, in the sense that does not mirror the texture.
         turned = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
         frames[..., 1 - along] = turned if along == 0 else -turned
         return frames
@@ -259,7 +261,7 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
     second /= np.sqrt((second**2).sum(axis=1, keepdims=True))
     third = np.cross(flat, second)
     shape = unit.shape
-    # Keep the exemplar upright: up becomes its planes, or its rows if planes follow the direction.
+    # Keep the exemplar upright: its plane axis points up, or its row axis if the plane axis follows the direction.
     one, other = [axis for axis in range(3) if axis != along]
     frames[..., one] = second.reshape(shape)
     frames[..., other] = third.reshape(shape)

@@ -37,11 +37,11 @@ _NAMES = ("row", "column"), ("plane", "row", "column")
 class Field(ABC):
     """A frame for every point of the plane or of space. Functions of `texrs.fields` create fields.
 
-    The columns of a frame F are the directions of the exemplar's axes in the output. A column of length 2 means features
-    twice as large along this axis. Its inverse J converts steps in the output to steps in the exemplar, and
-    source maps store J. Points are in voxels of the output, (row, column) or (plane, row, column), with centres at the
-    integers. They may be any finite numbers. A frame depends only on its point, to the last bit, so that all windows
-    of an unbounded texture agree.
+    The columns of a frame F are the directions of the exemplar's axes in the output. A column of length 2 means
+    features twice as large along this axis. The inverse J of a frame converts steps in the output to steps in the
+    exemplar, and source maps store J. Points are in voxels of the output, (row, column) or (plane, row, column), with
+    centres at the integers. Their coordinates can be any finite numbers. A frame depends only on its point, to the
+    last bit, so that all windows of an unbounded texture agree.
 
     Fields can be pickled. Two fields are equal if they have the same `key`.
 
@@ -61,16 +61,16 @@ class Field(ABC):
 
     axes: int
     _rigid = False
-    """Whether every frame is a rotation. Then J is the transpose of F, and no frame is singular."""
+    """If True, every frame is a rotation, so that J is the transpose of F, and frames are not singular."""
     _placed_in_voxels = False
-    """Whether points are voxels for any spacing, as for an array over the output."""
+    """If True, points are in voxels even if a spacing is given, as for an array that covers the output."""
 
     @abstractmethod
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        """Return the frames (A, A, N) of (N, A) points, unchecked."""
+        """Return the frames (A, A, N) at points (N, A), without a check."""
 
     def _content(self) -> tuple[Any, ...] | None:
-        """Return the data that determine the field, for its key; None if unknown."""
+        """Return the data that determine the field, for its key, or None if they are unknown."""
         parts: Any = self
         return tuple(getattr(self, part.name) for part in fields(parts) if part.compare)
 
@@ -81,7 +81,7 @@ class Field(ABC):
         Returns
         -------
         str
-            One line, for messages and reports.
+            Description in one line, for messages and reports.
 
         Examples
         --------
@@ -119,12 +119,12 @@ class Field(ABC):
         return as_png(draw_arrows(places, self.over((SIDE,) * self.axes).frames(places)))
 
     def frames(self, points: ArrayLike) -> Floats:
-        """Return the frames F.
+        """Return the frames F at points.
 
         Parameters
         ----------
         points : array_like
-            Shape (..., A), in voxels of the output.
+            Points of shape (..., A), in voxels of the output.
 
         Returns
         -------
@@ -134,9 +134,8 @@ class Field(ABC):
         Raises
         ------
         InvalidInput
-            If the points are invalid, or a frame at one of them is singular. It is singular if it is not finite, its
-            determinant is
-        below 0.001, or its condition number is above 100. The message names the place.
+            If the points are invalid, or a frame at one of them is singular. A frame is singular if it is not finite,
+            its determinant is below 0.001, or its condition number is above 100. The message names the place.
 
         Examples
         --------
@@ -156,7 +155,7 @@ class Field(ABC):
         Parameters
         ----------
         points : array_like
-            Shape (..., A), in voxels of the output.
+            Points of shape (..., A), in voxels of the output.
 
         Returns
         -------
@@ -166,7 +165,7 @@ class Field(ABC):
         Raises
         ------
         InvalidInput
-            If an argument is invalid for `frames`.
+            If the points are invalid, or a frame at one of them is singular (see `frames`).
 
         Examples
         --------
@@ -186,18 +185,18 @@ class Field(ABC):
         Parameters
         ----------
         shape : sequence of int
-            Samples along each axis.
+            Number of samples along each axis.
         origin : int, or one per axis
-            Index of the first sample, on the level's own lattice.
+            Index of the first sample on the level's lattice. Default: 0.
         step : float
-            Voxels from one sample to the next: 1, 2, 4 ... Sample i is at (i + 1/2) step - 1/2.
+            Distance of the samples in voxels: 1, 2, 4, ... Sample i is at (i + 1/2) step - 1/2. Default: 1.
         jacobians : bool
-            If False, return the frames.
+            If False, frames are returned instead of Jacobians. Default: True.
 
         Returns
         -------
         ndarray
-            Array of the lattice's shape, then (A, A); float32.
+            Array of the lattice's shape followed by (A, A), float32.
 
         Raises
         ------
@@ -232,7 +231,7 @@ class Field(ABC):
         return out.reshape(*sides, self.axes, self.axes)
 
     def over(self, shape: Sequence[int]) -> Field:
-        """Return the field over a bounded output: its size sets a centre or length that is not given.
+        """Return the field for a bounded output, whose size determines a centre or length that is not given.
 
         Parameters
         ----------
@@ -259,15 +258,15 @@ class Field(ABC):
         return self._over([n - 1 for n in as_size(shape, "shape", axes=self.axes)])
 
     def _over(self, reach: Sequence[float]) -> Field:
-        """Return the field over an output, given the distance of its last point from its first."""
+        """Return the field for an output whose last point is ``reach`` away from its first, along each axis."""
         return self
 
     def _check_steps(self, steps: Sequence[float]) -> None:
-        """Check that voxels of a spacing are small enough for the field."""
+        """Raise an error if voxels of this spacing are too large for the field."""
         return
 
     def inverse(self) -> Field:
-        """Return the field whose frames are the inverses of these.
+        """Return the field whose frames are the inverses of this field's frames.
 
         Returns
         -------
@@ -302,7 +301,7 @@ class Field(ABC):
 
 
 def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "field") -> Matrices:
-    """Return the inverses of frames, or raise InvalidInput with the first place of a singular one."""
+    """Return the inverses of frames, or raise InvalidInput that names the first place with a singular frame."""
     inverse, det = inverses(frames)
     bad = find_flat(frames, inverse, det, LEAST_DETERMINANT, MAX_CONDITION)
     if bad.any():
@@ -320,7 +319,7 @@ def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "fiel
 
 
 def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.float64]:
-    """Check points of shape (..., A) with finite numbers."""
+    """Return points as float64, after a check that their shape is (..., A) and that they are finite."""
     given = try_array(points)
     if given.dtype.kind not in "buif" or given.ndim == 0 or given.shape[-1] != axes:
         raise InvalidInput(
@@ -336,12 +335,12 @@ def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.
 
 
 def check_axes(axes: object) -> int:
-    """Check a number of axes, 2 or 3."""
+    """Return a checked number of axes, 2 or 3."""
     return as_axes(axes)
 
 
 def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float64]:
-    """Check a single point, (A,). Default: the origin."""
+    """Return a checked single point, (A,). Default: the origin."""
     if place is None:
         return np.zeros(axes)
     at = as_points(place, axes, name)
@@ -352,7 +351,7 @@ def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Inverse(Field):
-    """The inverses of another field's frames."""
+    """Field of the inverses of another field's frames."""
 
     field: Field
 
@@ -387,7 +386,7 @@ class _Inverse(Field):
 
 
 def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = None) -> None:
-    """Check a field over a box, before any long work.
+    """Check a field at points of a box, before a long computation.
 
     Parameters
     ----------
@@ -401,8 +400,8 @@ def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = N
     Raises
     ------
     InvalidInput
-        If it is not a field or has other axes. Also if it is singular at one of up to 32768 voxels spread evenly over
-        the box, corners included.
+        If the argument is not a field, or has another number of axes. Also if a frame is singular at one of up to
+        32768 voxels that are spread evenly over the box, including its corners.
 
     Examples
     --------

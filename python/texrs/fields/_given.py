@@ -1,4 +1,4 @@
-"""Conversion to fields: words, arrays of vectors or frames, and files of arrays."""
+"""Convert texts, arrays of vectors or frames, and files of such arrays to fields."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _OPTIONS = ("along", "order", "up", "signed")
 
 
 def is_file(text: str) -> bool:
-    """Return whether a text names a file of vectors, instead of a field in words."""
+    """Return whether a text is the name of a file of vectors or frames, instead of a description of a field."""
     return _split(text)[0].lower().rstrip("/").endswith(SUFFIXES) or io.is_store(_split(text)[0])
 
 
@@ -40,13 +40,14 @@ def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = 
     Parameters
     ----------
     path : path_like
-        .npy, .npz, .zarr, .nrrd, .nii, .vti or .tif: directions (..., 2) or (..., 3), or frames (..., A, A).
-        Components are x, y, z in the formats of ParaView, Slicer and similar programs. Components in other formats are
-        in the order of array axes, unless ``order`` is given.
+        File in the format .npy, .npz, .zarr, .nrrd, .nii, .vti or .tif, with directions (..., 2) or (..., 3), or
+        frames (..., A, A). Components are x, y, z in the formats of ParaView, Slicer and similar programs. Components
+        in other formats are in the order of array axes, unless ``order`` is given.
     extent : sequence of int, optional
-        Voxels that the field covers, as for `from_array`. Default: one for each vector.
+        Size of the box that the field covers, in voxels, as for `from_array`. Default: one voxel for each vector.
     axes : int, optional
-        Required number of axes, 2 or 3. For a single plane of vectors in space, 2 drops the component across it.
+        Required number of axes, 2 or 3. With 2, a single plane of vectors in space is also accepted, and the component
+        across the plane is dropped. Default: any.
     **options
         Options of `from_directions`: ``along``, ``up``, ``order``, ``signed``.
 
@@ -57,9 +58,9 @@ def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = 
     Raises
     ------
     FileError
-        If the file is missing, not readable, or has no such array.
+        If the file is missing or not readable, or does not contain such an array.
     InvalidInput
-        If the vectors or frames are not a field, or have other axes.
+        If the vectors or frames do not define a field, or have another number of axes.
 
     Examples
     --------
@@ -112,22 +113,23 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
 def as_field(
     value: object, axes: int, extent: Sequence[int] | None = None, *, spacing: Sequence[float] | None = None
 ) -> Field | None:
-    """Return a value as a field: a field, words, an array, or a file of an array. None stays None.
+    """Convert a field, a text, an array, or a file of an array to a field. None is returned as None.
 
     Parameters
     ----------
     value : Field, str, array_like, path_like or None
-        Words are those of `parse`. An array contains directions, (R, C, 2) or (P, R, C, 3), or frames, (..., A, A). A
-        file contains such an array (`read`). Options of `from_directions` may follow its name, as in
-        ``flow.npy:along=z,order=xyz`` (also ``up=1x0x0`` and ``signed=no``).
+        Value to convert. Texts are described in `parse`. An array contains directions, (R, C, 2) or (P, R, C, 3), or
+        frames, (..., A, A). A file contains such an array (`read`). Options of `from_directions` can follow the name
+        of a file, as in ``flow.npy:along=z,order=xyz`` (also ``up=1x0x0`` and ``signed=no``).
     axes : int
         Number of axes, 2 or 3.
     extent : sequence of int, optional
-        Voxels that arrays cover, and the size for words. Default: one for each vector.
+        Size of the output in voxels, which arrays cover and texts refer to. Default: one voxel for each vector.
     spacing : sequence of float, optional
         Distances between voxels along planes, rows and columns. The field rotates and scales in space, where voxels
-        need not be cubes. Places and lengths of the field are in the unit of the spacing. Arrays cover voxels, and
-        their vectors or frames are in space. A field that has a spacing keeps it. Default: voxels are cubes of side 1.
+        need not be cubes. Places and lengths of the field are in the unit of the spacing. An array covers whole
+        voxels, but its vectors or frames are in space. A field that already has a spacing keeps it. Default: voxels
+        are cubes of side 1.
 
     Returns
     -------
@@ -136,9 +138,9 @@ def as_field(
     Raises
     ------
     InvalidInput
-        If the value has another type, or other axes.
+        If the value has another type, or another number of axes.
     FileError
-        If a file is missing, damaged, or has no such array.
+        If a file is missing or damaged, or does not contain such an array.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Classes of the fields that a formula defines."""
+"""Classes of fields that are defined by formulas."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Wound(Field):
         at = (0.0,) * self.axes if self.centre is None else self.centre
         out = points[:, self.radial] - at[self.radial]
         along = points[:, self.tangential] - at[self.tangential]
-        # Use quotients and roots, because sines of angles could differ in the last bit between loops.
+        # Use quotients and roots, because sines of angles could differ in the last bit between vectorised loops.
         far = np.maximum(np.abs(out), np.abs(along))
         middle = far == 0
         far = np.where(middle, 1.0, far)
@@ -124,7 +124,7 @@ class Ramp(Field):
 
 
 def turn(degrees: float, first: int, second: int, axes: int) -> NDArray[np.float64]:
-    """Return the matrix that turns one axis towards another."""
+    """Return the matrix that rotates one axis towards another."""
     matrix = np.eye(axes)
     matrix[first, first] = matrix[second, second] = cos(radians(degrees))
     matrix[second, first] = sin(radians(degrees))

@@ -1,7 +1,7 @@
-"""Many small matrices at once, by formulas only: each result is independent of the other matrices.
+"""Operations on many small matrices at once, whose results do not depend on the other matrices of a call.
 
-All functions take float64 of shape (A, A, N), A = 2 or 3, so that ``m[i, j]`` is an array of numbers. Products,
-quotients and roots of single numbers are exact to the last bit at any position of an array. Loops of linear algebra
+All functions take float64 arrays of shape (A, A, N), A = 2 or 3, so that ``m[i, j]`` is an array of N numbers.
+Products, quotients and roots of single numbers have the same bits at any position of an array. Loops of linear algebra
 libraries do not guarantee this.
 """
 
@@ -48,7 +48,7 @@ def multiply(a: Matrices, b: Matrices) -> Matrices:
 
 
 def cofactors(m: Matrices) -> Matrices:
-    """Return the cofactors: the inverse is their transpose, divided by the determinant."""
+    """Return the cofactors. Their transpose, divided by the determinant, is the inverse."""
     out = np.empty_like(m)
     if len(m) == 2:
         out[0, 0], out[0, 1] = m[1, 1], -m[1, 0]

@@ -1,4 +1,4 @@
-"""Text form of fields, as the command line uses it."""
+"""Fields as texts, such as ``zigzag:period=64``, which the command line uses."""
 
 from __future__ import annotations
 
@@ -58,19 +58,20 @@ def parse(
     Parameters
     ----------
     text : str
-        ``name`` or ``name:key=value,key=value``. A centre is written ``16x24.5x0``. `names` lists the fields.
+        Text of the form ``name`` or ``name:key=value,key=value``. A centre is written ``16x24.5x0``. `names` lists the
+        fields.
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
     size : sequence of int, optional
         Size of the output. It sets parameters that are not given, as in `Field.over`.
     spacing : sequence of float, optional
-        Distances between voxels along planes, rows and columns. Places and lengths in the text are in its unit.
-        Default lengths are multiples of the smallest voxel side. Default: voxels are cubes of side 1.
+        Distances between voxels along planes, rows and columns. Places and lengths in the text are in the unit of
+        these distances. Default lengths are multiples of the smallest voxel side. Default: voxels are cubes of side 1.
 
     Returns
     -------
     Field
-        Field with this name.
+        Field that the text describes.
 
     Raises
     ------
@@ -110,7 +111,7 @@ def parse(
     elif axes != 3:
         raise InvalidInput(f"field: {name} is only available for volumes")
     if spacing is not None:
-        # Default lengths are in voxels.
+        # Convert default lengths from voxels to the unit of the spacing.
         unit, usual = min(as_distances(spacing, axes)), {"period": 32.0} | ({} if size else {"length": 128.0})
         options = {key: unit * length for key, length in usual.items() if key in allowed} | options
     try:

@@ -1,4 +1,4 @@
-"""Frame fields as arrows."""
+"""Draw a frame field as arrows."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Fields from samples: an array of any resolution, points, or a function.
 
-A mean of frames is not a frame: the mean of two rotations by plus and minus 30 degrees is 13 % too small. Each frame
-is therefore split into a rotation (or a mirrored one) and the logarithm of a stretch, F = R exp(L). Interpolated
-between samples, R is the rotation nearest to the mean of the R, and L is the mean of the L. Sizes are kept, and
-rotations without stretch stay so.
+Frames cannot be averaged directly, because the mean of two rotations by plus and minus 30 degrees is 13 % too small.
+Each frame is therefore split into a rotation R (possibly mirrored) and the logarithm L of a stretch, F = R exp(L). An
+interpolated R is the rotation nearest to the mean of the rotations, and an interpolated L is the mean of the
+logarithms. Sizes are therefore preserved, and an interpolation of rotations is a rotation.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from texrs.fields._field import Field, as_place, as_points, check_axes, refuse_f
 from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transpose_each
 
 MAX_FRAMES = 2**24
-"""Maximum number of frames in an array: 256 voxels a side."""
+"""Maximum number of frames in an array, which is a volume of 256 voxels a side."""
 MAX_POINTS = 4096
-"""Maximum number of points with frames. Every voxel uses all of them."""
+"""Maximum number of points with frames, because every voxel uses all of them."""
 
 _BLOCK = 2**14
-"""Number of frames that are split at a time."""
+"""Number of frames that are split into rotations and stretches at a time."""
 _FLATTEST = 0.02
 """Minimum determinant of a mean of rotations. Below it the nearest rotation is undefined."""
 
@@ -36,20 +36,21 @@ _FLATTEST = 0.02
 def from_array(
     frames: ArrayLike, extent: Sequence[int] | None = None, *, origin: Sequence[float] | None = None
 ) -> Field:
-    """Return a field that is sampled from an array of any resolution.
+    """Return a field that interpolates an array of frames of any resolution.
 
-    The array's cells divide the box of ``extent`` voxels from ``origin`` evenly. Each frame is at the middle of its
-    cell, which is exactly a voxel if the array has the box's resolution. Rotations and stretches are interpolated
-    linearly and separately between samples. Beyond the outermost samples the field is constant.
+    The array covers a box of ``extent`` voxels that begins at ``origin``. Its cells divide the box evenly, and each
+    frame is at the centre of its cell. If there is one frame for each voxel, frames are at the centres of voxels.
+    Rotations and stretches are interpolated linearly and separately between frames. Beyond the outermost frames the
+    field is constant.
 
     Parameters
     ----------
     frames : array_like
-        Shape (R, C, 2, 2) or (P, R, C, 3, 3), real numbers.
+        Frames of shape (R, C, 2, 2) or (P, R, C, 3, 3), real numbers.
     extent : sequence of int, optional
-        Voxels that the array covers. Default: one for each frame.
+        Size of the box that the array covers, in voxels. Default: one voxel for each frame.
     origin : sequence of float, optional
-        First voxel. Default: 0.
+        First voxel of the box. Default: 0.
 
     Returns
     -------
@@ -59,7 +60,7 @@ def from_array(
     Raises
     ------
     InvalidInput
-        If the array has another form, is singular somewhere, or is mirrored at some places only.
+        If the array has another shape, a frame is singular, or only some frames are mirrored.
 
     Examples
     --------
@@ -78,7 +79,10 @@ def from_array(
 def make_grid(
     frames: ArrayLike, extent: Sequence[int] | None, origin: Sequence[float] | None, *, opposed: bool = False
 ) -> Field:
-    """Return a field of an array of frames, as `from_array`."""
+    """Return the field of `from_array`.
+
+    If ``opposed``, the nearest frame is used where neighbouring frames are opposite.
+    """
     given = _as_numbers(frames, "frames")
     axes = given.shape[-1] if given.ndim else 0
     if axes not in (2, 3) or given.shape[-2:] != (axes, axes) or given.ndim != axes + 2 or given.size == 0:
@@ -99,11 +103,11 @@ def make_grid(
 
 
 def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
-    """Interpolate a smooth field through frames at points.
+    """Return a smooth field that interpolates frames at given points.
 
-    The weight of a point is the inverse fourth power of its distance. The field has the given frame at a given point,
-    follows the nearest points elsewhere, and approaches the mean of all far away. Rotations and stretches are averaged
-    separately.
+    The weight of a given point is the inverse fourth power of its distance. The field has the given frame at a given
+    point, follows the nearest points elsewhere, and approaches the mean of all frames far away. Rotations and
+    stretches are averaged separately.
 
     Parameters
     ----------
@@ -120,7 +124,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
     Raises
     ------
     InvalidInput
-        If arrays have other forms, two points are equal, a frame is singular, or only some are mirrored.
+        If an array has another shape, two points are equal, a frame is singular, or only some frames are mirrored.
 
     Examples
     --------
@@ -145,16 +149,16 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
 
 
 def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: int = 3) -> Field:
-    """Return a field that a function describes.
+    """Return a field whose frames a function computes.
 
     Parameters
     ----------
     function : callable
         Function of points (N, A), float64, that returns frames (N, A, A). The frame of a point must depend only on
-        this point, not on other points or earlier calls. A field can be pickled if its function can. Such a field has
-        no `Field.key`.
+        this point, not on other points or earlier calls. The field can be pickled if the function can. Its `Field.key`
+        is None.
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------
@@ -164,8 +168,8 @@ def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: in
     Raises
     ------
     InvalidInput
-        If it is not a function, or its result is not frames when the field is evaluated. Its own exceptions pass
-        through.
+        If the argument is not a function. Also when the field is evaluated, if the function fails or does not return
+        frames.
 
     Examples
     --------
@@ -193,9 +197,9 @@ class _Grid(Field):
     turns: Floats
     stretches: Floats | None
     opposed: bool = False
-    """Whether the nearest frame is used where surrounding frames are opposite, as around a vortex.
+    """If True, the nearest frame is used where surrounding frames are opposite, as around a vortex.
 
-    Otherwise this is refused.
+    If False, such a place raises an error.
     """
     _placed_in_voxels = True
 
@@ -214,7 +218,7 @@ class _Grid(Field):
             for a, (up, n) in enumerate(zip(corner, self.sides, strict=True)):
                 index = index * n + np.minimum(low[a] + up, n - 1)
                 weight = weight * (share[a] if up else 1 - share[a])
-            if not weight.any():  # Skip voxels on samples: adding zeros would not change a bit.
+            if not weight.any():  # Skip corners without weight: adding zeros would not change a bit.
                 continue
             turn += weight * self.turns[..., index]
             if stretch is not None and self.stretches is not None:
@@ -299,8 +303,8 @@ class _Function(Field):
 def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float64]]) -> tuple[Floats, Floats | None]:
     """Split frames (N, A, A) into rotations and logarithms of stretches.
 
-    The rotations are (A, A, N). The logarithms have the same shape, (N,) if each frame stretches all directions
-    equally, or are None if no frame stretches. They are float32, because a dense array of frames is large.
+    The rotations are (A, A, N). The logarithms have the same shape, or (N,) if each frame stretches all directions
+    equally, or are None if frames do not stretch. They are float32, because a dense array of frames is large.
     """
     count, axes = frames.shape[:2]
     turns, logs = (np.empty((axes, axes, count), np.float32) for _ in range(2))

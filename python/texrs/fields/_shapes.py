@@ -17,12 +17,12 @@ _WORDS = {"plane": "z", "row": "y", "column": "x"}
 
 
 def identity(axes: int = 3) -> Field:
-    """Return the field of textures in the orientation of their exemplar.
+    """Return the field that keeps the orientation and the scale of the exemplar.
 
     Parameters
     ----------
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def identity(axes: int = 3) -> Field:
 
 
 def constant(matrix: ArrayLike) -> Field:
-    """Return a field that is the same everywhere.
+    """Return the field with the same given frame everywhere.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def constant(matrix: ArrayLike) -> Field:
     Raises
     ------
     InvalidInput
-        If the matrix has another form or is singular.
+        If the matrix has another shape or is singular.
 
     Examples
     --------
@@ -81,12 +81,12 @@ def rotation(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
     Parameters
     ----------
     angle : float
-        Angle in degrees, -360 to 360. The first axis of ``plane`` turns towards the second.
+        Angle in degrees, -360 to 360. The first axis of ``plane`` turns towards the second. Default: 30.
     plane : str
         Two of "x" (columns), "y" (rows) and "z" (planes). A positive angle in "xy" is clockwise on the screen, where
-        rows grow downwards.
+        rows grow downwards. Default: "xy".
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------
@@ -117,9 +117,9 @@ def rotation_3d(angle: float = 30, angle2: float = 30) -> Field:
     Parameters
     ----------
     angle : float
-        Angle in xy in degrees, as in `rotation`, -360 to 360.
+        Angle in the plane xy in degrees, as in `rotation`, -360 to 360. Default: 30.
     angle2 : float
-        Angle in yz in degrees, applied afterwards, -360 to 360.
+        Angle in the plane yz in degrees, -360 to 360. This rotation is applied after the first. Default: 30.
 
     Returns
     -------
@@ -152,11 +152,11 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
     Parameters
     ----------
     amount : float
-        Steps along the first axis of ``plane`` for each step along the second, -9 to 9.
+        Steps along the first axis of ``plane`` for each step along the second, -9 to 9. Default: 0.5.
     plane : str
-        Two of "x", "y" and "z".
+        Two of "x", "y" and "z". Default: "xy".
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------
@@ -193,15 +193,16 @@ def circular(
     Parameters
     ----------
     axis : str
-        Axis of the circles: "x", "y" or "z". An image is wound round "z", which it does not have.
+        Axis of the circles: "x", "y" or "z". It is always "z" for an image, whose plane is perpendicular to it.
+        Default: "z".
     radial : str, optional
-        Axis r of the exemplar that points outwards; t is the remaining one. Default: the one after ``axis`` in x, y,
-        z, x: x is radial and y tangential round z.
+        Axis r of the exemplar that points outwards. The remaining axis is t. Default: the axis after ``axis`` in x, y,
+        z, x, so that x is radial and y is tangential round z.
     centre : sequence of float, optional
-        Point of the axis, (row, column) or (plane, row, column). Default: the middle of a bounded output (see
+        Point on the axis, (row, column) or (plane, row, column). Default: the middle of a bounded output (see
         `Field.over`), or the origin of an unbounded one.
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------
@@ -232,22 +233,23 @@ def spiral(
     centre: Sequence[float] | None = None,
     axes: int = 3,
 ) -> Field:
-    """Return the field of `circular`, rotated by an angle: circles become spirals.
+    """Return the field of `circular`, rotated by an angle, so that circles become spirals.
 
     Parameters
     ----------
     angle : float
         Angle in degrees between circles and spirals, -360 to 360. The spirals are logarithmic. The radial axis turns
-        towards the tangential one.
+        towards the tangential one. Default: 20.
     axis : str
-        Axis of the spirals: "x", "y" or "z". An image is wound round "z", which it does not have.
+        Axis of the spirals: "x", "y" or "z". It is always "z" for an image, whose plane is perpendicular to it.
+        Default: "z".
     radial : str, optional
-        Axis of the exemplar that points outwards at an angle of 0. Default: the one after ``axis`` in x, y, z, x.
+        Axis of the exemplar that points outwards at an angle of 0. Default: the axis after ``axis`` in x, y, z, x.
     centre : sequence of float, optional
-        Point of the axis, (row, column) or (plane, row, column). Default: the middle of a bounded output (see
+        Point on the axis, (row, column) or (plane, row, column). Default: the middle of a bounded output (see
         `Field.over`), or the origin of an unbounded one.
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------
@@ -274,21 +276,22 @@ def zigzag(
 ) -> Field:
     """Return the field that rotates the texture by an angle and by its opposite, in alternate bands.
 
-    Where floor(2 (p + 1/2) / period) along ``axis`` is even, the texture is rotated by ``angle``, elsewhere by
-    ``-angle``. Lines of the exemplar along ``axis`` become zigzags.
+    The texture is rotated by ``angle`` at points p where floor(2 (p + 1/2) / period) along ``axis`` is even, and by
+    ``-angle`` elsewhere. Lines of the exemplar along ``axis`` become zigzags.
 
     Parameters
     ----------
     period : float
-        Width of two bands, at least 2 voxels; in the unit of the spacing if one is given.
+        Width of two bands, at least 2 voxels. The unit is a voxel, or the unit of the spacing if one is given.
+        Default: 32.
     angle : float
-        Angle in degrees, as in `rotation`, -360 to 360.
+        Angle in degrees, as in `rotation`, -360 to 360. Default: 30.
     axis : str, optional
         Axis across the bands: "x", "y" or "z". Default: the first of ``plane``.
     plane : str
-        Plane of rotation: two of "x", "y" and "z", as in `rotation`.
+        Plane of rotation: two of "x", "y" and "z", as in `rotation`. Default: "xy".
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------
@@ -318,20 +321,20 @@ def scale_ramp(
 ) -> Field:
     """Return the field whose features grow along an axis.
 
-    Features are ``start`` times as large at 0 and ``stop`` times at ``length``. The factor grows exponentially
-    between, and is constant beyond.
+    Features are ``start`` times as large as in the exemplar at position 0, and ``stop`` times at ``length``. The
+    factor changes exponentially between these positions, and is constant beyond.
 
     Parameters
     ----------
     start, stop : float
-        Size of the features, from 1/8 to 8.
+        Size of the features relative to the exemplar, 1/8 to 8. Default: 1 and 2.
     axis : str
-        Axis of growth: "x", "y" or "z".
+        Axis of growth: "x", "y" or "z". Default: "x".
     length : float, optional
-        Length of the growth in voxels, or in the unit of the spacing if one is given; more than 0. Default: up to
-        the last voxel of a bounded output (see `Field.over`), or 128 for an unbounded one.
+        Length of the growth, above 0, in voxels or in the unit of the spacing if one is given. Default: up to the last
+        voxel of a bounded output (see `Field.over`), or 128 for an unbounded one.
     axes : int
-        Number of axes, 2 or 3.
+        Number of axes, 2 or 3. Default: 3.
 
     Returns
     -------

@@ -40,7 +40,7 @@ class Spaced(Field):
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         step = np.array(self.spacing)
-        # An array of frames covers voxels of any shape.
+        # An array of frames covers voxels of any shape, so its points stay in voxels.
         at = points if self.field._placed_in_voxels else points * step
         return np.asarray(self.field._frames(at) * (step / step[:, np.newaxis])[..., np.newaxis])
 
@@ -55,7 +55,10 @@ class Spaced(Field):
 
 
 def space(field: Field, spacing: Sequence[float] | None) -> Field:
-    """Return a field for voxels of a spacing. Cubes of side 1, and fields with a spacing, are returned unchanged."""
+    """Return a field for voxels with the given distances.
+
+    It is unchanged if they are 1, or if it already has a spacing.
+    """
     if isinstance(field, Spaced):
         return field
     steps = as_distances(spacing, field.axes)
@@ -64,10 +67,10 @@ def space(field: Field, spacing: Sequence[float] | None) -> Field:
 
 
 def find_distances(spacing: Sequence[float] | None, value: object, axes: int) -> Sequence[float] | None:
-    """Return the given distances between voxels, or else those that the file of a volume states, and report these.
+    """Return the given distances between voxels, or else the distances in the file of a volume, and report these.
 
-    The volume is a path, an array as `texrs.io.read_volume` returned it, or an exemplar made from one of them. None if
-    nothing is stated.
+    The volume is a path, an array that `texrs.io.read_volume` returned, or an exemplar of one of them. The result is
+    None if neither states distances.
     """
     if spacing is not None or axes != 3:
         return spacing
@@ -78,7 +81,7 @@ def find_distances(spacing: Sequence[float] | None, value: object, axes: int) ->
 
 
 def as_distances(spacing: Sequence[float] | None, axes: int) -> tuple[float, ...]:
-    """Check the distances between voxels along each axis; None is 1."""
+    """Return the checked distances between voxels along each axis. None means 1."""
     if spacing is None:
         return (1.0,) * axes
     given = as_tuple(spacing, "spacing", axes, f"{axes} numbers, {_AXES[axes - 2]}")
