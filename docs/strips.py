@@ -1,4 +1,4 @@
-"""Strips of images for the guides. Each strip shows an option at several settings, computed together with the pages."""
+"""Strips of images for the guides. Each strip shows the results of several values of one option."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ QUALITY = 82
 
 
 def several(values: list[Any], make: Callable[[Any], Picture]) -> list[tuple[str, Callable[[], Picture]]]:
-    """Return the caption of each image and the function that computes it."""
+    """Return the caption and the function of each image of a strip, one for each value of an option."""
     return [(str(value), lambda value=value: make(value)) for value in values]
 
 
@@ -47,12 +47,12 @@ def design() -> Iterator[Strip]:
     )
     yield (
         "weights",
-        "Share of each example in the result. The numbers are the share of pebbles.",
+        "Share of each example in the result, 0 to 1. The numbers are the share of the pebbles.",
         several([0.1, 0.3, 0.5, 0.7, 0.9], mix),
     )
     yield (
         "density",
-        "Share of the area that elements of the second example cover.",
+        "Share of the area that elements of the second example cover, 0 to 1.",
         several([0.05, 0.1, 0.2, 0.3, 0.4], scatter),
     )
 
@@ -76,17 +76,17 @@ def tile() -> Iterator[Strip]:
 
     yield (
         "overlap",
-        "Overlap of opposite borders, in pixels. The images show 2 x 2 copies.",
+        "Overlap of opposite borders, in pixels. The images show 2 x 2 copies of the tile.",
         several([8, 24, 48, 72, 96], cut),
     )
     yield (
         "wrap",
-        "Axes along which the result is periodic. The images show 2 x 2 copies.",
+        "Axes along which the result is periodic. The images show 2 x 2 copies of the result.",
         several(["none", "x", "y", "xy"], wrap),
     )
     yield (
         "size",
-        "Side of the tile, in pixels. A tile that is larger than the image (192) is a quilt of patches.",
+        "Side of the tile, in pixels. The image has a side of 192 pixels. A larger tile is composed of patches.",
         several([96, 144, 192, 288, 384], size),
     )
 
@@ -111,7 +111,7 @@ def inpaint() -> Iterator[Strip]:
     )
     yield (
         "method",
-        "`patch` copies patches. `optimise` corrects windows until each resembles a window of the image.",
+        "`patch` copies patches. `optimise` changes the hole until each of its windows resembles a window of the image.",
         several(["patch", "optimise"], lambda name: fill(method=name)),
     )
 
@@ -132,13 +132,13 @@ def splice() -> Iterator[Strip]:
 
     yield (
         "strength",
-        "Share of the way that elements move, from their own layout (0) to the other layout (1).",
+        "Strength of the change, from 0 (elements stay in their own layout) to 1 (elements are in the other layout).",
         several([0, 0.25, 0.5, 0.75, 1.0], part),
     )
-    yield ("layout_scale", "Scale of the layout.", several([0.7, 0.85, 1.0, 1.25, 1.5], scale))
+    yield ("layout_scale", "Scale factor of the layout.", several([0.7, 0.85, 1.0, 1.25, 1.5], scale))
     yield (
         "randomise",
-        "A step of `self_splice`. The numbers are its `amount`: the random displacement, in spacings of the elements.",
+        "A step of `self_splice`. The numbers are its `amount`: the random displacement, relative to the spacing of elements.",
         several([0, 0.1, 0.2, 0.3, 0.4], shake),
     )
 
@@ -159,7 +159,7 @@ def perspective() -> Iterator[Strip]:
 
     yield (
         "target",
-        "The plane that the texture lies on. The numbers are its slant, in degrees.",
+        "Plane that is covered with the texture. The numbers are its slant, in degrees.",
         several([0, 20, 35, 50, 60], slant),
     )
     yield ("direction", "Rotation of the texture, in degrees counter-clockwise.", several([0, 20, 45, 70, 90], turn))
@@ -179,17 +179,17 @@ def rectify() -> Iterator[Strip]:
 
     yield (
         "slant",
-        "Slant of the plane, in degrees. Here it is 50. With other values, elements become too long or too wide.",
+        "Slant of the plane, in degrees. Its correct value is 50. With other values, elements become too long or too wide.",
         several([30, 40, 50, 60, 70], lambda a: flatten(slant=a)),
     )
     yield (
         "tilt",
-        "Tilt of the plane, in degrees. Here it is 90. With other values, elements are sheared.",
+        "Tilt of the plane, in degrees. Its correct value is 90. With other values, elements are sheared.",
         several([50, 70, 90, 110, 130], lambda a: flatten(tilt=a)),
     )
     yield (
         "resolution",
-        "Pixels of the texture for one pixel in the middle of the photograph.",
+        "Resolution of the texture, relative to the resolution in the middle of the photograph.",
         several([0.35, 0.5, 0.7, 1.0, 1.4], lambda r: texrs.rectify(floor, resolution=r, seed=1).image),
     )
 
@@ -202,15 +202,19 @@ def solid() -> Iterator[Strip]:
 
     yield (
         "rotation:angle",
-        "Rotation in a plane, in degrees.",
+        "Rotation of the texture in a plane, in degrees.",
         several([0, 15, 30, 45, 60], lambda a: grow(f"rotation:angle={a}")),
     )
     yield (
         "scale_ramp:stop",
-        "Scale at the end of the ramp. At its beginning, the scale is 1.",
+        "Scale of the texture at the end of an axis. At the beginning of the axis, the scale is 1.",
         several([0.5, 0.75, 1.0, 1.5, 2.0], lambda s: grow(f"scale_ramp:axis=y,start=1,stop={s}")),
     )
-    yield ("shear", "Amount of shear.", several([0, 0.25, 0.5, 0.75, 1.0], lambda s: grow(f"shear:amount={s}")))
+    yield (
+        "shear",
+        "Shear of the texture. The numbers are its `amount`.",
+        several([0, 0.25, 0.5, 0.75, 1.0], lambda s: grow(f"shear:amount={s}")),
+    )
 
 
 def materials() -> Iterator[Strip]:
@@ -246,7 +250,7 @@ def materials() -> Iterator[Strip]:
     )
     yield (
         "mipmaps",
-        "Smaller copies of a map. The numbers count how often it is halved.",
+        "Smaller copies of a map. The number n means that the map has 1/2^n of its size.",
         several([0, 1, 2, 3, 4], shrink),
     )
 
@@ -274,11 +278,11 @@ def augment() -> Iterator[Strip]:
     def label(seed: int) -> Picture:
         return volume.label_to_color(texrs.transforms.TextureAugment()(buttons.image, buttons.labels, seed=seed).mask)
 
-    yield ("seed", "Each seed gives another image, with its boxes.", several([0, 1, 2, 3, 4], draw))
-    yield ("seed, with labels", "The labels of the same images.", several([0, 1, 2, 3, 4], label))
+    yield ("seed", "Each seed gives another image with other bounding boxes.", several([0, 1, 2, 3, 4], draw))
+    yield ("seed, with labels", "Labels of the images above.", several([0, 1, 2, 3, 4], label))
     yield (
         "min_visible",
-        "Smallest share of a box that a piece must show to have a box of its own.",
+        "Minimum share of a bounding box that a piece must show to get a bounding box.",
         several([0.1, 0.3, 0.5, 0.7, 0.95], lambda share: draw(3, share)),
     )
 
@@ -306,17 +310,17 @@ def source_map() -> Iterator[Strip]:
 
     yield (
         "screening",
-        "Weight of the values when seams are corrected. Here squares come from an example that is darker at the top.",
+        "Weight of the original values when seams are corrected. The example of the squares is darker at the top.",
         several(["none", 1.0, 0.15, 0.05, 0.01], blend),
     )
     yield (
         "interpolation",
-        "Interpolation between pixels of the example, which is enlarged 5x here.",
+        "Interpolation between pixels of the example. Here the example is enlarged 5x.",
         several(["nearest", "linear", "cubic"], lambda how: grown["large"].render(weave, interpolation=how)),
     )
     yield (
         "antialias",
-        "If True, the example is smoothed where it is shrunk. Here it is shrunk to 0.3.",
+        "If True, the example is smoothed where it is reduced in size. Here it is reduced to 0.3 of its size.",
         several([True, False], smooth),
     )
 
@@ -338,7 +342,7 @@ def batch() -> Iterator[Strip]:
         said = ", ".join(f"{name} = {value}" for name, value in options.items())
         yield (
             f"presets.{preset}",
-            f"{said}. The numbers are seeds.",
+            f"Options of this preset: {said}. The numbers are seeds.",
             several([0, 1, 2, 3, 4], lambda s, p=preset: make(s, p)),
         )
 
@@ -349,7 +353,7 @@ GUIDES = (design, tile, inpaint, splice, perspective, rectify, solid, materials,
 
 
 def write_strips(out: Path) -> None:
-    """Write the strips of each guide as a page to include, and their images. Pages newer than the package are kept."""
+    """Write the strips of each guide and their images. If a page is newer than the package, it is kept."""
     folder, pictures = out / "strips", out / "extra" / "strips"
     newest = max(f.stat().st_mtime for f in [Path(__file__), *Path(texrs.__file__).parent.rglob("*.py")])
     for guide in GUIDES:
