@@ -1,4 +1,4 @@
-"""Represent an exemplar: pixels, guidance channels, features, labels, periods, layers and scaled copies."""
+"""Represent an exemplar: its pixels, features, elements, lattice, colour layers and resized copies."""
 
 from texrs.exemplar._exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import Analysis

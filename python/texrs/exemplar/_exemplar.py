@@ -1,4 +1,4 @@
-"""Provide `Exemplar`, which computes each fact about an example on first use and caches it by content."""
+"""Provide `Exemplar`, which computes facts about an example on first use and caches them."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ CACHED = 256 << 20
 """Size of the cache of facts, which are keyed by content, in bytes. A larger fact is cached without any other."""
 _SMALL = 1 << 12
 _ANALYSED, _SAID = 256, 1 << 24
-"""Maximum size of a saved analysis in bytes per sample, and of the other parts of the file in bytes."""
+"""Maximum size of a saved analysis in bytes per sample, and maximum size of the other parts of the file in bytes."""
 
 
 class Exemplar:
@@ -88,7 +88,7 @@ class Exemplar:
 
     See Also
     --------
-    cached : How a further fact is added.
+    cached : The method that adds a fact.
 
     Examples
     --------
@@ -118,7 +118,7 @@ class Exemplar:
         self._facts: dict[Hashable, object] = {}
 
     def __repr__(self) -> str:
-        """Return a text with the size, the channels and the dtype."""
+        """Return a short description with the size, the channels and the dtype."""
         return f"<Exemplar of {measure(self._pixels, self._axes)}>"
 
     def _repr_png_(self) -> bytes:
@@ -180,16 +180,17 @@ class Exemplar:
 
     @property
     def repeat(self) -> tuple[bool, ...]:
-        """Axes along which the example is periodic: as given, or measured at each level of its pyramid."""
+        """Axes along which the example is periodic: as given, or measured at all levels of its pyramid."""
         return self.cached("repeat", lambda: self._measure(count_levels(self.shape, COARSEST)))
 
     def analyse(self, radii: Sequence[int] = (2,), coarsest: int = COARSEST) -> Analysis:
-        """Return the pyramid, with an appearance vector for the window of each sample.
+        """Return the pyramid of the exemplar, with an appearance vector for the window around each sample.
 
         Parameters
         ----------
         radii : sequence of int
-            Radius of the windows, 1 to 8, from the coarsest level on. The last radius is used for all further levels.
+            Radius of the windows at each level, from the coarsest on, in samples, 1 to 8. The last radius is used for
+            all further levels.
         coarsest : int
             Minimum side of the coarsest level, in samples.
 
@@ -230,18 +231,18 @@ class Exemplar:
         numbers: int = 8,
         progress: Callable[[float], object] | None = None,
     ) -> Similarity:
-        """Return the most similar samples of each sample of a level.
+        """Return the most similar samples for each sample of a level of the pyramid.
 
         Parameters
         ----------
         level : int
-            Level of the analysis with windows of radius 2. 0 is the coarsest, -1 the finest.
+            Level of the analysis with windows of radius 2: 0 is the coarsest, -1 the finest.
         coarsest : int
-            Minimum side of the coarsest level of that analysis, in samples.
+            Minimum side of the coarsest level of the analysis, in samples.
         k : int
             Number of similar samples per sample, 1 to 16.
         n : int
-            Side of the box around each chosen sample that excludes other choices, in samples. Must be odd.
+            Side of the box around each chosen sample, in samples. No other sample inside it is chosen. Must be odd.
         numbers : {8, 24}
             Number of leading components of the appearance vectors that are compared.
         progress : callable, optional
@@ -254,7 +255,7 @@ class Exemplar:
         Raises
         ------
         InvalidInput
-            The level does not exist, or it does not have ``k`` samples that far apart.
+            The level does not exist, or it does not contain ``k`` samples at this distance from each other.
         Cancelled
             The work was cancelled.
 
@@ -282,9 +283,9 @@ class Exemplar:
 
     @property
     def stitcher(self) -> Stitcher:
-        """The exemplar prepared for cutting patches, with its elements and the costs of neighbouring colours.
+        """The exemplar prepared for cutting patches: its elements, and the costs of neighbouring colours.
 
-        If the elements are uncertain, cuts through the elements that `segment` finds in an image cost more.
+        If the elements are uncertain, seams through the elements that `segment` finds in an image only cost more.
         """
         return self.cached("stitcher", self._make_stitcher)
 
@@ -298,9 +299,9 @@ class Exemplar:
 
     @property
     def anisotropy(self) -> float:
-        """Degree to which edges share one direction, or two at right angles, from 0 (none) to 1 (all).
+        """Share of the edges that agree in one direction, or in two at right angles, from 0 (none) to 1 (all).
 
-        For a volume, the largest value of its three middle planes.
+        For a volume, the largest value of its three middle slices.
         """
         if self._axes == 2:
             return self.cached("anisotropy", lambda: measure_direction(self.guidance))
@@ -344,7 +345,7 @@ class Exemplar:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle without large facts, which are computed again and cached by content."""
+        """Return the parts for a pickle, without large facts, which are computed again when needed."""
         small = {fact: value for fact, value in self._facts.items() if isinstance(value, bool | float | tuple)}
         return _restore, (self._image, self._axes, self._labels, self._repeat, small)
 
@@ -352,11 +353,11 @@ class Exemplar:
 
     @cached_property
     def key(self) -> str:
-        """Digest of the pixels and options. Exemplars with the same key have the same facts."""
+        """Digest of the pixels and the options. Exemplars with equal keys have equal facts."""
         return content_hash(self._pixels, self._axes, self._labels, self._repeat).hex()
 
     def cached(self, fact: Hashable, make: Callable[[], T]) -> T:
-        """Return a fact about the exemplar, computed on first use.
+        """Return a fact about the exemplar, which is computed on first use.
 
         The fact stays with the exemplar, and is cached for other exemplars with the same content while there is room.
         To add a fact, write a method that returns ``self.cached((name, *options), make)``. The options must include
@@ -365,9 +366,10 @@ class Exemplar:
         Parameters
         ----------
         fact : hashable
-            Key of the fact: a name and all options that it depends on.
+            Key of the fact: a name and all options that the fact depends on.
         make : callable
-            Function that computes the fact. If its result has ``nbytes``, this is its size in the cache.
+            Function that computes the fact. If the result has an attribute ``nbytes``, it counts as the size in the
+            cache.
 
         Returns
         -------
@@ -377,7 +379,7 @@ class Exemplar:
         Raises
         ------
         TypeError
-            The key is not hashable. Exceptions of ``make`` are passed on, and nothing is cached.
+            The key is not hashable. Exceptions from ``make`` are passed on, and nothing is cached.
 
         Examples
         --------
@@ -396,7 +398,7 @@ class Exemplar:
         return cast(T, self._facts[fact])
 
     def save(self, path: Path) -> None:
-        """Write the exemplar and its analysis to a .npz file.
+        """Write the exemplar and its analysis to a .npz file, which `load` reads.
 
         An existing file is replaced only after everything is written.
 
@@ -430,7 +432,7 @@ class Exemplar:
 
     @classmethod
     def load(cls, path: Path) -> Exemplar:
-        """Return the exemplar that `save` wrote, with its analysis.
+        """Read an exemplar, with its analysis, from a file that `save` wrote.
 
         Parameters
         ----------
@@ -460,7 +462,7 @@ class Exemplar:
         from texrs.io import read_arrays
 
         def choose(headers: Mapping[str, Header]) -> list[str]:
-            # Check the size before reading: an analysis takes tens of bytes per sample over all levels.
+            # Check the size before reading, because an analysis takes tens of bytes per sample over all levels.
             size = sum(header.size for name, header in headers.items() if "/" in name)
             if any(name not in headers for name in ("format", "image", "said")):
                 raise FileError(f"{path}: is not a saved exemplar")
@@ -509,16 +511,16 @@ def _restore(
 
 
 def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum: int = 1) -> Exemplar:
-    """Return an `Exemplar` unchanged, or make one from an array.
+    """Convert an argument to an `Exemplar`. An `Exemplar` is returned unchanged.
 
-    Every public function calls this for its first argument.
+    Every public function that synthesises calls this for its first argument.
 
     Parameters
     ----------
     value : Exemplar, array_like, path_like or PIL.Image.Image
         The argument from the user: an exemplar, or any value that `Exemplar` accepts.
     name : str
-        Name of the argument, for messages.
+        Name of the argument, for error messages.
     axes : int
         Required number of axes, 2 or 3.
     minimum : int
@@ -527,12 +529,12 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
     Returns
     -------
     Exemplar
-        The given exemplar, or a new one. Exemplars with equal pixels share their facts.
+        The given exemplar, or a new one. Exemplars with equal pixels and options share their facts.
 
     Raises
     ------
     InvalidInput
-        The exemplar has another number of axes, or the value is not an array or is too small.
+        The exemplar has another number of axes, or the value is not an array, or it is too small.
     FileError
         The path cannot be read.
 

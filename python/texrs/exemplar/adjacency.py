@@ -1,4 +1,4 @@
-"""Measure which colours of an exemplar are neighbours, and how surprising other pairs are."""
+"""Measure how often pairs of colours are neighbours in an exemplar, and how surprising each pair is."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from texrs._typing import Floats
 __all__ = ["Adjacency", "classify", "measure_adjacency"]
 
 CLASSES = 48
-"""Number of palette colours whose pairs are counted."""
+"""Maximum number of palette colours whose pairs are counted."""
 SAMPLES = 6000
 """Maximum number of samples for computing a palette."""
 MOST = 6.0
-"""Maximum surprise, in nats. Larger values are clipped to it."""
+"""Maximum surprise of a pair, in nats. Larger values are clipped, and costs are divided by it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Adjacency:
-    """Surprise of each pair of neighbouring colours.
+    """Costs of pairs of neighbouring colours: how surprising each pair is in the exemplar.
 
     Attributes
     ----------
     classes : uint8 array
         Class of the colour of each sample.
     costs : (K, K) float32
-        Negative pointwise mutual information of two neighbouring classes, scaled to [0, 1].
+        Negative pointwise mutual information of neighbouring classes, clipped and scaled to [0, 1].
 
     """
 
@@ -43,16 +43,16 @@ class Adjacency:
 
 
 def classify(colours: Floats, count: int) -> NDArray[np.uint8]:
-    """Return the colour class of each sample, from at most ``count`` k-means classes.
+    """Assign each sample to one of at most ``count`` colour classes (k-means).
 
-    ``colours`` is (..., C). If there are at most ``count`` colours, each is a class. The result does not depend on
-    chance.
+    ``colours`` is (..., C). If there are at most ``count`` colours, each of them is a class. The same colours always
+    give the same classes.
     """
     from scipy.cluster.vq import kmeans, vq
 
     flat = np.ascontiguousarray(colours.reshape(-1, colours.shape[-1]), np.float64)
     step = max(1, len(flat) // SAMPLES)
-    # Draw the samples at random places: regular places could coincide with a period of the texture.
+    # Choose the samples at random, because regular positions could coincide with a period of the texture.
     some = flat[np.random.default_rng(0).permutation(len(flat))[: len(flat) // step]]
     distinct = np.unique(some, axis=0)
     centres = distinct if len(distinct) <= count else kmeans(some, _spread(distinct, count))[0]
@@ -60,7 +60,7 @@ def classify(colours: Floats, count: int) -> NDArray[np.uint8]:
 
 
 def _spread(colours: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return colours that are far apart: each is the farthest from those chosen before."""
+    """Return ``count`` colours that are far apart. Each is the farthest from the colours chosen before."""
     chosen = [int(np.linalg.norm(colours - colours.mean(axis=0), axis=-1).argmin())]
     away = np.linalg.norm(colours - colours[chosen[0]], axis=-1)
     while len(chosen) < count:
@@ -70,7 +70,7 @@ def _spread(colours: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 
 
 def measure_adjacency(colours: Floats, wrap: Sequence[bool]) -> Adjacency:
-    """Count which colours are neighbours along the axes.
+    """Measure which colours are neighbours along the axes of an exemplar.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def measure_adjacency(colours: Floats, wrap: Sequence[bool]) -> Adjacency:
 
     Examples
     --------
-    A pair of equal colours in these stripes is as usual as any other that occurs.
+    A pair of equal colours in these stripes is as usual as any other pair that occurs.
 
     >>> import numpy as np
     >>> from texrs.exemplar.adjacency import measure_adjacency

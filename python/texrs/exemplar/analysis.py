@@ -18,19 +18,19 @@ from texrs.errors import InvalidInput
 __all__ = ["COARSEST", "Analysis", "analyse_colours", "are_labels", "code_colours", "count_levels", "measure_repeat"]
 
 COARSEST = 16
-"""Minimum side of the coarsest level. Below it, a window covers most of the exemplar."""
+"""Minimum side of the coarsest level, in samples. On smaller levels, a window would cover most of the exemplar."""
 SIMILAR = 1.25
 """Maximum ratio of the difference across the ends of a periodic axis to the difference of neighbours within it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
-    """An analysed exemplar.
+    """Pyramid of an exemplar with appearance vectors at each level.
 
     Attributes
     ----------
     levels : tuple of Appearance
-        Levels from the coarsest to the resolution of the exemplar. Each is twice as fine as the level before.
+        Levels from the coarsest to the resolution of the exemplar. Each has twice the resolution of the previous one.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Analysis:
         Raises
         ------
         InvalidInput
-            An array is missing, or the arrays do not belong together.
+            An array is missing, or the arrays do not match each other.
 
         Examples
         --------
@@ -105,7 +105,7 @@ class Analysis:
         """
         if not isinstance(arrays, Mapping) or not all(isinstance(name, str) for name in arrays):
             raise InvalidInput(f"arrays: must be a mapping of names to arrays, got {type(arrays).__name__}")
-        # A file stores a single number as an array with one value.
+        # Restore single numbers, which a file stores as arrays with one value.
         mine = {name: a.reshape(()) if a.size == 1 else a for name, a in arrays.items() if "/" in name}
         count = len({name.split("/")[0] for name in mine})
         if not count:
@@ -115,12 +115,12 @@ class Analysis:
 
 
 def count_levels(shape: Sequence[int], coarsest: int) -> int:
-    """Return the number of pyramid levels for a minimum side of the coarsest level."""
+    """Return the number of pyramid levels whose coarsest level has at least a given side."""
     return max(1, int(log2(max(1, min(shape) / coarsest))) + 1)
 
 
 def analyse_colours(seen: Floats, wrap: tuple[bool, ...], radii: Sequence[int], count: int) -> Analysis:
-    """Return an analysis of colours with a given number of levels."""
+    """Return the analysis of colours with a given number of levels."""
     pyramid, axes = [seen], len(wrap)
     for _ in range(count - 1):
         pyramid.append(halve(pyramid[-1], wrap, axes=axes))
@@ -131,17 +131,17 @@ def analyse_colours(seen: Floats, wrap: tuple[bool, ...], radii: Sequence[int], 
 
 
 def code_colours(image: Array, labels: bool | None = None) -> Floats:
-    """Return up to four channels, in [0, 1], for comparing windows of an exemplar.
+    """Return up to four channels, in [0, 1], for comparing the windows of an exemplar.
 
-    Colours count in proportion to their opacity. Classes become corners of a cube, which are all equally far apart or
-    nearly so. If there are more than four channels, the four principal components are used.
+    Colours are weighted by their opacity. Classes become corners of a cube, which are all about equally far apart. If
+    there are more than four channels, the four principal components are used.
     """
     if are_labels(image, labels):
         values, index = np.unique(image[..., 0], return_inverse=True)
         if len(values) > 4096:
             raise InvalidInput(f"labels: must have at most 4096 classes, got {len(values)}")
         if len(values) == 2:
-            code = np.array([[0], [1]], np.float32)  # A second channel would contain the same values.
+            code = np.array([[0], [1]], np.float32)  # With two classes, a second channel would contain the same values.
         elif len(values) <= 4:
             code = np.eye(len(values), dtype=np.float32)
         else:
@@ -165,11 +165,11 @@ def code_colours(image: Array, labels: bool | None = None) -> Floats:
 
 
 def are_labels(image: Array, labels: bool | None = None) -> bool:
-    """Return whether an exemplar contains classes instead of ordered values.
+    """Return True if the values of an exemplar are unordered classes.
 
-    By default this holds for one channel of integers or bool with 2 to 16 values.
+    By default, one channel of integers or bool with 2 to 16 values contains classes.
 
-    With so few values, interpolation would produce values that are not classes.
+    Interpolation between so few values would produce values that are not classes.
     """
     if labels is not None:
         if as_bool(labels, "labels") and image.shape[-1] != 1:
@@ -181,10 +181,10 @@ def are_labels(image: Array, labels: bool | None = None) -> bool:
 
 
 def measure_repeat(exemplar: object, *, axes: int, levels: int = 1) -> tuple[bool, ...]:
-    """Return the axes along which an exemplar is periodic, by comparing its opposite ends.
+    """Measure along which axes an exemplar is periodic, by comparing its opposite ends.
 
-    The ends of a periodic axis differ by at most 25 % more than neighbouring samples within it, at every level of the
-    pyramid. Its length must also be a multiple of the span of a sample of the coarsest level.
+    An axis is periodic if its ends differ by at most 25 % more than neighbouring samples inside, at every level of the
+    pyramid. Its length must also be a multiple of the span of one sample of the coarsest level.
 
     Examples
     --------

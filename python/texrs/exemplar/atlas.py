@@ -1,8 +1,8 @@
-"""Build an atlas: copies of an exemplar in several sizes in one array, analysed at every resolution.
+"""Build an atlas: resized copies of an exemplar in one array, analysed at several resolutions.
 
-If the elements of an exemplar have many sizes, only a small part of it has the scale that is needed at a point.
+If the elements of an exemplar have many sizes, only a small part of it has the scale that an output pixel requires.
 Enlarged and reduced copies provide more such parts. Each copy has its own scale map. Windows that cross the border of
-a copy, or touch an area that must not be copied, are barred.
+a copy, or touch an area that must not be copied, are excluded.
 """
 
 from __future__ import annotations
@@ -30,29 +30,29 @@ __all__ = ["LARGEST", "RADIUS", "SMALLEST", "Atlas", "AtlasLevel", "Copy", "code
 RADIUS = 2
 """Radius of a window, in samples."""
 NAT = 512
-"""Number of units per nat of scale in the 12 bits of a demand."""
+"""Units per nat of a logarithmic scale, stored in the 12-bit values that a demand compares."""
 STEP = 1.25
 """Ratio between successive sizes of copies."""
 SMALLEST, LARGEST = 1 / 8, 4.0
-"""Minimum and maximum size of a copy."""
+"""Minimum and maximum factor of a resized copy."""
 BARRED = 2047
-"""Fourth value of a demand at a barred sample. No output requests it."""
+"""Fourth value of a demand for excluded samples. No output requests it."""
 RESIZED = 0.1
 """Cost of taking a sample from a resized copy, relative to the cost of a scale error of the same ratio."""
 BAND = 1 << 15
-"""Number of places that are located at once."""
+"""Number of places that are processed at once, to limit memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class Copy:
-    """A part of the exemplar in another size.
+    """A resized copy of a part of the exemplar.
 
     Attributes
     ----------
     factor : (float, float)
-        Samples of the copy per sample of the exemplar, along rows and columns.
+        Number of samples of the copy per sample of the exemplar, along rows and columns.
     first : (int, int)
-        First sample of the part in the exemplar.
+        Row and column in the exemplar of the first sample of the part.
     origin, shape : (int, int)
         Position and size of the copy in the atlas.
     """
@@ -81,7 +81,7 @@ class AtlasLevel:
         Four values per sample: the logarithm of its scale, the logarithm of the size of its copy, 0, and 0 or
         `BARRED`.
     order : (any) uint32
-        Samples that are not barred, sorted by scale.
+        Indices of samples that are not excluded, sorted by scale.
 
     """
 
@@ -92,7 +92,7 @@ class AtlasLevel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Atlas:
-    """Copies of an exemplar, packed and analysed.
+    """Resized copies of an exemplar in one array, analysed at several resolutions.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Atlas:
     copies : tuple of Copy
         The copies. The first is the exemplar in its own size.
     levels : tuple of AtlasLevel
-        Levels, from the coarsest on.
+        The atlas at each resolution, the coarsest first.
 
     """
 
@@ -120,20 +120,20 @@ class Atlas:
         wanted: tuple[float, float] | None = None,
         known: Bools | None = None,
     ) -> Atlas:
-        """Return the atlas of an exemplar.
+        """Build the atlas of an exemplar.
 
         Parameters
         ----------
         colours : (H, W, C) float32
             Channels that guide decisions (`texrs.Exemplar.guidance`).
         scale : (H, W) float32, optional
-            Scale map of the exemplar. None if sizes are ignored.
+            Scale map of the exemplar. None if elements have one size.
         sizes : sequence of float
-            Sizes of the copies. The first is 1, the exemplar in its own size.
+            Factors of the copies. The first is 1, the exemplar in its own size.
         levels : int
             Number of resolutions.
         wanted : (float, float), optional
-            Minimum and maximum requested scale. Other copies than the first keep only the parts with such scales.
+            Minimum and maximum requested scale. Copies after the first are cropped to the parts with such scales.
         known : (H, W) bool, optional
             Samples that may be copied. Default: all.
         """
@@ -162,13 +162,13 @@ class Atlas:
 
     @property
     def usable(self) -> bool:
-        """True if every level has samples to copy from."""
+        """True if every level has samples that can be copied."""
         return all(level.order.size for level in self.levels)
 
     def locate(self, places: NDArray[np.int32]) -> tuple[NDArray[np.uint32], Floats]:
-        """Return the copy and the position in the exemplar of places in the atlas.
+        """Return the number of the copy, and the position in the exemplar, for places in the atlas.
 
-        Positions are in units of 1/4096 of a sample.
+        Places are in units of 1/4096 of a sample, positions in samples.
         """
         sample = places.reshape(-1, 2)
         which, found = np.zeros(len(sample), np.uint32), np.empty((len(sample), 2), np.float32)
@@ -188,7 +188,7 @@ class Atlas:
         return which, found
 
     def source(self, places: NDArray[np.int32], shape: tuple[int, ...]) -> SourceMap:
-        """Return the source map of places. Its labels identify the copies, its Jacobians contain their sizes."""
+        """Return the source map of an output. Labels are the numbers of the copies, and Jacobians contain their sizes."""
         which, at = self.locate(places)
         inverse = np.array([np.diag([1 / f for f in c.factor]) for c in self.copies], np.float32)
         frame = inverse if len(self.copies) > 1 else None
@@ -196,9 +196,9 @@ class Atlas:
 
 
 def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float]) -> tuple[float, ...]:
-    """Return sizes of copies, extended until they reach the minimum and maximum requested scale."""
+    """Return sizes of copies, extended so that the copies cover the minimum and maximum requested scale."""
     found = list(sizes)
-    # Use quantiles: requested scales at the ends should not depend only on the extremes of the exemplar.
+    # Use quantiles, because a few extreme scales of the exemplar would not provide enough samples.
     low, high = np.quantile(scale, [0.3, 0.7])
     while wanted[1] > max(found) * high and max(found) * STEP <= LARGEST:
         found.append(max(found) * STEP)
@@ -210,7 +210,7 @@ def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, flo
 def find_box(
     logs: Floats, factor: float, wanted: tuple[float, float] | None, least: int
 ) -> tuple[int, int, int, int] | None:
-    """Return the part of the exemplar that has requested scales when resized.
+    """Return the part of the exemplar that has requested scales when it is resized. None if there is none.
 
     The part is (first row, end row, first column, end column).
     """
@@ -235,7 +235,7 @@ def find_box(
 
 
 def pack(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block: int, gap: int = 0) -> tuple[Copy, ...]:
-    """Place copies on shelves, the highest first, with a minimum gap. The order of the copies stays."""
+    """Place copies on shelves, the highest first, with a minimum gap. Return them in the original order."""
     sizes = []
     for factor, box in parts:
         assert box is not None
@@ -257,7 +257,7 @@ def pack(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block:
 
 
 def measure(copies: Sequence[Copy], block: int) -> tuple[int, int]:
-    """Return the number of rows and columns that copies take, in whole blocks."""
+    """Return the number of rows and columns that packed copies take, rounded up to whole blocks."""
     ends = [[-(-(o + n) // block) * block for o, n in zip(c.origin, c.shape, strict=True)] for c in copies]
     return max(e[0] for e in ends), max(e[1] for e in ends)
 
@@ -265,7 +265,7 @@ def measure(copies: Sequence[Copy], block: int) -> tuple[int, int]:
 def fill_gaps(packed: Array, copies: Sequence[Copy], block: int) -> None:
     """Fill the gaps between copies with colours of the first copy.
 
-    A constant colour would count as texture.
+    A constant colour in the gaps would count as texture.
     """
     empty = np.ones(packed.shape[:2], bool)
     for copy in copies:
@@ -278,7 +278,7 @@ def fill_gaps(packed: Array, copies: Sequence[Copy], block: int) -> None:
 
 
 def resampling_matrix(n: int, m: int) -> csr_array:
-    """Return the matrix that resamples n samples to m by cubic convolution.
+    """Return the sparse matrix (m, n) that resamples n samples to m by cubic convolution.
 
     The kernel is widened if m is smaller than n.
     """
@@ -291,14 +291,14 @@ def resampling_matrix(n: int, m: int) -> csr_array:
     x = np.abs(taps - centre[:, np.newaxis]) / stretch
     weight = np.where(x < 1, (1.5 * x - 2.5) * x * x + 1, np.where(x < 2, ((-0.5 * x + 2.5) * x - 4) * x + 2, 0.0))
     weight /= weight.sum(axis=1, keepdims=True)
-    # Positions outside the ends use the last sample.
+    # Positions beyond the ends use the first or last sample.
     column = np.clip(taps, 0, n - 1).astype(np.intp)
     row = np.broadcast_to(np.arange(m)[:, np.newaxis], column.shape)
     return csr_array((weight.ravel().astype(np.float32), (row.ravel(), column.ravel())), shape=(m, n))
 
 
 def resize(colours: Floats, copy: Copy) -> Floats:
-    """Return the colours of a copy."""
+    """Return the colours of a copy, resampled from the exemplar."""
     ends = [f + round(n / k) for f, n, k in zip(copy.first, copy.shape, copy.factor, strict=True)]
     part = colours[copy.first[0] : ends[0], copy.first[1] : ends[1]]
     if copy.factor == (1.0, 1.0):
@@ -312,7 +312,7 @@ def resize(colours: Floats, copy: Copy) -> Floats:
 
 
 def pick_known(known: Bools, copy: Copy) -> Bools:
-    """Return which samples of a copy are computed from known samples only."""
+    """Return a mask of the samples of a copy that depend only on known samples of the exemplar."""
     from scipy import ndimage
 
     reach = [2 * max(1.0, 1 / f) for f in copy.factor]
@@ -329,7 +329,7 @@ def pick_known(known: Bools, copy: Copy) -> Bools:
 def code_values(
     copies: Sequence[Copy], logs: Floats, free: Bools, shape: tuple[int, ...], spacing: int
 ) -> NDArray[np.int16]:
-    """Return the values that a demand compares at the samples of a level."""
+    """Return the values of a level of the atlas that a demand compares, (samples * 4)."""
     from scipy import ndimage
 
     values = np.zeros((*shape, 4), np.int16)
@@ -356,7 +356,7 @@ def code_values(
 
 
 def sort_by_scale(values: NDArray[np.int16]) -> NDArray[np.uint32]:
-    """Return the samples that are not barred, sorted by scale."""
+    """Return the indices of samples that are not excluded, sorted by scale."""
     scale, barred = values[0::4], values[3::4] > 0
     if barred.all():
         return np.zeros(0, np.uint32)
@@ -365,5 +365,5 @@ def sort_by_scale(values: NDArray[np.int16]) -> NDArray[np.uint32]:
 
 
 def code_logs(logs: Array) -> NDArray[np.int16]:
-    """Return logarithms of scales in the 12 bits of a demand."""
+    """Convert natural logarithms of scales to the 12-bit values that a demand compares."""
     return np.asarray(np.clip(np.rint(logs * NAT), -2048, 2047), np.int16)

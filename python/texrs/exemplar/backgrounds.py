@@ -1,7 +1,7 @@
 """Choose the background among the layers of an exemplar, and the layers that contain elements.
 
-Each layer is tried as the background, and the one that leaves the most convincing elements is used. Layers are added
-as long as they yield more elements of the same size. Smooth areas on a background of fine grain are added in the same
+Each layer is tried as the background, and the layer that leaves the most convincing elements is chosen. Layers are
+added while this gives more elements of the same size. Smooth areas on a background of fine grain are added in the same
 way.
 """
 
@@ -21,33 +21,35 @@ from texrs.exemplar.layers import Regions, mark_smooth
 __all__ = ["USUAL_LAYERS", "Features", "find_foreground"]
 
 LEAST_COVERED, LARGEST, SPREAD = 0.05, 0.25, 1.6
-"""Minimum share of the image that elements cover; maximum share for one element; maximum ratio of the standard
-deviation of areas to their mean.
+"""Minimum share of the image that elements cover, and maximum share for one element.
+
+The last value is the maximum standard deviation of areas, relative to their mean.
 """
 WHOLE, INSIDE, OUTSIDE, HEAP = 0.79, 1.6, 1.5, 0.6
 """Minimum solidity; minimum ratio of the contrast across outlines to the contrast inside; minimum ratio to the
 contrast of the background.
 
-The last is not required for a heap, whose elements cover at least `HEAP` of the image and whose background is gaps.
+The last value is the share of the image above which elements form a heap. The background of a heap is only gaps, so
+the contrast of the background is not compared.
 """
 CONVINCING = 0.83
-"""Score of elements that ends the search for a background."""
+"""Score of elements above which no other background is tried."""
 USUAL_LAYERS, MOST_LAYERS = 2, 4
-"""Default number of layers, and maximum number of layers that are chosen automatically."""
+"""Default number of layers, and maximum number that is chosen automatically."""
 APART, CLEARLY, SAME_SIZE = 0.45, 1.15, 0.6
-"""Maximum coverage of separate elements.
+"""Maximum share of the image that separate elements cover.
 
-Minimum factor of increase in coverage that justifies further layers. Minimum ratio of median areas of elements of the
-same size.
+Minimum factor of increase in coverage for further layers. Minimum ratio between the median areas of the new
+and the previous elements.
 """
 SMOOTH_GROUND = 0.6
-"""Maximum share of smooth pixels in a background of fine grain."""
+"""Maximum share of smooth pixels in the background if it has fine grain."""
 
 
 def find_foreground(
     rgb: Floats, regions: Regions, layers: int | None, watch: Callable[[], object]
 ) -> tuple[Labels, Labels, str]:
-    """Find the layers of an image and the elements in them.
+    """Find the colour layers of an image, and the elements in them.
 
     Parameters
     ----------
@@ -56,9 +58,9 @@ def find_foreground(
     regions : Regions
         Regions of one colour in the image.
     layers : int, optional
-        Number of layers. Default: chosen by the elements that they yield.
+        Number of layers. Default: chosen by the number of elements that they contain.
     watch : callable
-        Function that is called during the work.
+        Function that is called during the work without arguments.
 
     Returns
     -------
@@ -81,27 +83,27 @@ def find_foreground(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """Creases and contrasts, which serve to find elements in layers."""
+    """Depth of creases and contrast at each pixel, for finding elements in layers."""
 
     crease: Floats
     contrast: Floats
 
     @classmethod
     def of(cls, rgb: Floats) -> Features:
-        """Measure an image, (H, W, 3) in [0, 1]."""
+        """Measure creases and contrast in an image, (H, W, 3) in [0, 1]."""
         lab = to_lab(rgb)
         return cls(measure_creases(lab), measure_contrast(lab))
 
     def find(self, layers: Labels) -> tuple[Labels, Evidence]:
-        """Find the elements of the layers above 0, and the evidence for them."""
+        """Return the elements of the layers above 0, and the evidence for them."""
         found = find_elements(layers, self.crease)
         return found, weigh_evidence(found, self.crease, self.contrast)
 
 
 def choose_background(layers: Labels, features: Features, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
-    """Move the layer that leaves the most convincing elements to the front, as the background.
+    """Choose the layer that leaves the most convincing elements as the background, and make it layer 0.
 
-    Returns the layers, the elements, and the reason why the elements cannot be trusted (empty if they can).
+    Return the layers, the elements, and the reason why the elements cannot be trusted (empty if they can).
     """
     best: tuple[float, Labels, Labels, str] | None = None
     for background in range(int(layers.max()) + 1):
@@ -122,7 +124,7 @@ def choose_background(layers: Labels, features: Features, watch: Callable[[], ob
 def add_layers(
     regions: Regions, features: Features, layers: Labels, elements: Labels, fault: str, watch: Callable[[], object]
 ) -> tuple[Labels, Labels, str]:
-    """Add layers while they yield clearly more separate elements of the same size.
+    """Add layers while these give clearly more separate elements of the same size.
 
     Two layers find the light stones on a dark background, but not the stones that are as dark as the background.
     """
@@ -139,9 +141,9 @@ def add_layers(
 
 
 def add_smooth(rgb: Floats, features: Features, layers: Labels, elements: Labels) -> tuple[Labels, Labels] | None:
-    """Add smooth areas on a background of fine grain, such as stones as dark as their sand.
+    """Add smooth areas on a background of fine grain as elements, such as stones as dark as their sand.
 
-    Returns None if this does not yield clearly more elements.
+    Return None if this does not give clearly more elements.
     """
     smooth = mark_smooth(rgb)
     # In an image without grain, everything except outlines is smooth.
@@ -155,7 +157,7 @@ def add_smooth(rgb: Floats, features: Features, layers: Labels, elements: Labels
 
 
 def find_fault(evidence: Evidence) -> str:
-    """Return the reason why elements cannot be trusted. Empty if they can."""
+    """Return the reason why elements cannot be trusted, or an empty text if they can."""
     e = evidence
     if e.covered < LEAST_COVERED:
         return f"elements cover {e.covered:.0%} of the image, less than {LEAST_COVERED:.0%}"

@@ -1,9 +1,9 @@
 """Find the cells of a connected texture: bricks in mortar, stones between gaps, honeycomb, scales.
 
-Joints are lines that are darker or lighter than the cells between them. Their polarity and spacing are unknown, so
-each polarity is tried at several sizes. The best tessellation has closed joints, and cells that are free of joints,
-solid and of one size. Each tessellation starts with too many cells. Neighbours are then joined unless the joint
-between them, their common shape, or the usual size of cells supports two cells.
+Joints are lines that are darker or lighter than the cells between them. Neither is known in advance, nor is the size
+of cells, so dark and light joints are tried with several sizes. The best tessellation has closed joints, and solid
+cells of one size without joints inside. Each tessellation starts with too many cells. Neighbours are then merged
+unless the joint between them, their common shape, or the usual size of cells supports two cells.
 """
 
 from __future__ import annotations
@@ -27,38 +27,38 @@ from texrs.exemplar.shapes import Shapes, mark_outlines, widen
 __all__ = ["Cells", "find_cells", "take_cells"]
 
 WORKING = 22.0
-"""Working width of a cell, in pixels. Images with larger cells are reduced to it."""
+"""Width of a cell at the working resolution, in pixels. Images with larger cells are reduced."""
 SIZES, STEP = (7.0, 0.4), 1.4
 """Cell widths that are tried: minimum in pixels, maximum as a share of the shorter side, and ratio between successive
 widths.
 """
 RADII = (0.14, 0.28)
-"""Radii of the closings that detect joints, in cell widths."""
+"""Radii of the morphological closings that detect joints, in cell widths."""
 JOINT = 82.0
-"""Percentile of the joint strength above which a pixel is initially a joint."""
+"""Percentile of the joint strength above which pixels are first taken as joints."""
 PARTS = 0.42
-"""Minimum strength of a joint that separates cells, as a position between the 40th and the 90th percentile."""
+"""Minimum strength of a joint that separates cells, as a fraction of the range from the 40th to the 90th percentile."""
 BASIN = 0.09
-"""Minimum height between two basins of the distance to joints for two cells, in cell widths."""
+"""Minimum height between two basins of the distance map that become two cells, in cell widths."""
 FRAGMENT = 0.15
-"""Share of the usual area below which a cell joins the neighbour with the weakest joint between them."""
+"""Share of the usual area below which a part is merged with the neighbour behind the weakest joint."""
 FEWEST = 4
-"""Minimum number of cells for an estimate of their size."""
+"""Minimum number of cells for estimating their size."""
 NEAR = (-0.75, 0.0, 0.75)
-"""Ratios to a given width that are tried."""
+"""Sizes that are tried around a given width, as exponents of the step between sizes."""
 CLEAR, SPREAD = 0.2, 0.2
-"""Minimum distance from an outline, in cell widths, where a cell should be free of joints.
+"""Minimum distance from the outline, in cell widths, of the inner part of a cell that should be free of joints.
 
-Maximum standard deviation of the logarithm of areas of equally large cells.
+Standard deviation of the logarithm of areas below which cells count as equally large.
 """
 EVEN, WIDTH = 0.38, 0.04
-"""Score of a texture that is equally likely to have cells or not, and score difference for odds of 2.7 to 1. A higher
-score was measured for 17 of 19 textures with cells, and for 0 of 12 without. The values were chosen on these
-same textures. The values were chosen on these same
-textures.
+"""Score of a texture that is equally likely to have cells or not, and score difference for odds of 2.7 to 1.
+
+A higher score was measured for 17 of 19 textures with cells, and for 0 of 12 without. The values were chosen on these
+same textures.
 """
 SURE, FINE = 0.15, 0.3
-"""Minimum distance from an outline, in cell widths, where a pixel keeps its cell at full resolution.
+"""Minimum distance from the outline, in cell widths, where pixels keep their cell at full resolution.
 
 Weight of the full-resolution lightness relative to the joint strength.
 """
@@ -66,14 +66,14 @@ Weight of the full-resolution lightness relative to the joint strength.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
-    """The cells of a texture, each an instance with its own outline.
+    """Cells of a texture, each with its own outline.
 
     Attributes
     ----------
     labels : (H, W) int32
         Cell of each pixel, from 1. Joints are divided among the adjacent cells, so that every pixel has a cell.
     outlines : (n, P, 2) float64
-        Outline of each cell as equally spaced points (row, column). Row n - 1 belongs to cell n.
+        Outline of each cell as P equally spaced points (row, column). Index n - 1 belongs to cell n.
     centre : (n, 2) float64
         Centroids of the outlines.
     area : (n,) float64
@@ -83,7 +83,7 @@ class Cells:
     whole : (n,) bool
         True if no border of the image cuts the cell.
     certain : (n,) float64
-        Certainty of each cell, 0 to 1: closedness of its joints times absence of joints inside.
+        Certainty of each cell, 0 to 1: how well its joints close, times how free of joints it is inside.
     joints : (H, W) float32
         Joint strength: 0 inside cells, about 1 in joints.
     confidence : float
@@ -115,9 +115,9 @@ class Cells:
     def size(self) -> float:
         """Side of a square with the median area of cells, in pixels.
 
-        Only whole cells count. Borders cut large cells more often. Each cell is therefore weighted by the inverse
-        probability that a cell of its size is whole in the image (Miles and Lantuéjoul). If too few cells are whole,
-        the median of the larger half is used.
+        Only cells that no border cuts are used. Borders cut large cells more often. Each cell is therefore weighted by
+        the inverse probability that a cell of its size is uncut (Miles and Lantuéjoul). If there are too few uncut
+        cells, the median of the larger half of all cells is used.
         """
         if np.count_nonzero(self.whole) < FEWEST:
             return float(np.sqrt(np.quantile(self.area, 0.75)))
@@ -135,7 +135,7 @@ class Cells:
 
 
 class _Tessellation(NamedTuple):
-    """Cells for one size and polarity, at the working resolution."""
+    """Cells found with one size and one polarity of joints, at the working resolution."""
 
     labels: Labels
     relief: Floats
@@ -158,7 +158,7 @@ def find_cells(
     size : float, optional
         Approximate width of a cell across its shorter axis, in pixels. Default: estimated.
     joints : (H, W) array of bool, optional
-        Mask of known joints. It provides one more tessellation to choose from.
+        Mask of known joints. It gives one additional tessellation to choose from.
     progress : callable, optional
         Function that is called as ``progress("cells", share)``. An exception from it stops the work.
 
@@ -207,7 +207,7 @@ def find_cells(
 
 
 def take_cells(labels: Labels, image: object) -> Cells:
-    """Make `Cells` from known cells, independent of the colours.
+    """Create `Cells` from a label image of known cells.
 
     Parameters
     ----------
@@ -215,12 +215,12 @@ def take_cells(labels: Labels, image: object) -> Cells:
         Cell of each pixel, from 1, with consecutive numbers; 0 in joints, which the adjacent cells share. If cells
         touch, their outlines are the joints.
     image : (H, W) or (H, W, C) array
-        Texture, which decides whether joints are darker or lighter.
+        Texture, for measuring whether joints are darker or lighter.
 
     Returns
     -------
     Cells
-        The cells, with confidence 1 and each certain.
+        The cells, with a confidence of 1.
 
     Examples
     --------
@@ -245,9 +245,9 @@ def take_cells(labels: Labels, image: object) -> Cells:
 
 
 def _project(lab: Floats, joints: Bools) -> Floats:
-    """Return the linear combination of colours that separates joints best (Fisher).
+    """Return one channel that separates joints from cells best: a linear combination of colours (Fisher).
 
-    It is higher in joints.
+    Its values are higher in joints.
     """
     inside, outside = lab[joints].astype(np.float64), lab[~joints].astype(np.float64)
     within = (np.cov(inside.T, bias=True) * len(inside) + np.cov(outside.T, bias=True) * len(outside)) / lab[
@@ -267,7 +267,7 @@ def _list_sizes(shape: tuple[int, ...]) -> list[float]:
 
 
 def _tessellate(light: Floats, size: float, polarity: int) -> _Tessellation:
-    """Find cells of about one width between joints that are dark (-1) or light (1)."""
+    """Find cells of about one width, between dark joints (polarity -1) or light joints (1)."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter, label
     from skimage.morphology import h_minima
     from skimage.segmentation import watershed
@@ -289,7 +289,7 @@ def _tessellate(light: Floats, size: float, polarity: int) -> _Tessellation:
 
 
 def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
-    """Use the connected areas between known joints as cells, which share the joints."""
+    """Use the connected areas between known joints as cells, and divide the joints between them."""
     from scipy.ndimage import distance_transform_edt, label
     from skimage.segmentation import watershed
 
@@ -300,7 +300,7 @@ def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
     _, pieces = np.unique(pieces, return_inverse=True)
     away = distance_transform_edt(pieces == 0)
     labels = watershed(away, pieces.reshape(joints.shape)).astype(np.int32)
-    # A known joint must also look like one, because masks are often made only from colours.
+    # Measure the joint strength in the image as well, because masks are often made from colours only.
     width = float(np.sqrt(usual))
     shrink = min(1.0, WORKING / width)
     relief = _measure_relief(-_shrink(seen, shrink), width * shrink)
@@ -308,7 +308,7 @@ def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
 
 
 def _find_threshold(relief: Floats) -> float:
-    """Return twice the minimum strength of a joint that separates cells."""
+    """Return twice the joint strength that separates cells, so that 0.5 is the threshold after division by it."""
     low, high = np.percentile(relief, (40, 90))
     return max(2 * float(low + PARTS * (high - low)), 1e-6)
 
@@ -327,9 +327,9 @@ def _resize(values: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 def _measure_relief(light: Floats, width: float) -> Floats:
-    """Return how strongly each pixel looks like a dark joint.
+    """Return how strongly each pixel looks like a dark joint, at least 0.
 
-    The strength adds the fill of closings to the darkness of a pixel relative to its surroundings.
+    The strength is the sum of the change by morphological closings, and the darkness relative to the surroundings.
     """
     from scipy.ndimage import gaussian_filter, grey_closing
     from skimage.morphology import disk
@@ -346,13 +346,13 @@ def _measure_relief(light: Floats, width: float) -> Floats:
 
 
 def _judge(labels: Labels, relief: Floats, width: float, polarity: int) -> _Tessellation:
-    """Score a tessellation by closed joints, cells free of joints, solidity and equal areas."""
+    """Rate a tessellation by closed joints, cells without joints inside, solid cells and equal areas."""
     from scipy.ndimage import distance_transform_edt
 
     count = int(labels.max())
     outline = mark_outlines(labels)
     ridge = widen(relief) > 0.5
-    # Subtract the share of the outline that random lines would meet.
+    # Subtract the share of an outline that would be on joints by chance.
     chance = min(0.9, float(ridge.mean()))
     closed = np.clip((_average(ridge, labels, outline, count) - chance) / (1 - chance), 0, 1)
     clean = 1 - _average(relief > 0.5, labels, distance_transform_edt(~outline) > CLEAR * width, count)
@@ -368,7 +368,7 @@ def _judge(labels: Labels, relief: Floats, width: float, polarity: int) -> _Tess
 
 
 def _average(values: Array, labels: Labels, where: Bools, count: int) -> NDArray[np.float64]:
-    """Return the mean of values over some pixels of each label. 0 if a label has none."""
+    """Return the mean of values over the selected pixels of each label. 0 if none is selected."""
     chosen = labels[where]
     number = np.bincount(chosen, minlength=count + 1)[1:]
     return np.asarray(np.bincount(chosen, values[where], count + 1)[1:] / np.maximum(number, 1))
@@ -390,7 +390,7 @@ def _mark_whole(labels: Labels) -> Bools:
 
 
 def _measure(found: _Tessellation, light: Floats) -> Cells:
-    """Draw the cells at full resolution and measure them."""
+    """Compute the cells at full resolution and their measures."""
     labels, relief = (found.labels, found.relief) if found.labels.shape == light.shape else _enlarge(found, light)
     outlines = trace(labels, np.arange(1, int(labels.max()) + 1))
     moments = measure_moments(outlines)
@@ -409,13 +409,13 @@ def _measure(found: _Tessellation, light: Floats) -> Cells:
 
 
 def _compare(light: Floats, relief: Floats) -> int:
-    """Return -1 if joints are darker than the other pixels, or 1 if they are lighter."""
+    """Return 1 if joints are lighter than the other pixels, else -1."""
     joint = relief > 0.5
     return 1 if joint.any() and not joint.all() and light[joint].mean() > light[~joint].mean() else -1
 
 
 def _enlarge(found: _Tessellation, light: Floats) -> tuple[Labels, Floats]:
-    """Return the labels and the joint strength at full resolution.
+    """Return the labels and the joint strength of a tessellation at full resolution.
 
     The borders of labels follow the ridges of the joints.
     """
@@ -424,7 +424,7 @@ def _enlarge(found: _Tessellation, light: Floats) -> tuple[Labels, Floats]:
 
     depth = distance_transform_edt(~mark_outlines(found.labels))
     seeds = np.where(depth > SURE * found.width, found.labels, 0)
-    # Every cell keeps a seed: a narrow cell keeps its deepest pixels.
+    # Keep at least the deepest pixels of each cell as a seed, so that narrow cells do not vanish.
     peak = np.zeros(int(found.labels.max()) + 1)
     np.maximum.at(peak, found.labels.ravel(), depth.ravel())
     seeds = np.where(depth >= 0.7 * peak[found.labels], found.labels, seeds)

@@ -1,4 +1,4 @@
-"""Trace outlines of labels as closed polygons of equally many points, and measure them."""
+"""Trace the outlines of labels as closed polygons with a fixed number of points, and measure them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SMOOTH = 1.0
 
 
 class Moments(NamedTuple):
-    """Areas, centroids, directions and elongations of polygons.
+    """Area, centroid, direction and elongation of polygons.
 
     Attributes
     ----------
@@ -47,12 +47,12 @@ def trace(labels: Labels, numbers: NDArray[np.integer], *, smooth: float = SMOOT
     Parameters
     ----------
     labels : (H, W) int32
-        Label image. Pixels outside the image belong to no label.
+        Label image. Pixels outside the image have no label.
     numbers : (n,) int
-        Labels to trace. Each must exist.
+        Labels to trace. Each must occur in the image.
     smooth : float
-        Standard deviation of the Gaussian that smooths the steps of pixels, in pixels. Reduced for a label that would
-        vanish.
+        Standard deviation of the Gaussian that smooths the steps of pixels, in pixels. It is reduced for labels that
+        would vanish.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def trace(labels: Labels, numbers: NDArray[np.integer], *, smooth: float = SMOOT
 def paint(polygons: Polygons, shape: tuple[int, ...]) -> Labels:
     """Return the number of the polygon that contains each pixel, from 1.
 
-    Pixels in no polygon, or in several, are 0.
+    Pixels in no polygon or in several polygons are 0.
     """
     from skimage.draw import polygon
 
@@ -140,9 +140,9 @@ def measure_moments(polygons: Polygons) -> Moments:
 
 
 def measure_profiles(polygons: Polygons, centres: Polygons, rays: int) -> NDArray[np.float64]:
-    """Return the distance from centre to outline along equally spaced rays, (n, rays).
+    """Return the distances from the centre to the outline along equally spaced rays, (n, rays).
 
-    The first ray is the column axis.
+    The first ray points along the column axis.
     """
     away = polygons - centres[:, None]
     turn = np.arctan2(away[..., 0], away[..., 1])

@@ -1,7 +1,7 @@
-"""Find courses: the rows of a wall, a parquet or a hem, of any height, without vertical alignment.
+"""Find courses: rows of elements, as in a wall, a parquet or a hem, whose heights can differ.
 
-Elements in courses need not repeat: each course has its own height, and its elements begin anywhere. Only the joints
-between courses cross the whole image. They are straight, thin, and look the same along their length.
+Elements in courses do not have to repeat: each course has its own height, and its elements can start anywhere. Only
+the joints between courses cross the whole image. They are straight and thin, and look the same along their length.
 """
 
 from __future__ import annotations
@@ -21,43 +21,43 @@ from texrs.source_map import SourceMap
 __all__ = ["Courses", "find_courses"]
 
 STRIPS = 24
-"""Number of strips across the courses that are compared."""
+"""Number of strips, across the courses, into which an image is divided for comparison."""
 STEEPEST, SLOPES = 0.15, (41, 21)
-"""Maximum slope of courses that are levelled, in rows per column; and the numbers of slopes that are tried, first
-coarsely, then finely.
+"""Maximum slope of courses, in rows per column, and numbers of slopes that are tried, first coarsely, then finely.
 """
 AGREE = 0.6
-"""Minimum share of the brightness gradient across courses that all strips have in common.
+"""Minimum share of the brightness gradient across courses that is common to all strips.
 
 Textures without courses have 0.05 to 0.25, denim 0.46, walls 0.9.
 """
 CLEAR = 0.4
-"""Minimum strength of a joint, relative to the strongest joints; and in a strip, relative to the mean strength of the
-joint.
+"""Minimum strength of a joint relative to the strongest joints.
+
+The minimum in a single strip is relative to the mean strength of the joint.
 """
 THROUGH, MOST = 0.8, 0.75
-"""Minimum share of strips that a joint crosses, and minimum share of prominent lines that are such joints."""
+"""Minimum share of strips that a joint crosses. Minimum share of the prominent lines that are such joints."""
 FEWEST, LEAST = 4, 6.0
-"""Minimum number of courses in a wall, and minimum height of a course in pixels."""
+"""Minimum number of courses, and minimum height of a course in pixels."""
 GAIN = 0.15
-"""Minimum gain in correlation at lattice points over other places of the same course that proves a lattice.
+"""Minimum difference between the correlation at lattice points and along the same courses that proves a lattice.
 """
 PARTS = 2.0**4
-"""Number of parts of a pixel to which joints are rounded, so that they are the same on every processor."""
+"""Number of steps per pixel to which joints are rounded, so that they are the same on every processor."""
 
 
 @dataclass(frozen=True, slots=True)
 class Courses:
-    """The courses of an exemplar.
+    """Courses of an exemplar.
 
     Attributes
     ----------
     axis : int
-        Axis across the courses: 0 for level courses, 1 for upright ones.
+        Axis across the courses: 0 for horizontal courses, 1 for vertical ones.
     slope : float
-        Slope of the courses: pixels along `axis` per pixel along the other axis.
+        Slope of the courses, in pixels along `axis` per pixel along the other axis.
     joints : tuple of float
-        Joints between courses, in pixels along `axis`, in the levelled exemplar.
+        Positions of the joints between courses, in pixels along `axis`, after levelling the exemplar.
 
     """
 
@@ -78,19 +78,19 @@ class Courses:
         return np.diff(self.joints)
 
     def level(self, shape: tuple[int, ...]) -> SourceMap:
-        """Return the source map that rotates an exemplar of a given shape until its courses are level."""
+        """Return the source map that levels the courses of an exemplar by a rotation."""
         return bend(shape, turn(self.slope, self.axis)) if self.slope else SourceMap.identity(shape)
 
 
 def turn(slope: float, axis: int) -> NDArray[np.float64]:
-    """Return the rotation of (row, column) that levels courses of a given slope."""
+    """Return the rotation matrix of (row, column) that levels courses of a given slope."""
     cosine = 1 / np.hypot(1, slope)
     sine = slope * cosine * (1 if axis == 0 else -1)
     return np.rint(np.array([[cosine, -sine], [sine, cosine]]) * FRACTIONS) / FRACTIONS
 
 
 def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
-    """Find the courses of an image. None if the image also repeats along them, on a lattice."""
+    """Find the courses of an image. None if there are none, or if the elements are on a lattice."""
     if min(guide.shape[:2]) < STRIPS * 2:
         return None
     light = guide.mean(axis=-1, dtype=np.float64)
@@ -108,7 +108,7 @@ def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
 
 
 def cut_strips(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the means (rows, strips) of an image in strips, and the strips' distances from the middle."""
+    """Return the mean of each row in each strip, (rows, strips), and the distances of the strips from the middle."""
     from scipy.ndimage import gaussian_filter1d
 
     ends = np.linspace(0, light.shape[1], STRIPS + 1).astype(int)
@@ -117,15 +117,15 @@ def cut_strips(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
 
 
 def measure_slope(light: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the share of the row gradient that strips have in common, and the slope of courses.
+    """Return the share of the gradient across rows that is common to all strips, 0 to 1, and the slope of courses.
 
-    The slope is the one with the largest share.
+    This is the slope for which the share is largest.
     """
     first = max(0, light.shape[1] - WINDOW) // 2
     strips, away = cut_strips(light[:, first : first + WINDOW])
 
     def agree(slope: float) -> float:
-        # Move each strip by whole rows, then by a fraction of a row.
+        # Shift each strip by whole rows and then by a fraction of a row.
         down = slope * away
         whole = np.floor(down).astype(np.intp)
         inside = int(np.abs(whole).max()) + 1
@@ -143,20 +143,20 @@ def measure_slope(light: NDArray[np.float64]) -> tuple[float, float]:
     for count in SLOPES:
         tried = np.linspace(middle - reach, middle + reach, count)
         found = [agree(slope) for slope in tried.tolist()]
-        # Among slopes with the same share, take the smallest.
+        # Among slopes with equal shares, use the smallest.
         best, _, middle = max((value, -abs(slope), slope) for value, slope in zip(found, tried.tolist(), strict=True))
         if best < AGREE / 2:
             return best, 0.0
         reach *= 2 / (count - 1)
-    # Courses that climb by less than half a pixel are level.
+    # Treat courses that climb by less than half a pixel as level.
     steep = abs(middle) * light.shape[1] > 0.5 and best > agree(0.0) + 1e-3
     return best, float(np.rint(middle * FRACTIONS) / FRACTIONS) if steep else 0.0
 
 
 def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the rows of thin lines, bright or dark, that cross a level image.
+    """Return the rows of thin bright or dark lines that cross a level image, to a fraction of a pixel.
 
-    Empty if few of the prominent lines cross it.
+    Empty if too few of the prominent lines cross the image.
     """
     from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
@@ -175,7 +175,7 @@ def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
         kept = peaks[through >= THROUGH]
         if len(kept) < MOST * len(peaks):
             continue
-        # Interpolate the peak by a parabola through three rows.
+        # Refine the position by a parabola through three rows.
         low, high = line[kept] - line[kept - 1], line[kept] - line[kept + 1]
         joints = kept + 0.5 * (low - high) / np.maximum(low + high, 1e-9)
         joints = np.rint(joints * PARTS) / PARTS
@@ -184,7 +184,7 @@ def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
 
 
 def repeats(lattice: Lattice, courses: Courses, level: Floats) -> bool:
-    """Return whether a level image correlates better at lattice points than elsewhere along its courses."""
+    """Return True if a level image correlates better at lattice points than at other shifts along its courses."""
     correlation = widen(correlate(crop_light(level)), 2)
     reach = np.array(correlation.shape) // 2
     vectors = turn(courses.slope, courses.axis) @ lattice.vectors

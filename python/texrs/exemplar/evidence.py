@@ -1,4 +1,4 @@
-"""Measure evidence for elements: prominent outlines, solid shapes, few large ones, similar areas."""
+"""Measure the evidence for elements: clear outlines, solid shapes, moderate and similar areas."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from texrs.exemplar.shapes import mark_outlines, measure_solidity, widen
 __all__ = ["Evidence", "measure_contrast", "measure_creases", "weigh_evidence"]
 
 CREASE = 1.5
-"""Standard deviation of the Gaussian for detecting creases, in pixels."""
+"""Standard deviation of the Gaussian for detecting creases, which are thin dark lines, in pixels."""
 CONTRAST, CLEAR = 2.0, 2
 """Standard deviation of the Gaussian for measuring contrast, and minimum distance of inner pixels from an outline, in
 pixels.
@@ -21,9 +21,9 @@ pixels.
 
 
 def measure_creases(lab: Floats) -> Floats:
-    """Return the depth of the dark line at each pixel.
+    """Return the depth of a dark line at each pixel, 0 where there is none.
 
-    The depth is the larger curvature of the lightness, where it is positive.
+    The depth is the larger principal curvature of the lightness.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -35,7 +35,7 @@ def measure_creases(lab: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Measures of whether found elements are convincing."""
+    """Measures of how convincing the found elements are."""
 
     covered: float
     """Share of the image that elements cover."""
@@ -44,11 +44,11 @@ class Evidence:
     spread: float
     """Standard deviation of the areas of elements, divided by their mean."""
     solidity: float
-    """Share of their convex hulls that elements fill. Gaps between elements fill only a small share."""
+    """Share of their convex hulls that elements fill. It is small if gaps were taken for elements."""
     inside: float
-    """Ratio of contrast, or crease depth, along outlines to that inside elements."""
+    """Ratio of the contrast, or the crease depth, along outlines to the contrast inside elements."""
     outside: float
-    """Ratio of contrast along outlines to that in the background."""
+    """Ratio of the contrast along outlines to the contrast in the background."""
 
 
 def measure_contrast(lab: Floats) -> Floats:
@@ -65,7 +65,7 @@ def measure_contrast(lab: Floats) -> Floats:
 
 
 def weigh_evidence(elements: Labels, crease: Floats, contrast: Floats) -> Evidence:
-    """Measure the evidence for elements in their image."""
+    """Return measures of how convincing elements are, from creases and contrast of the image."""
     outline = mark_outlines(elements)
     far = ~widen(outline, CLEAR)
     covered = elements > 0

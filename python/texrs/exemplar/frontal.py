@@ -1,4 +1,4 @@
-"""Prepare a frontal view with elements of one size as a sheet for covering curved surfaces."""
+"""Prepare an exemplar seen from the front, with elements of one size, for covering curved surfaces."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from texrs.exemplar.sheet import FINE, FLAT, MOST, OPEN, Copies, measure_seen, r
 __all__ = ["Frontal"]
 
 SMALLEST = 32
-"""Minimum number of samples of the shorter side, if the exemplar has them."""
+"""Minimum number of samples of the shorter side after reduction."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frontal(Copies):
-    """A frontal exemplar in its own size or reduced.
+    """An exemplar seen from the front, in its own size or reduced.
 
-    Its patches are bent to any size and direction.
+    Its patches are bent to the size and direction that the surface requires.
 
     Attributes
     ----------
     size : float
-        Size of its elements.
+        Scale of its elements.
 
     """
 
@@ -39,7 +39,7 @@ class Frontal(Copies):
 
     @classmethod
     def over(cls, colours: Floats, size: float, target: Floats) -> Frontal:
-        """Lay out an exemplar at the resolution that a target needs."""
+        """Resize an exemplar to the resolution that a target requires."""
         shape = (colours.shape[0], colours.shape[1])
         finest = float(np.sqrt(np.prod(np.quantile(target, [FINE, 1 - FINE])))) / size
         factor = min(1.0, max(finest, SMALLEST / min(shape)), float(np.sqrt(MOST / np.prod(shape))))
@@ -55,21 +55,21 @@ class Frontal(Copies):
         )
 
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Analyse the exemplar at its size in the sheet."""
+        """Find the elements and the costs of neighbouring colours at the resolution of the sheet."""
         return find_instances(self.colours, OPEN), measure_adjacency(self.colours, OPEN)
 
     def describe(self) -> dict[str, Any]:
-        """Return the resolution."""
+        """Return the kind of the sheet and its resolution, as JSON types."""
         return {"kind": "front", "resolution": round(float(np.sqrt(np.prod(self.copies[0].factor))), 5)}
 
     def side(self, target: Floats) -> float:
-        """Return a share of the sheet's side. Patches bend with the surface."""
+        """Return the side of a patch in samples, as a share of the sheet's side. Patches bend with the surface."""
         return FLAT * float(np.sqrt(self.free.size))
 
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
-        """Return the Jacobians in samples."""
+        """Return the Jacobians of an output that shows a surface, in samples of the sheet, in fixed point."""
         return round_frames(jacobians * (self.size * np.array(self.copies[0].factor)[:, np.newaxis]))
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median scale error, weighted by the area of the exemplar that each pixel shows."""
+        """Return the median error of log scales, weighted by the area of the exemplar that each pixel shows."""
         return measure_seen(places, frames)

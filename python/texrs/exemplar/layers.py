@@ -1,4 +1,4 @@
-"""Divide an exemplar into layers: clusters of regions of one colour.
+"""Divide an exemplar into colour layers, by clustering regions of one colour.
 
 The image is first smoothed by a mean-shift filter (Comaniciu and Meer, IEEE PAMI 2002). It is then merged into regions
 by the graph-based method of Felzenszwalb and Huttenlocher (IJCV 2004). The mean colours of regions are clustered by
@@ -27,13 +27,14 @@ MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60 / 255, 0.4, 24
 """Parameters of the graph-based merge: scale in colour units of [0, 1], blur in pixels, and minimum area in pixels."""
 
 FINE, AROUND = 1.0, 2.0
-"""Standard deviations of two Gaussians, in pixels: finer changes count as grain, and the amount of grain is averaged
-over the second.
+"""Standard deviations of two Gaussians, in pixels. Changes that the first one removes are grain.
+
+The amount of grain is averaged with the second one.
 """
 TWO_KINDS = 0.75
-"""Minimum share of the variance of the amount of grain between two classes for two kinds of area.
+"""Minimum share of the variance of the amount of grain that is between the classes of smooth and grainy areas.
 
-A normal distribution has 0.64.
+For a normal distribution, the share is 0.64.
 """
 
 
@@ -49,7 +50,7 @@ class Regions:
 
     @classmethod
     def of(cls, rgb: Floats, watch: Callable[[], object] = int) -> Regions:
-        """Filter an image and merge similar pixels. ``watch`` is called during the work."""
+        """Smooth an image and merge similar pixels into regions. ``watch`` is called during the work."""
         filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS, progress=lambda stage, share: watch())
         watch()
         region = felzenszwalb(filtered, MERGE_SCALE, blur=MERGE_BLUR, least=MERGE_MINIMUM)
@@ -71,9 +72,9 @@ class Regions:
 
 
 def _cluster(points: NDArray[np.float64], weight: NDArray[np.float64], count: int) -> NDArray[np.intp]:
-    """Cluster weighted points.
+    """Cluster weighted points by k-means.
 
-    The centres start at the heaviest point and then at the farthest ones, so the result does not depend on chance.
+    The first centre is the heaviest point, and the others are the farthest points, so that the result is reproducible.
     """
     centres = points[[int(np.argmax(weight))]]
     while len(centres) < count:
@@ -95,11 +96,11 @@ def _cluster(points: NDArray[np.float64], weight: NDArray[np.float64], count: in
 
 
 def mark_smooth(rgb: Floats) -> Bools | None:
-    """Mark smooth areas among fine grain, such as stones on sand.
+    """Return a mask of smooth areas among fine grain, such as stones on sand.
 
-    Returns None if the image does not have both kinds.
+    Return None if the image does not have both smooth and grainy areas.
 
-    The amount of grain is relative to the lightness, so that one material has the same amount in light and in shade.
+    The amount of grain is divided by the lightness, so that a material has the same amount in light and in shade.
     """
     from scipy.ndimage import gaussian_filter
     from skimage.filters import threshold_otsu
@@ -114,5 +115,5 @@ def mark_smooth(rgb: Floats) -> Bools | None:
     between = share * (1 - share) * float(amount[smooth].mean() - amount[~smooth].mean()) ** 2
     if between < TWO_KINDS * float(amount.var()):
         return None
-    # The average includes grain beyond outlines, so smooth areas come out too small.
+    # Widen smooth areas, because the average includes grain beyond their outlines.
     return np.asarray(widen(smooth), bool)

@@ -1,8 +1,8 @@
-"""Join parts of labelled planes until evidence supports all separations that are left.
+"""Merge parts of a label image until the evidence supports all remaining separations.
 
 The caller defines the evidence. `texrs.exemplar.components` defines it for parts of a mask. This module defines it for
-a tessellation, which divides the whole plane. A tessellation has no background whose outline could show what is solid,
-and a union of many cells is as solid as one cell. The usual size of cells is therefore evidence as well.
+a tessellation, which has no background. Many merged cells can be as solid as one cell, so the usual size of cells is
+used as evidence as well.
 """
 
 from __future__ import annotations
@@ -20,48 +20,53 @@ from texrs.exemplar.shapes import Shapes, list_borders
 __all__ = ["join_least_parted", "join_parts", "measure_usual_area"]
 
 Weigh: TypeAlias = Callable[[Any, Any, Any, Any], Any]
-"""Function that returns the evidence against joining pairs, from their labels, the sum of the relief along their
-borders and the border lengths.
+"""Function that returns the evidence against merging pairs of labels.
+
+Its arguments are both labels, the sum of the relief along their borders, and the lengths of the borders.
 """
 Join: TypeAlias = Callable[[int, int, int], object]
-"""Function that records a join of the second label into the first, with the length of the border between them."""
+"""Function that is called when the second label is merged into the first.
+
+The third argument is the length of their border.
+"""
 
 PARTED = 0.5
-"""Evidence below which two parts are joined: the mean strength of their joint plus terms for shape and size."""
+"""Evidence below which two parts are merged: the mean strength of their joint plus terms for shape and size."""
 DEEP = 1.0
-"""Maximum strength of joints.
+"""Maximum strength of joints. Larger values are clipped.
 
-Strengths are clipped to it because marks are strong in places only, joints along their whole length.
+Marks on elements are strong at single places, but joints are strong along their whole length.
 """
 CONVEXITY, CONSENSUS, MOST = 1.5, 0.12, 0.25
-"""Weight of the solidity that is lost by joining two parts.
+"""Weight of the solidity that is lost by merging two parts.
 
-Weight of the log ratio of the smaller part's area error to that of the union, and maximum of this term.
+Weight of the size term, and its maximum. The term compares the deviation from the usual area of the smaller part and
+of the union, as a log ratio.
 """
 HUGE = 3.0
-"""Area, in usual areas, above which no parts are joined."""
+"""Area, in usual areas, above which parts are not merged."""
 
 
 def measure_usual_area(area: NDArray[np.float64]) -> float:
-    """Return the median area of the cell at a random place. Fragments hardly affect it."""
+    """Return the median area of the cell at a random pixel. Small fragments hardly affect it."""
     order = np.sort(area)
     total = np.cumsum(order)
     return float(order[np.searchsorted(total, 0.5 * total[-1])])
 
 
 def join_parts(parts: Labels, relief: Floats, usual: float | None = None, *, least: float = 0.0) -> Labels:
-    """Join the parts of a tessellation, weakest separation first.
+    """Merge the parts of a tessellation, weakest separation first.
 
     Parameters
     ----------
     parts : (H, W) int32
         Labels from 1. Every pixel has one.
     relief : (H, W) float32
-        Strength of the joints, about 1 in joints.
+        Strength of the joint at each pixel: about 1 in joints, 0 inside cells.
     usual : float, optional
         Expected area of a cell in pixels. Default: the area is not used as evidence.
     least : float
-        Area in pixels below which a part always joins the neighbour with the weakest separation.
+        Area in pixels below which a part is always merged with the neighbour with the weakest separation.
 
     Returns
     -------
@@ -89,27 +94,27 @@ def join_parts(parts: Labels, relief: Floats, usual: float | None = None, *, lea
 
 
 def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *, below: float) -> NDArray[np.int32]:
-    """Join the least separated labels of a plane until all separations reach a limit.
+    """Merge pairs of labels with the weakest separation until all separations reach a minimum.
 
     Parameters
     ----------
     parts : (H, W) int32
-        Labels. 0 is not a part, and is not joined.
+        Label image. Label 0 is not a part, and is not merged.
     relief : (H, W) float32
-        Strength of the separation at each pixel. The larger of the two values at a border counts.
+        Strength of the separation at each pixel. The larger value of two neighbouring pixels is used.
     weigh : callable
-        ``weigh(one, other, total, length)`` returns the evidence against joining pairs of labels. ``total`` is the sum
-        of the relief along their border, and ``length`` is its number of pixel pairs. Called for all pairs, then for
-        one label and its neighbours.
+        ``weigh(one, other, total, length)`` returns the evidence against merging pairs of labels. ``total`` is the sum
+        of the relief along their border, and ``length`` is its number of pixel pairs. It is called once for all pairs,
+        and after each merge for one label and its neighbours.
     join : callable
-        ``join(one, other, length)`` is called before the other label becomes the first.
+        ``join(one, other, length)`` is called before the label ``other`` becomes ``one``.
     below : float
-        Minimum value of ``weigh`` for a pair to stay separate.
+        Minimum value of ``weigh`` for two labels to stay separate.
 
     Returns
     -------
     (labels,) int32
-        New label of each label, from 0: the lowest label among those joined with it.
+        New label of each label, from 0: the lowest of the labels that were merged with it.
 
     """
     a, b = list_borders(parts)
@@ -128,7 +133,7 @@ def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *
         borders.setdefault(q, {})[p] = (total, length)
     into = np.arange(int(parts.max()) + 1, dtype=np.int32)
     scores = dict(zip(pairs, weigh(one, other, sums, lengths).tolist(), strict=True))
-    # The queue keeps outdated entries of pairs that have a new score or no longer exist. They are skipped.
+    # The queue can contain outdated scores of pairs. These are skipped.
     queue = [(score, pair) for pair, score in scores.items()]
     heapify(queue)
     while queue:
@@ -139,14 +144,14 @@ def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *
             break
         join(p, q, borders[p][q][1])
         into[q] = p
-        # Add the borders of the joined label to those of the label that remains.
+        # Add the borders of the merged label to the borders of the label that remains.
         for r, (total, length) in borders.pop(q).items():
             del borders[r][q]
             scores.pop((min(q, r), max(q, r)))
             if r != p:
                 before = borders[p].get(r, (0.0, 0))
                 borders[p][r] = borders[r][p] = (before[0] + total, before[1] + length)
-        # The new label needs new scores against its neighbours.
+        # Compute new scores between the merged label and its neighbours.
         near = sorted(borders[p])
         if near:
             totals, counts = np.array([borders[p][r] for r in near]).T

@@ -1,4 +1,4 @@
-"""Find places of patches without holes, and build an index of all patches that may be copied."""
+"""Index all patches of an exemplar that can be copied, and find the places of patches in a result."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["choose_usual_side", "index_patches", "mark_corners", "place_patches"
 def index_patches(
     guide: Floats, side: int, mirrors: Sequence[Flip], free: Bools | None = None, like: PatchIndex | None = None
 ) -> PatchIndex:
-    """Return an index of the square patches of an exemplar, in each of its mirror images.
+    """Build an index of the square patches of an exemplar and of its mirror images.
 
     Parameters
     ----------
@@ -27,11 +27,11 @@ def index_patches(
     side : int
         Side of the largest patch, in pixels.
     mirrors : sequence of (bool, bool)
-        Mirror images. They are the images of the index.
+        Mirror images to index, as (rows mirrored, columns mirrored).
     free : (H, W) bool, optional
-        Pixels that patches may contain. Default: all.
+        Pixels that patches can contain. Default: all.
     like : PatchIndex, optional
-        Index of the same exemplar in the same mirror images, for patches of another size.
+        Index of the same mirror images of the exemplar for another patch size, whose data are reused.
 
     """
     allowed = None if free is None else [mark_corners(flip(free, mirror), side) for mirror in mirrors]
@@ -44,7 +44,7 @@ def index_patches(
 def place_patches(
     found: Inpainting, mirrors: Sequence[Flip], shape: tuple[int, int]
 ) -> tuple[tuple[NDArray[np.intp], ...], Floats, list[Floats]]:
-    """Return the pixels that patches fill, and their origins in the exemplar without mirroring.
+    """Return the pixels that patches filled, and where in the exemplar (without mirroring) each was copied from.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def place_patches(
         The Jacobian of each patch.
 
     """
-    # This is 10x as fast as `np.nonzero`, which handles each axis separately.
+    # `np.nonzero` would take 10x as long, because it handles each axis separately.
     new = np.unravel_index(np.flatnonzero(found.label >= 0), found.label.shape)
     origin, places = found.source[found.label[new]], found.coordinates[new]
     for number, mirror in enumerate(mirrors):
@@ -75,19 +75,19 @@ def place_patches(
 
 
 def choose_usual_side(shorter: int) -> int:
-    """Return the default side of a patch for the shorter side of an exemplar.
+    """Return the default side of a patch, in pixels, from the length of the shorter side of an exemplar.
 
-    It is about the size of an element.
+    It is about the size of an element in a typical exemplar.
     """
     return min(shorter, max(12, min(32, shorter // 6)))
 
 
 def mark_corners(free: Bools, side: int) -> Bools:
-    """Mark the top-left corners of the square patches that are entirely in ``free``."""
+    """Return a mask of the top left corners of all square patches that are entirely in ``free``."""
     found = np.zeros(free.shape, bool)
     whole, width = free, 1
     while width < side:
-        # Two overlapping squares of side `width` form one whose side is larger by `step`.
+        # Combine overlapping squares of side `width` into squares whose side is larger by `step`.
         step = min(width, side - width)
         whole = whole[step:] & whole[:-step]
         whole = whole[:, step:] & whole[:, :-step]

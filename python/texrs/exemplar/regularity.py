@@ -31,33 +31,39 @@ Vector = tuple[int, int]
 WINDOW = 512
 """Side of the central part of an image that is analysed, in pixels."""
 REACH = 0.45
-"""Maximum shift, as a share of a side. For longer shifts the overlap of the image with itself is too small."""
+"""Maximum shift, as a share of a side. Longer shifts leave too small an overlap of the image with itself."""
 SHORTEST, PEAKS = 6, 8
-"""Minimum period in pixels, and number of correlation peaks that are candidates for periods."""
+"""Minimum period in pixels, and number of correlation peaks that are considered as periods."""
 REGULAR = 0.3
-"""Minimum mean correlation of an accepted lattice. Scattered elements reach 0.2."""
+"""Minimum mean correlation of an accepted lattice. Scattered elements have up to 0.2."""
 DIP = 0.75
-"""Maximum ratio of the smallest correlation on the way to a peak to the peak.
+"""Maximum ratio of the smallest correlation between the centre and a peak to the correlation at the peak.
 
-Above it, the peak belongs to a stripe and is not a period.
+If the ratio is larger, the peak belongs to a stripe and is not a period.
 """
 NEAR = 2
 """Search distance around the expected multiple of a period, in pixels."""
 OFTEN = 64
-"""Number of first peaks. Periods are fitted again after each of them. Later they are fitted once per ring of peaks."""
+"""Number of nearest peaks that periods are fitted to one by one. Farther out, they are fitted once per ring of peaks.
+"""
 BENT = 0.15
-"""Maximum stretch or shear of an image that makes its lattice close on a torus."""
+"""Maximum stretch or shear of an image to fit whole periods of its lattice."""
 PARTS, FRACTIONS = 2.0**8, 2.0**20
-"""Numbers of parts to which periods (of a pixel) and matrices (of 1) are rounded, so that results are the same on
-every processor.
+"""Numbers of steps for rounding periods (per pixel) and matrices (per unit).
+
+Results are then the same on every processor.
 """
 FARTHEST = 4096.0
 """Maximum length of listed shifts, in pixels."""
 LEANS = 3.0
-"""Standard errors of a leaning lattice that count as one. A wall photographed slightly obliquely leans by up to 10."""
+"""Divisor of the mirror measure of lattices that lean, in standard errors, so that 3 count as one.
+
+A wall photographed slightly obliquely has up to 10.
+"""
 FINE, BLOCKS = (0.7, 1.5), 4
-"""Standard deviations of the Gaussians for comparing an image with its mirror image, and number of parts per side that
-give the standard error.
+"""Standard deviations of two Gaussians, in pixels, for comparing an image with its mirror images.
+
+The second value is the number of parts per side for estimating the standard error.
 """
 
 
@@ -72,7 +78,7 @@ class Lattice:
     correlation : float
         Mean autocorrelation of the image over the lattice, -1 to 1.
     exact : ((float, float), (float, float)), optional
-        The two vectors to a fraction of a pixel, from the positions of their multiples.
+        The vectors to a fraction of a pixel, fitted to the positions of their multiples.
 
     Examples
     --------
@@ -87,7 +93,7 @@ class Lattice:
     correlation: float
     """Mean autocorrelation of the image over the lattice, -1 to 1."""
     exact: tuple[tuple[float, float], tuple[float, float]] | None = None
-    """The two vectors to a fraction of a pixel, from the positions of their multiples."""
+    """The vectors to a fraction of a pixel, fitted to the positions of their multiples."""
 
     __repr__ = brief
 
@@ -100,7 +106,7 @@ class Lattice:
         return np.array(self.exact or (self.a, self.b), np.float64).T
 
     def shifts(self, reach: float) -> list[Vector]:
-        """Return the lattice translations up to `reach`, shortest first.
+        """Return the lattice translations up to length `reach`, the shortest first.
 
         The nearest neighbours are always included.
 
@@ -117,7 +123,7 @@ class Lattice:
         Raises
         ------
         InvalidInput
-            The value is not a number from 0 to 4096.
+            ``reach`` is not a number from 0 to 4096.
 
         Examples
         --------
@@ -134,23 +140,23 @@ class Lattice:
         return [(int(v[0]), int(v[1])) for v in found if v @ v <= reach**2 + 0.5]
 
     def close(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> NDArray[np.float64] | None:
-        """Return the linear map near the identity after which the lattice closes on a torus.
+        """Return the smallest linear change of an image after which whole periods of its lattice fit a given size.
 
-        The map acts on (row, column). After it, the height and the width of the torus are lattice translations, along
-        the axes that wrap. Without it, courses and joints that leave a texture on one side would not continue on the
-        other side.
+        The result is a matrix that acts on (row, column). After the change, the height and the width are lattice
+        translations, along the axes that wrap. Courses and joints that end at one side of a tileable texture then
+        continue on the other side.
 
         Parameters
         ----------
         size : (rows, columns)
-            Size of the torus.
+            Size of the tileable texture, in pixels.
         wrap : (bool, bool)
-            Axes along which the torus wraps.
+            Axes along which the texture must be tileable.
 
         Returns
         -------
         (2, 2) float64, or None
-            None if the lattice would have to change by more than `BENT`.
+            None if the lattice would have to be stretched or sheared by more than 0.15.
 
         Raises
         ------
@@ -168,11 +174,11 @@ class Lattice:
         lengths = [as_int(n, "size", 1, 2**31) for n in as_tuple(size, "size", 2, "2 integers, rows and columns")]
         cyclic = as_wrap(wrap)
         sides = np.diag(np.array(lengths, np.float64))
-        # Find the lattice translation nearest to each side.
+        # Find the lattice translation that is nearest to each side of the texture.
         nearest = np.where(cyclic, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
         if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):
             return None
-        # Adding 0 removes negative zeros.
+        # Add 0 to convert negative zeros.
         turned = np.rint(sides @ np.linalg.inv(nearest) * FRACTIONS) / FRACTIONS + 0.0
         return turned if np.abs(turned - np.eye(2)).max() <= BENT else None
 
@@ -193,7 +199,7 @@ def find_lattice(guide: Floats) -> Lattice | None:
         ask()
         found.append(_fit_lattice(correlate(picture)))
     believed = [each for each in found if each is not None and each.correlation >= REGULAR]
-    # Edges distinguish places less well than colours: two edges may be half a period apart.
+    # Prefer colours: edges distinguish places less well, because two similar edges can be half a period apart.
     return believed[0] if believed else None
 
 
@@ -205,14 +211,14 @@ def crop_light(guide: Floats) -> Floats:
 
 
 def correlate(picture: Floats) -> Floats:
-    """Return the autocorrelation of an image without its slow changes. The centre is the zero shift."""
+    """Return the autocorrelation of an image without slow changes. The zero shift is in the middle."""
     from scipy.fft import irfft2, next_fast_len, rfft2
     from scipy.ndimage import gaussian_filter, uniform_filter
 
     height, width = picture.shape
     flat = gaussian_filter(picture, 1.0) - uniform_filter(picture, min(picture.shape) // 2)
     size = tuple(next_fast_len(2 * n, real=True) for n in picture.shape)
-    # Use double precision: single-precision transforms differ in their last bits between processors.
+    # Use double precision, because single-precision transforms differ in their last bits between processors.
     spectrum = rfft2(flat.astype(np.float64), size)
     product = irfft2(spectrum.real**2 + spectrum.imag**2, size)
     rows, columns = (int(REACH * n) for n in picture.shape)
@@ -224,9 +230,9 @@ def correlate(picture: Floats) -> Floats:
 
 
 def _fit_lattice(correlation: Floats) -> Lattice | None:
-    """Find the lattice of the highest mean correlation.
+    """Return the lattice with the highest mean correlation, or None.
 
-    Among lattices that are nearly as good, the one with the smallest cell is used.
+    Among nearly equal lattices, the one with the smallest cell is chosen.
     """
     reach = np.array(correlation.shape) // 2
     tolerant = widen(correlation, 2)
@@ -256,9 +262,9 @@ def _fit_lattice(correlation: Floats) -> Lattice | None:
 
 
 def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two periods to a fraction of a pixel.
+    """Return two periods refined to a fraction of a pixel.
 
-    They are fitted to the peaks near their multiples, from the nearest multiples outwards.
+    They are fitted to the correlation peaks near their multiples, starting with the nearest ones.
     """
     reach = np.array(correlation.shape) // 2
     found = np.array([a, b], np.float64)
@@ -277,10 +283,10 @@ def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, flo
         at = np.unravel_index(int(near.argmax()), near.shape)
         times.append(step)
         peaks.append(expected - NEAR + at)
-        # A maximum at the border of a window belongs to a peak outside it, or to none, so it has little weight.
+        # A maximum at the border of the search window is not a peak, so give it little weight.
         inside = all(0 < place < 2 * NEAR for place in at)
         weights.append(max(float(near.max()), 0.0) * (1.0 if inside else 0.01))
-        # After enough peaks, fit once per ring: the nearer peaks predict all peaks of a ring.
+        # After enough peaks, fit once per ring, because the nearer peaks predict all peaks of a ring.
         if len(times) > OFTEN and number == fitted:
             continue
         fitted = number
@@ -292,7 +298,7 @@ def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, flo
 
 
 def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the shortest vectors of the lattice of two vectors (Lagrange and Gauss)."""
+    """Return the shortest vectors that generate the same lattice (Lagrange and Gauss)."""
     a, b = sorted((one, other), key=lambda v: int(v @ v))
     while a.any():
         b = b - round(int(a @ b) / int(a @ a)) * a
@@ -303,7 +309,7 @@ def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.
 
 
 def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reach: NDArray[np.intp]) -> float:
-    """Return the mean over the points of a lattice. 0 for fewer than four points, which are not enough evidence."""
+    """Return the mean of a correlation over lattice points. 0 if there are fewer than four points."""
     most = int(np.hypot(*reach) * 2 / max(1.0, float(np.hypot(*a)))) + 1
     times = np.arange(-most, most + 1)
     places = (times[:, None, None] * a + times[:, None] * b).reshape(-1, 2)
@@ -313,7 +319,7 @@ def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reac
 
 
 def _has_dip(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]) -> bool:
-    """Return whether the correlation falls and rises again on the way to a vector."""
+    """Return True if the correlation falls and rises again between the centre and a vector."""
     if (np.abs(vector) > reach).any():
         return False
     steps = int(np.abs(vector).max())
@@ -323,11 +329,11 @@ def _has_dip(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.in
 
 
 def measure_direction(guide: Floats) -> float:
-    """Return how much the edges of an image agree in direction, from 0 (none) to 1 (all).
+    """Return how much the edges of an image agree in direction, from 0 (not at all) to 1 (all edges).
 
-    The result is the larger of two measures. The first measures one direction (the structure tensor), as in bark. The
-    second measures two directions at right angles (a similar tensor of fourth order), as in brickwork. Such directions
-    cancel in the structure tensor.
+    The result is the larger of two measures. The first measures agreement in one direction (structure tensor), as in
+    bark. The second measures agreement in two directions at right angles (a similar tensor of fourth order), as in
+    brickwork. Such directions cancel in the structure tensor.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -343,14 +349,14 @@ def measure_direction(guide: Floats) -> float:
 
 
 def measure_polarity(guide: Floats) -> tuple[float, float, float]:
-    """Return how certainly an image differs from its mirror images, in standard errors.
+    """Return how clearly an image differs from its mirror images: three values in standard errors.
 
-    The first value measures properties that a mirror along rows reverses, the second those that a mirror along columns
-    reverses. The third measures properties that either mirror reverses but both together do not. Light from one side
-    makes the image darken slowly and brighten quickly along rows or columns. Slopes weighted by their square, or by
-    the square of the other slope, then do not sum to 0. For equally likely mirror images they would. If edges are
-    oblique, the product of the slopes does not sum to 0. If edges have two oblique directions at right angles, a
-    similar product of fourth order does not.
+    The first value is about properties that a mirror along rows reverses, the second about properties that a mirror
+    along columns reverses. The third is about properties that either mirror reverses but both together do not. Light
+    from one side makes the image darken slowly and brighten quickly along rows or columns. Slopes weighted by their
+    square, or by the square of the other slope, then do not sum to 0. For equally likely mirror images they would. If
+    edges are oblique, the product of the slopes does not sum to 0. If edges have two oblique directions at right
+    angles, a similar product of fourth order does not.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -372,9 +378,9 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
 
 
 def _measure_oddness(odd: Floats, scale: Floats) -> float:
-    """Return the mean of values, relative to a scale, in standard errors.
+    """Return the mean of values relative to a scale, in standard errors.
 
-    Equal parts of the image give the standard error.
+    The standard error is estimated from equal parts of the image.
     """
     rows, columns = (n // BLOCKS for n in odd.shape)
     parts = [v[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns) for v in (odd, scale)]
@@ -384,10 +390,10 @@ def _measure_oddness(odd: Floats, scale: Floats) -> float:
 
 
 def bend(shape: tuple[int, ...], matrix: NDArray[np.float64]) -> SourceMap:
-    """Return the source map of a linearly transformed image, cropped to a rectangle without gaps."""
+    """Return the source map of an image after a linear change, cropped to a rectangle without gaps."""
     inverse = np.rint(np.linalg.inv(matrix) * FRACTIONS) / FRACTIONS
     half = (np.array(shape) - 1) / 2
-    # A sheared image needs room on both sides.
+    # Crop both sides, because a shear moves them out of the image.
     reach = np.floor(np.maximum(np.linalg.solve(np.abs(inverse), half), 8))
     away = np.stack(np.meshgrid(*(np.arange(-r, r + 1) for r in reach), indexing="ij"), axis=-1)
     places = np.clip(away @ inverse.T + half, 0, 2 * half).astype(np.float32)

@@ -1,8 +1,8 @@
-"""Split an exemplar into layers, and its layers into elements.
+"""Divide an exemplar into colour layers, and the layers into elements.
 
 For layers, see `texrs.exemplar.layers`: a mean-shift filter, a graph-based merge, and k-means of the mean colours of
-regions. Elements (child layers): connected components of the layers above the background, split where they touch. If
-the components are not convincing, a jittered grid of cells is used.
+regions. Elements (child layers) are the connected components of all layers except the background, split where elements
+touch. If the components are not convincing, a jittered grid of cells is used instead.
 """
 
 from __future__ import annotations
@@ -87,11 +87,11 @@ class ElementOptions:
 
     @property
     def key(self) -> Hashable:
-        """Key that identifies these options. Labels are identified by their content."""
+        """Hashable key of these options. Labels are represented by a hash of their content."""
         return self.layers, self.segmentation, None if self.labels is None else content_hash(np.asarray(self.labels))
 
     def select(self, number: int) -> ElementOptions:
-        """Return the options for one of several exemplars, with its own labels.
+        """Return the options for one of several exemplars, with the labels of this exemplar.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class ElementOptions:
         Raises
         ------
         InvalidInput
-            The list has no such entry.
+            The list does not contain labels for this exemplar.
 
         Examples
         --------
@@ -124,7 +124,7 @@ class ElementOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segmentation:
-    """An exemplar in layers and elements.
+    """Layers and elements of an exemplar.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class Segmentation:
     kind : {"components", "grid", "none", "labels"}
         Method that found the elements.
     reason : str
-        Reason why "auto" used the grid, or why elements stay in their places. Empty otherwise.
+        Reason why "auto" used the grid, or why the elements are not moved. Empty otherwise.
     lattice : Lattice, optional
         Lattice of the exemplar, if any. None for elements marked by hand.
     courses : Courses, optional
@@ -170,7 +170,7 @@ class Segmentation:
         return self.layers.nbytes + self.elements.nbytes
 
     def freeze(self) -> Segmentation:
-        """Make the arrays read-only, so that the segmentation can be shared, and return it.
+        """Make the arrays read-only, because the segmentation is shared, and return it.
 
         Returns
         -------
@@ -188,7 +188,7 @@ class Segmentation:
         return self
 
     def measure_depth(self, reach: float) -> Floats:
-        """Return the depth of each pixel inside its element.
+        """Return the depth of each pixel inside its element, 0 to 1.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ class Segmentation:
         Raises
         ------
         InvalidInput
-            The distance is not a number from 1e-6 to 1e9.
+            ``reach`` is not a number from 1e-6 to 1e9.
 
         Examples
         --------
@@ -288,13 +288,13 @@ def segment(
 
 
 class Steps:
-    """Report a share that approaches 1 with each call, because the number of steps is unknown."""
+    """Reports progress of a work with an unknown number of steps: each call moves the share closer to 1."""
 
     def __init__(self, progress: Progress | None) -> None:
         self.progress, self.left = progress, 1.0
 
     def __call__(self) -> None:
-        """Report a step."""
+        """Report that a step is finished."""
         self.left *= 0.9
         if self.progress is None:
             ask()
@@ -303,7 +303,7 @@ class Steps:
 
 
 def number_marks(labels: Marks | Sequence[Marks], shape: tuple[int, int]) -> Segmentation:
-    """Return the segmentation given by elements marked by hand, with consecutive numbers."""
+    """Return the segmentation for elements marked by hand. Elements are renumbered consecutively."""
     marks = np.asarray(labels)
     if marks.shape != shape or marks.dtype.kind not in "biu":
         raise InvalidInput(f"labels: must be integers of shape {shape}, got {marks.dtype} {marks.shape}")
@@ -313,9 +313,9 @@ def number_marks(labels: Marks | Sequence[Marks], shape: tuple[int, int]) -> Seg
 
 
 def draw_cells(height: int, width: int) -> Labels:
-    """Cut an image into jittered Voronoi cells.
+    """Divide an image into jittered Voronoi cells, for images without separate elements.
 
-    Every other cell, as on a chequerboard, is an element.
+    Every other cell is an element, as on a chequerboard. The others are the background.
     """
     from scipy.spatial import KDTree
 

@@ -1,8 +1,8 @@
-"""Find separate elements of an exemplar by colour: areas in a connected background.
+"""Find separate elements of an exemplar by their colours, as areas on a connected background.
 
 Colours are reduced to a small palette. The background is the connected part of the palette whose removal leaves many
-bounded areas. It is accepted only if no criterion speaks against it. Textures without such a background are better cut
-by the frequency of neighbouring colours (`texrs.exemplar.adjacency`).
+bounded areas. It is accepted only if it meets all criteria. Textures without such a background are better cut by the
+frequency of neighbouring colours (`texrs.exemplar.adjacency`).
 """
 
 from __future__ import annotations
@@ -28,14 +28,16 @@ LEAST = 6
 LARGEST = 0.15
 """Maximum size of an element, as a share of all areas."""
 FAIR, SHARE, COMPACT, EXPLAINED, PLAIN = 0.9, 0.65, 0.9, 0.3, 0.45
-"""Criteria for accepting a background, in order.
+"""Criteria for accepting a background, in this order.
 
-Minimum score of the background. Maximum share of the exemplar outside the background. Minimum share of elements
-shorter than half of the exemplar. Minimum share of colour variance that the division explains. Maximum variance of the
-background, as a share of the total.
+- Minimum score of the background.
+- Maximum share of the exemplar that elements cover.
+- Minimum share of elements shorter than half of the exemplar.
+- Minimum share of colour variance between elements and background.
+- Maximum variance of the background, as a share of the total.
 """
 PAD = 12
-"""Number of samples added around a periodic exemplar before distances are measured. Larger depths count the same."""
+"""Number of samples added around a periodic exemplar before distances are measured. Larger distances are not exact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +88,7 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     Returns
     -------
     Instances or None
-        None if no connected background leaves bounded areas.
+        The elements. None if no connected background leaves bounded areas.
 
     Examples
     --------
@@ -99,7 +101,7 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     """
     from scipy import ndimage
 
-    # Smooth slightly, because grain would split areas.
+    # Smooth slightly, because grain would divide areas.
     modes = ["wrap" if closed else "nearest" for closed in wrap]
     smooth = np.stack([ndimage.gaussian_filter(colours[..., c], 0.7, mode=modes) for c in range(colours.shape[-1])], -1)
     palette = classify(smooth, COLOURS)
@@ -118,7 +120,7 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
 
 
 def _measure_depth(mask: Bools, wrap: Sequence[bool]) -> Floats:
-    """Return the distance of each sample of a mask to the background."""
+    """Return the distance of each sample in a mask to the background, in samples."""
     from scipy import ndimage
 
     padded = np.pad(mask, PAD, mode="wrap" if all(wrap) else "edge")
@@ -127,9 +129,9 @@ def _measure_depth(mask: Bools, wrap: Sequence[bool]) -> Floats:
 
 
 def _try_background(palette: NDArray[np.uint8], colours: list[int], wrap: Sequence[bool]) -> _Pieces:
-    """Return the areas that are left without some colours.
+    """Return the areas that are left if some palette colours are taken as the background, with a score.
 
-    They are taken as they are, or eroded so that areas in contact by one sample separate.
+    The areas are tried unchanged and eroded by one sample, which separates areas that just touch.
     """
     from scipy import ndimage
 
@@ -155,7 +157,7 @@ def _score_pieces(mask: Bools, apart: Bools, whole: float, wrap: Sequence[bool])
 
 
 def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
-    """Return whether areas are elements.
+    """Return True if areas look like elements on a background.
 
     They must cover few samples and be short, in a plain background of another colour.
     """
@@ -182,7 +184,7 @@ def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
 
 
 def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
-    """Return the connected parts of a mask, numbered from 1, across the periodic axes."""
+    """Label the connected parts of a mask from 1. Parts continue across periodic axes."""
     from scipy import ndimage
 
     labels, count = ndimage.label(mask)
@@ -207,7 +209,7 @@ def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
 
 
 def as_instances(classes: Array, wrap: Sequence[bool]) -> Instances | None:
-    """Return the elements of a label image: connected areas of all classes except the background.
+    """Return the elements of an image of classes: connected areas of all classes except the background.
 
     The background is the most connected class.
     """

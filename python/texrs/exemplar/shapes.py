@@ -1,4 +1,4 @@
-"""Measure labelled sets of pixels: their outlines, and the share of their convex hulls that they fill."""
+"""Measure labelled areas: their outlines, and the share of their convex hulls that they fill."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from texrs._typing import Array, Bools, Labels
 __all__ = ["Shapes", "list_borders", "mark_outlines", "measure_solidity", "narrow", "renumber", "widen"]
 
 TURN = 2 * np.pi / 32
-"""Angle between the directions of measured extents. Hulls come out at most 2 % too large."""
+"""Angle between the directions of measured extents. With 32 directions, hulls are at most 2 % too large."""
 BEFORE, AFTER = np.arange(32) - 1, (np.arange(32) + 1) % 32
-"""Indices of the directions before and after each direction."""
+"""Indices of the previous and the next direction."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shapes:
-    """Areas of sets of pixels, and their extents in each direction, which define their hulls."""
+    """Areas of labels, and their extents in 32 directions, which approximate their convex hulls."""
 
     area: NDArray[np.float64]
     reach: NDArray[np.float64]
 
     @classmethod
     def of(cls, labels: Labels) -> Shapes:
-        """Measure each label, including 0, by the corners of the first and last pixel of its runs in rows."""
+        """Measure all labels, including 0, from the corners of the first and last pixel of each run in a row."""
         height, width = labels.shape
         change = np.ones((height, width + 1), bool)
         change[:, 1:-1] = labels[:, 1:] != labels[:, :-1]
@@ -44,25 +44,25 @@ class Shapes:
         return cls(np.bincount(labels.ravel(), minlength=len(reach)).astype(np.float64), reach)
 
     def join(self, one: int, other: int) -> None:
-        """Join two sets. The first becomes the union."""
+        """Merge two labels. The first label becomes the union."""
         self.area[one] += self.area[other]
         self.reach[one] = np.maximum(self.reach[one], self.reach[other])
 
     def measure_solidity(self) -> NDArray[np.float64]:
-        """Return the share of its convex hull that each set fills. 0 for empty sets."""
+        """Return the share of its convex hull that each label fills, 0 to 1. 0 for labels without pixels."""
         return np.where(self.area > 0, self.area / np.maximum(_measure_hulls(self.reach), 1.0), 0.0)
 
     def compare_solidity(self, one: Any, other: Any) -> tuple[Any, Any]:
-        """Return the filled share of two separate hulls, and of the hull of the union."""
+        """Return the filled share of the hulls of two labels taken separately, and of the hull of their union."""
         area = self.area[one] + self.area[other]
         apart = _measure_hulls(self.reach[one]) + _measure_hulls(self.reach[other])
         return area / apart, area / _measure_hulls(np.maximum(self.reach[one], self.reach[other]))
 
 
 def _measure_hulls(reach: NDArray[np.float64]) -> Any:
-    """Return the area of the polygon with a given extent in each direction."""
+    """Return the area of polygons from their extents in 32 directions."""
     finite = np.where(np.isfinite(reach), reach, 0.0)
-    # Index instead of calling `np.roll`, which would take most of the time. This runs for every pair.
+    # Use indices instead of `np.roll`, which would take most of the time, because this runs for every pair.
     side = (finite[..., BEFORE] + finite[..., AFTER] - 2 * np.cos(TURN) * finite) / np.sin(TURN)
     return 0.5 * (finite * side).sum(axis=-1)
 
@@ -75,7 +75,7 @@ def measure_solidity(elements: Labels) -> float:
 
 
 def list_borders(labels: Labels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the flat indices of neighbours along rows and columns whose labels differ."""
+    """Return the flat indices of neighbouring pixels, along rows and columns, whose labels differ."""
     width = labels.shape[1]
     down = np.flatnonzero(labels[1:] != labels[:-1])
     along = np.flatnonzero(labels[:, 1:] != labels[:, :-1])
@@ -86,9 +86,9 @@ def list_borders(labels: Labels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def widen(values: Array, reach: int = 1) -> Array:
     """Return the maximum of the values within `reach` pixels along rows and columns.
 
-    True is larger than False.
+    For a mask, this is a dilation.
 
-    The result equals that of `scipy.ndimage.maximum_filter` and `binary_dilation`, and takes a fraction of the time.
+    The result equals that of `scipy.ndimage.maximum_filter` and `binary_dilation`, but takes a fraction of the time.
     """
     for axis in range(2):
         wide = values.copy()
@@ -101,9 +101,9 @@ def widen(values: Array, reach: int = 1) -> Array:
 
 
 def narrow(mask: Bools, *, beyond: bool = False) -> Bools:
-    """Return a mask without the pixels next to its outside.
+    """Erode a mask by one pixel along rows and columns.
 
-    Pixels outside the image count as inside the mask if ``beyond``.
+    If ``beyond``, pixels outside the image count as part of the mask.
     """
     narrowed: Bools = ~widen(~mask)
     if not beyond:
@@ -113,9 +113,9 @@ def narrow(mask: Bools, *, beyond: bool = False) -> Bools:
 
 
 def mark_outlines(labels: Labels) -> Bools:
-    """Mark the pixels on both sides of label changes along rows or columns.
+    """Return a mask of the pixels on both sides of label borders, along rows and columns.
 
-    The result equals that of `skimage.segmentation.find_boundaries`, 10x as fast.
+    The result equals that of `skimage.segmentation.find_boundaries`, in 1/10 of the time.
     """
     outline = np.zeros(labels.shape, bool)
     for axis in range(2):
@@ -127,12 +127,12 @@ def mark_outlines(labels: Labels) -> Bools:
 
 
 def renumber(labels: Labels, kept: Bools) -> Labels:
-    """Return labels renumbered from 1 in their order. Labels that are not kept become background.
+    """Renumber the kept labels from 1 in their order. Other labels become 0, the background.
 
     Parameters
     ----------
     labels : (H, W) int32
-        Labels from 0, the background.
+        Label image. 0 is the background.
     kept : (labels,) bool
         True for labels that stay.
 

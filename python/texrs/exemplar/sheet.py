@@ -1,7 +1,7 @@
-"""Lay out an exemplar as a sheet: shifted patches of it show any place in any size.
+"""Prepare an exemplar as a sheet: an image that contains patches for any place and any scale.
 
-For a plane in perspective, the sheet is the flattened plane: only the viewing scale differs between places. For any
-other exemplar, the sheet is a set of resized copies, as in an atlas.
+For a plane in perspective, the sheet is the flattened plane, which contains elements of one size. For any other
+exemplar, the sheet contains several resized copies, as in an atlas.
 """
 
 from __future__ import annotations
@@ -31,59 +31,68 @@ from texrs.scale_maps._slope import Slope
 __all__ = ["OPEN", "Copies", "Flattened", "Sheet", "code", "find_plane", "measure_seen", "multiply", "round_frames"]
 
 OPEN = (False, False)
-"""A sheet is not periodic along any axis."""
+"""Axes along which a sheet is periodic: none."""
 GAP = 8
-"""Number of samples between copies. Patches that cross the gap cost too much."""
+"""Number of samples between copies. It is so large that patches do not cross the gap."""
 BLURRED = 1.8
-"""Maximum enlargement of parts of a flattened plane. Parts above it are left out if enough others are left."""
+"""Maximum enlargement of parts of a flattened plane. Parts that need more are excluded."""
 NEAR = 0.7
 """Share of the largest scale above which parts are always included."""
 FAR = 3.0
-"""Maximum enlargement of any part of a plane. The area near the horizon is larger than any other and is left out."""
+"""Maximum enlargement of any part of a plane if only part of the exemplar is known.
+
+The area near the horizon would be larger than any other.
+"""
 MOST = 1 << 19
 """Maximum number of samples of a flattened plane."""
 STEEP = 7.9
-"""Maximum step in a sheet from pixel to pixel. Fixed-point numbers cannot represent more."""
+"""Maximum step between neighbouring output pixels, in samples of the sheet. Fixed-point numbers cannot represent more.
+"""
 FLAT, COPIED = 0.4, 0.3
-"""Side of a patch, as a share of the square root of the number of samples (flattened plane, copies)."""
+"""Side of a patch, as a share of the square root of the number of samples: for a flattened plane, and for copies."""
 VARIES = 0.4
-"""Maximum difference of scales across a patch of one size, as a natural logarithm."""
+"""Maximum difference of log scales across a patch of a resized copy."""
 GOOD, FAIR = 0.03, 0.08
-"""Maximum residual of a scale map that certainly is a plane, and of one that may be a plane."""
+"""Maximum residual of a scale map that fits a plane well, and of one that fits it fairly."""
 FORESHORTENED = 0.2
-"""Minimum increase of edge steepness with distance for a fair fit.
+"""Minimum increase of edge steepness with distance, if a plane fits fairly.
 
 It is less than 1 because few edges are exactly across the slope.
 """
 FRONTAL = 0.05
-"""Minimum increase of edge steepness for a good fit.
+"""Minimum increase of edge steepness with distance, if a plane fits well.
 
-Below it the map does not show a plane, but round elements that are each seen from the front.
+With a smaller increase, the exemplar does not show a plane, but round elements that are each seen from the front.
 """
 BETTER, SURE = 0.5, 1e-3
-"""A map contains areas if its residual as areas is below this factor times the other residual, minus this margin."""
+"""Factor and margin for comparing fits.
+
+A map contains areas if its residual as areas is below this factor times its residual as widths, minus the margin.
+"""
 BANDS = 8
-"""Number of bands of scales for comparing edges."""
+"""Number of ranges of scales for comparing the steepness of edges."""
 PLANAR = 0.02
-"""Maximum deviation of a target from one that grows along a line."""
+"""Maximum residual of a target for which sizes change along one line, as on a plane."""
 ALIGNED = 0.8
-"""Minimum cosine between that line and the slope of the exemplar.
+"""Minimum cosine of the angle between this line and the slope of the exemplar.
 
 Elements are foreshortened along the slope and look wrong along other lines.
 """
 HALF = 0.5
-"""Power of the foreshortening if sizes rise and fall. No surface looks so, and a lower power shears patches less."""
+"""Exponent of the foreshortening if the target is not a plane.
+
+No surface has such sizes, and a lower exponent shears patches less.
+"""
 EXCESS = 38
-"""Weight of showing larger parts, which are reduced, in 1/256 of the weight of showing smaller parts, which are
-blurred.
+"""Cost of showing larger parts, which are reduced, in 1/256 of the cost of showing smaller parts, which are blurred.
 """
 FINE = 0.05
-"""Share of a target that may be finer, or coarser, than the sizes for which the resolution of a sheet is chosen."""
+"""Share of a target, at either end of its sizes, that is ignored when the resolution of a sheet is chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet(ABC):
-    """The array that patches are cut from.
+    """An image that patches are cut from.
 
     Attributes
     ----------
@@ -94,7 +103,7 @@ class Sheet(ABC):
     logs : (rows, columns) float32
         Logarithm of the scale of each sample.
     free : (rows, columns) bool
-        Samples that may be shown.
+        Samples that can be copied.
 
     """
 
@@ -108,27 +117,30 @@ class Sheet(ABC):
     guide: ClassVar[float]
     """Weight of the scale error in cuts."""
     excess: ClassVar[int]
-    """Cost of a larger scale than the requested one, in 1/256 of the cost of a smaller one."""
+    """Cost of a scale larger than the requested one, in 1/256 of the cost of a smaller one."""
     heal: ClassVar[bool]
-    """True if torn elements are healed. On planes, healing takes most of the time and tears as much as it heals."""
+    """True if torn elements are healed.
+
+    On planes, healing takes most of the time, and damages as many elements as it repairs.
+    """
 
     @property
     def elements(self) -> Instances | None:
-        """Separate elements of the samples that may be shown."""
+        """Elements of the samples that can be copied. None if there are none."""
         return self.stitcher[1]
 
     @cached_property
     def stitcher(self) -> tuple[Stitcher, Instances | None]:
-        """The sheet prepared for cutting patches, with its elements."""
+        """The sheet prepared for cutting patches, and its elements."""
         found, beside = self.analyse()
         return make_stitcher(self.colours, OPEN, found, beside=beside), found
 
     @abstractmethod
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Find the separate elements of the usable samples, and the costs of neighbouring colours."""
+        """Find the separate elements of the sheet, and the costs of neighbouring colours."""
 
     def values(self, strength: float) -> NDArray[np.int16]:
-        """Return the values that a demand compares: weighted scales and barred samples, (samples * 4)."""
+        """Return the values that a demand compares, (samples * 4): weighted log scales, and marks of excluded samples."""
         values = np.zeros((*self.free.shape, 4), np.int16)
         values[..., 0] = code(self.logs, strength)
         values[..., 1] = np.where(self.free, 0, BARRED)
@@ -136,57 +148,61 @@ class Sheet(ABC):
 
     @abstractmethod
     def show(self, image: Array) -> Array:
-        """Return an image, in register with the exemplar, laid out like the sheet.
+        """Return the sheet with the colours of another image that is aligned with the exemplar.
 
         Unused samples are black.
         """
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Return the kind of the sheet and its figures, as JSON types."""
+        """Return the kind of the sheet and its measures, as JSON types."""
 
     @abstractmethod
     def side(self, target: Floats) -> float:
-        """Return the side of a patch for an output that follows a scale map, in samples of the sheet."""
+        """Return the side of patches for an output that follows a scale map, in samples of the sheet."""
 
     @abstractmethod
     def frames(
         self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
     ) -> NDArray[np.int16]:
-        """Return the Jacobians of an output whose element sizes follow a scale map, in fixed point.
+        """Return the Jacobians, in fixed point, of an output whose element sizes follow a scale map.
 
-        Rotations (rows, columns, 2, 2), if given, turn them. For a plane they act on the plane.
+        Rotations (rows, columns, 2, 2), if given, are applied to the Jacobians. For a plane, they are rotations in the
+        plane.
         """
 
     @abstractmethod
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
-        """Return the Jacobians of an output that shows a surface, in fixed point.
+        """Return the Jacobians, in fixed point, of an output that shows a surface.
 
-        The Jacobians of the surface, (rows, columns, 2, 2), map steps in the image to steps on a texture in its normal
-        size. The target contains the resulting sizes.
+        The Jacobians of the surface, (rows, columns, 2, 2), map steps in the image to steps on a texture at scale 1.
+        The target contains the resulting scales.
         """
 
     @abstractmethod
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
-        """Return the places in the exemplar of places (N, 2) in fixed point, and the Jacobians there."""
+        """Convert places in the sheet (N, 2), in fixed point, to coordinates in the exemplar.
+
+        Also return the Jacobians there.
+        """
 
     @abstractmethod
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median error of the log scales at places (rows, columns, 2) against a target."""
+        """Return the median error of the log scales of an output with given places (rows, columns, 2) against a target."""
 
 
 @dataclass(frozen=True, eq=False)
 class Flattened(Sheet):
-    """A plane in perspective, flattened.
+    """Sheet of an exemplar that shows a plane in perspective: the flattened plane.
 
     Attributes
     ----------
     plane : Plane
-        Position of the plane.
+        Direction and scale of the plane.
     origin : (float, float)
-        Point of the plane that the first sample shows.
+        Point of the plane at the first sample.
     resolution : float
-        Samples per unit of the plane. A sample is as large as a pixel at this scale.
+        Number of samples per unit of the plane. A part of the exemplar with this scale keeps its size.
 
     """
 
@@ -198,15 +214,16 @@ class Flattened(Sheet):
 
     @classmethod
     def of(cls, colours: Floats, plane: Slope, target: Floats, known: Bools | None = None) -> Flattened:
-        """Flatten an exemplar, as finely as a target needs.
+        """Flatten an exemplar, at the resolution that a target requires.
 
-        If only part of it is known, the whole plane is flattened.
+        If only part of the exemplar is known, the other parts are flattened as well.
         """
         shape = (colours.shape[0], colours.shape[1])
         resolution = min(float(np.sqrt(np.prod(np.quantile(target, [FINE, 1 - FINE])))), plane.largest)
         least = min(resolution / BLURRED, NEAR * plane.largest)
         grid = np.moveaxis(np.indices(shape), 0, -1)
-        # Constrained pixels outside the known part must also have a place in the sheet, although they are not copied.
+        # Include constrained pixels outside the known part, because they need a place in the sheet even though they
+        # are not copied.
         spread = plane.flatten(grid)[plane.scales(grid) >= (least if known is None else min(least, resolution / FAR))]
         low, high = spread.min(axis=0), spread.max(axis=0)
         resolution = min(resolution, float(np.sqrt(MOST / np.prod(high - low + 1e-9))))
@@ -221,16 +238,16 @@ class Flattened(Sheet):
         return cls(shape, shown, log_single(scales), inside, plane, (float(low[0]), float(low[1])), resolution)
 
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Analyse the flattened plane, where elements have one size."""
+        """Find the elements and the costs of neighbouring colours on the flattened plane, where elements have one size."""
         found = find_instances(self.colours, OPEN)
         if found is not None:
-            # A part that the border cuts off is a separate element.
+            # Label again, because the border of the usable samples can divide an element.
             labels = label_components((found.labels > 0) & self.free, OPEN)
             found = Instances(labels.astype(np.uint32), found.depth) if labels.any() else None
         return found, measure_adjacency(self.colours, OPEN)
 
     def show(self, image: Array) -> Array:
-        """Return the flattened plane."""
+        """Return another image flattened in the same way."""
         rows, columns = np.nonzero(self.free)
         shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
         places = np.stack([rows, columns], axis=-1).astype(np.int32) * ONE
@@ -238,7 +255,7 @@ class Flattened(Sheet):
         return shown
 
     def describe(self) -> dict[str, Any]:
-        """Return the position of the plane: tilt in degrees as in `texrs.scale_maps`, scale ratio and fit."""
+        """Return tilt (in degrees, as in `texrs.scale_maps`), scale ratio and fit of the plane, as JSON types."""
         tilt = degrees(atan2(self.plane.down[0], -self.plane.down[1])) % 360
         ratio = self.plane.largest / self.plane.least
         return {
@@ -250,22 +267,23 @@ class Flattened(Sheet):
         }
 
     def steps_at(self, scale: float) -> float:
-        """Return the samples across the slope per output pixel, for elements shown in a given scale."""
+        """Return the number of samples across the slope per output pixel, for elements shown at a given scale."""
         return self.resolution / scale
 
     def side(self, target: Floats) -> float:
-        """Return a share of the sheet's side. Patches bend with the map."""
+        """Return the side of a patch in samples, as a share of the sheet's side. Patches bend with the map."""
         return FLAT * float(np.sqrt(np.count_nonzero(self.free)))
 
     def frames(
         self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
     ) -> NDArray[np.int16]:
-        """Return the Jacobians of the plane, seen at the sizes of a scale map."""
+        """Return the Jacobians, in fixed point, of the plane seen at the scales of a map."""
         other = None if any(wrap) or min(target.shape) < 2 else Slope.fit(target)
         if other is None or other.order(target) > PLANAR:
             frames = self.plane.jacobians(target, foreshortened=HALF)
         else:
-            # A target that grows along a line looks like the plane itself, if the line is along the plane's own slope.
+            # If the target changes along a line near the slope of the plane, it looks like the plane and keeps its
+            # full foreshortening.
             aligned = abs(float(np.dot(other.down, self.plane.down))) > ALIGNED
             frames = self.plane.jacobians(target, other if aligned else None)
         if turn is not None:
@@ -274,41 +292,41 @@ class Flattened(Sheet):
         return self.fix(frames)
 
     def fix(self, frames: NDArray[np.float64]) -> NDArray[np.int16]:
-        """Return Jacobians (..., 2, 2) in units of the plane as fixed-point steps of the sheet, (N, 2, 2)."""
+        """Convert Jacobians (..., 2, 2), in units of the plane, to fixed-point steps of the sheet, (N, 2, 2)."""
         fixed = np.clip(np.rint(frames * (self.resolution * ONE)), -STEEP * ONE, STEEP * ONE)
         return np.ascontiguousarray(fixed.astype(np.int16).reshape(-1, 2, 2))
 
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
-        """Return the Jacobians of the plane as a surface shows it."""
+        """Return the Jacobians, in fixed point, of the plane's texture on a surface."""
         return round_frames(multiply(self.plane.upright, jacobians) * self.resolution)
 
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
-        """Return the coordinates in the exemplar, and the Jacobians of the plane there."""
+        """Convert places in the sheet to coordinates in the exemplar. Also return the Jacobians there."""
         points = places / (ONE * self.resolution) + np.array(self.origin)
         at = np.clip(self.plane.project(points), 0, np.array(self.shape) - 1)
         seen = self.plane.projection_jacobians(points) / self.resolution
         return at.astype(np.float32), seen.astype(np.float32)
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median scale error, weighted by the area of the plane that each pixel shows."""
+        """Return the median error of log scales, weighted by the area of the plane that each pixel shows."""
         return measure_seen(places, frames)
 
     def place(self, coordinates: Floats) -> NDArray[np.int32]:
-        """Return the places of the plane that show given coordinates."""
+        """Convert coordinates in the exemplar to places in the sheet."""
         points = (self.plane.flatten(coordinates) - np.array(self.origin)) * self.resolution
         return np.asarray(np.rint(np.clip(points, -1e5, 1e5) * ONE), np.int32)
 
 
 @dataclass(frozen=True, eq=False)
 class Copies(Sheet):
-    """Copies of an exemplar in several sizes, in one array.
+    """Sheet of resized copies of an exemplar, in one array.
 
     Attributes
     ----------
     copies : tuple of Copy
         The copies. The first is the exemplar in its own size.
     owner : (rows, columns) uint16
-        The copy of each sample.
+        Number of the copy that contains each sample.
 
     """
 
@@ -319,9 +337,9 @@ class Copies(Sheet):
 
     @classmethod
     def of(cls, colours: Floats, scale: Floats, sizes: Sequence[float], target: Floats) -> Copies:
-        """Resize an exemplar.
+        """Resize an exemplar to the given sizes.
 
-        Copies other than the first keep only the parts with scales of the target.
+        Copies after the first contain only the parts with scales of the target.
         """
         shape, logs = (colours.shape[0], colours.shape[1]), log_single(scale)
         wanted = float(target.min()), float(target.max())
@@ -339,7 +357,7 @@ class Copies(Sheet):
         return cls(shape, shown, sized, free, copies, owner)
 
     def analyse(self) -> tuple[Instances | None, Adjacency]:
-        """Analyse the exemplar, and look up the result in its copies, which are many times as large."""
+        """Find the elements and the costs of neighbouring colours in the exemplar, and transfer them to the copies."""
         colours = self.colours[self.copies[0].window]
         found, beside = find_instances(colours, OPEN), measure_adjacency(colours, OPEN)
         classes = np.zeros(self.free.shape, np.uint8)
@@ -349,9 +367,9 @@ class Copies(Sheet):
             classes[here] = gather(beside.classes, at, interpolation="nearest")
             if found is not None:
                 own = gather(found.labels, at, interpolation="nearest")
-                # An element gets another number in each copy.
+                # Give an element another number in each copy.
                 labels[here] = np.where(own > 0, own + number * found.count, 0)
-                # Interpolated depths extend beyond the borders of elements, so they are masked.
+                # Mask the interpolated depths, because they extend beyond the borders of elements.
                 inside = gather(found.depth > 0, at, interpolation="nearest")
                 depth[here] = gather(found.depth, at) * inside * np.float32(np.sqrt(np.prod(copy.factor)))
         fill_gaps(classes, self.copies, 1)
@@ -362,18 +380,21 @@ class Copies(Sheet):
         return found, Adjacency(classes, beside.costs)
 
     def show(self, image: Array) -> Array:
-        """Return the copies in one array."""
+        """Return another image resized and packed in the same way."""
         shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
         for copy in self.copies:
             shown[copy.window] = gather(image, lay_out(copy))
         return shown
 
     def describe(self) -> dict[str, Any]:
-        """Return the sizes of the copies."""
+        """Return the sizes of the copies, as JSON types."""
         return {"kind": "copies", "sizes": [round(float(np.sqrt(np.prod(c.factor))), 4) for c in self.copies]}
 
     def side(self, target: Floats) -> float:
-        """Return a share of the exemplar's side, or less if the map varies much within it."""
+        """Return the side of a patch in samples, as a share of the exemplar's side.
+
+        It is less if scales vary within a patch.
+        """
         logs = log_single(target)
         down, right = (np.gradient(logs, axis=k) if n > 1 else np.zeros_like(logs) for k, n in enumerate(logs.shape))
         steep = hypot_single(down, right)
@@ -382,15 +403,18 @@ class Copies(Sheet):
     def frames(
         self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
     ) -> NDArray[np.int16]:
-        """Return the identity or the rotations. Sizes come from the copies."""
+        """Return the rotations, or the identity, in fixed point. Scales come from the copies."""
         return np.eye(2, dtype=np.int16)[np.newaxis] * np.int16(ONE) if turn is None else round_frames(turn)
 
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
-        """Return the Jacobians without their sizes, which come from the copies."""
+        """Return the Jacobians in fixed point, divided by the scales, which come from the copies."""
         return round_frames(jacobians * target[..., np.newaxis, np.newaxis].astype(np.float64))
 
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
-        """Return the coordinates in the exemplar, and the sizes of the copies there."""
+        """Convert places in the sheet to coordinates in the exemplar.
+
+        Also return the inverse sizes of the copies there.
+        """
         at = (places / np.float32(ONE)).astype(np.float32)
         own = self.owner[self._nearest(places)]
         factor, origin, first = (
@@ -402,7 +426,7 @@ class Copies(Sheet):
         return found, np.eye(2, dtype=np.float32) / factor[:, np.newaxis]
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
-        """Return the median error of the scales of the samples."""
+        """Return the median error of the log scales of the copied samples."""
         return float(np.median(np.abs(self.logs[self._nearest(places)] - log_single(target))))
 
     def _nearest(self, places: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
@@ -412,20 +436,19 @@ class Copies(Sheet):
 
 
 def lay_out(copy: Copy) -> Floats:
-    """Return the coordinates in the exemplar of the samples of a copy, (rows, columns, 2)."""
+    """Return the coordinates in the exemplar of all samples of a copy, (rows, columns, 2)."""
     at = [(np.arange(n) + 0.5) / f - 0.5 + o for n, f, o in zip(copy.shape, copy.factor, copy.first, strict=True)]
     return np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
 
 
 def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -> Slope | None:
-    """Return the plane that an exemplar shows, if the evidence is good enough.
+    """Return the plane that an exemplar shows. None if the evidence is too weak.
 
-    A scale map contains the widths of elements, or the square roots of their areas. The square roots of areas are the
-    3/2 power of the widths in perspective, and the plane describes widths (see `Plane.power`). If neither the caller
-    nor the map specifies the kind, the kind that fits better is used. Measured maps deviate from a plane, and maps of
-    round elements that get smaller are close to one. Edges therefore decide: on a plane, they get steeper along the
-    slope with distance. A good fit needs only a small increase. Without any increase, the plane may have been fitted
-    to an exemplar that does not show one.
+    A scale map contains widths of elements, or square roots of their areas. On a plane in perspective, the square
+    roots of areas are the 3/2 power of the widths. The plane describes widths (see `Plane.power`). If neither the
+    caller nor the map specifies which, the better fit is used. Measured maps deviate from a plane, and maps of round
+    elements that get smaller can fit a plane. Edges therefore decide: on a plane, they get steeper along the slope
+    with distance. A good fit requires only a small increase of steepness. Without any increase, the fit is rejected.
     """
     holds = find_kind(scale) if scale_kind is None else scale_kind
     plane = Slope.fit(scale, AREAS if holds == "area" else 1.0)
@@ -439,9 +462,9 @@ def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -
 
 
 def _measure_foreshortening(colours: Floats, plane: Slope) -> float:
-    """Return how fast edges get steeper along the slope as scales fall.
+    """Return the exponent with which edges get steeper along the slope as scales fall.
 
-    It is 1 if edges are along or across the slope.
+    It is 1 on a plane whose edges are along or across the slope.
     """
     from scipy import ndimage
 
@@ -460,7 +483,7 @@ def _measure_foreshortening(colours: Floats, plane: Slope) -> float:
 
 
 def measure_seen(places: NDArray[np.int32], frames: NDArray[np.int16]) -> float:
-    """Return the median error of log sizes, weighted by the area of a sheet that each pixel shows."""
+    """Return the median error of log scales, weighted by the area of the sheet that each pixel shows."""
     if min(places.shape[:2]) < 2:
         return 0.0
     steps = np.stack([np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]], axis=-1) / ONE
@@ -477,7 +500,7 @@ def measure_areas(frames: NDArray[np.float64]) -> NDArray[np.float64]:
 def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return products of matrices (..., 2, 2).
 
-    The last bits of library functions would depend on the processor.
+    Written out, because the last bits of library functions depend on the processor.
     """
     return np.asarray(a[..., :, :1] * b[..., :1, :] + a[..., :, 1:] * b[..., 1:, :], np.float64)
 
@@ -489,9 +512,9 @@ def invert(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def round_frames(frames: NDArray[np.float64]) -> NDArray[np.int16]:
-    """Return Jacobians in fixed point, (points, 2, 2).
+    """Convert Jacobians to fixed point, (points, 2, 2).
 
-    Jacobians that are too large for fixed point are reduced as a whole.
+    Jacobians that are too large for fixed point are scaled down.
     """
     steepest = np.abs(frames).max(axis=(-2, -1), keepdims=True)
     held = frames * np.minimum(1, STEEP / np.maximum(steepest, 1e-9))
@@ -499,11 +522,11 @@ def round_frames(frames: NDArray[np.float64]) -> NDArray[np.int16]:
 
 
 def code(logs: Floats, strength: float) -> NDArray[np.int16]:
-    """Return weighted logarithms of scales in the 12 bits of a demand."""
+    """Convert log scales, weighted by the strength of a demand, to its 12-bit values."""
     return np.asarray(np.clip(np.rint(logs * (NAT * strength**0.5)), -2048, 2047), np.int16)
 
 
 def mirror(at: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Return coordinates, mirrored into the image if they are outside its borders."""
+    """Mirror coordinates that are outside an image at its borders."""
     ends = np.array([max(n - 1, 1) for n in shape])
     return np.asarray(np.abs((at + ends) % (2 * ends) - ends), np.float64)

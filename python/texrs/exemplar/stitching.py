@@ -1,4 +1,4 @@
-"""Collect the facts about an exemplar that the stitcher needs."""
+"""Prepare an exemplar for the stitcher, which cuts patches along seams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from texrs.exemplar.separate_elements import Instances
 __all__ = ["guess_instances", "make_stitcher"]
 
 REACH, DEEP = 3.0, 8.0
-"""Depth in pixels beyond which all cuts inside a possible element cost the same, and the depth that it counts as."""
+"""Depth in pixels beyond which all seams inside an uncertain element cost the same, and the depth whose cost they have.
+"""
 
 
 def make_stitcher(
@@ -26,9 +27,9 @@ def make_stitcher(
     sure: bool = True,
     beside: Adjacency | None = None,
 ) -> Stitcher:
-    """Return an exemplar prepared for cutting patches, with its elements and colour costs.
+    """Return an exemplar prepared for cutting patches, with its elements and the costs of neighbouring colours.
 
-    The costs of neighbouring colours are measured if they are not given.
+    The costs are measured if they are not given.
     """
     beside = beside or measure_adjacency(colours, wrap)
     return Stitcher(
@@ -43,9 +44,9 @@ def make_stitcher(
 
 
 def guess_instances(parts: Segmentation) -> Instances | None:
-    """Return the possible elements of an image, such as a heap without a background between them.
+    """Return the uncertain elements of an image, such as a heap without a background between its elements.
 
-    None if there are none.
+    None if the segmentation finds none.
     """
     if parts.kind != "components":
         return None

@@ -1,4 +1,4 @@
-"""Find the mirror images that an exemplar resembles, with their pixels, coordinates and frames."""
+"""Find the mirror images that look like the exemplar itself, and mirror pixels, coordinates and frames."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from texrs.exemplar.regularity import measure_polarity
 __all__ = ["ALL", "NONE", "Flip", "find_mirrors", "flip", "flip_coordinates", "flip_frame"]
 
 Flip: TypeAlias = tuple[bool, bool]
-"""Two flags: the image is mirrored along its row axis, and along its column axis."""
+"""Two flags: mirrored along the row axis, and mirrored along the column axis."""
 
 
 NONE: Flip = (False, False)
 ALL: tuple[Flip, ...] = (NONE, (True, False), (False, True), (True, True))
-"""The mirror images of an exemplar, the exemplar itself first."""
+"""All mirror images of an exemplar. The first is the exemplar itself."""
 
 POLAR, SUSPECT = 5.0, 4.5
-"""Minimum difference between an exemplar and its mirror image, in standard errors, that is certain, and that is suspected.
+"""Difference between an exemplar and its mirror image, in standard errors, that is certain, and that is suspected.
 
-With a threshold of 3.5, heaps of fruit would still be mirrored left to right, and elements would face each other.
+With 3.5, heaps of fruit were not excluded from mirroring left to right, so that elements faced each other.
 """
 
 
 def find_mirrors(guide: Floats, sure: float = POLAR) -> tuple[Flip, ...]:
-    """Return the mirror images that look like an exemplar, the exemplar itself first.
+    """Return the mirror images that look like the exemplar itself, which is the first.
 
-    For example, a texture that is lit from the left does not look like one lit from the right.
+    For example, a texture lit from the left does not look like its mirror image, which is lit from the right.
 
-    A mirror image is left out if it differs by at least ``sure`` standard errors.
+    A mirror image is excluded if it differs by at least ``sure`` standard errors.
     """
     rows, columns, oblique = measure_polarity(guide)
-    # Each mirror reverses two of the three measures, which are independent evidence.
+    # Each mirror image reverses two of the three measures, so use their combined evidence.
     odd = {(True, False): (rows, oblique), (False, True): (columns, oblique), (True, True): (rows, columns)}
     return tuple(f for f in ALL if f == NONE or math.hypot(*odd[f]) < sure)
 
 
 def flip(array: Array, axes: Flip) -> Array:
-    """Mirror an image along its row axis, its column axis, or both."""
+    """Mirror an array along its row axis, its column axis, or both."""
     flipped = array[:: -1 if axes[0] else 1, :: -1 if axes[1] else 1]
     if array.ndim < 3 or not axes[1]:
         return np.ascontiguousarray(flipped)
-    # Copy channel by channel, so that copies run along rows and not along the few values of a pixel.
+    # Copy each channel separately, so that copies run along rows and not along the few values of a pixel.
     out = np.empty(array.shape, array.dtype)
     for channel in np.ndindex(array.shape[2:]):
         out[:, :, *channel] = flipped[:, :, *channel]
@@ -61,5 +61,5 @@ def flip_coordinates(coordinates: Floats, axes: Flip, shape: tuple[int, int]) ->
 
 
 def flip_frame(axes: Flip) -> Floats:
-    """Return the Jacobian of a mirror."""
+    """Return the Jacobian of a mirror image, (2, 2)."""
     return np.diag([-1.0 if f else 1.0 for f in axes]).astype(np.float32)
