@@ -55,10 +55,10 @@ class Mask:
     Parameters
     ----------
     marks : (H, W) or (D, H, W) array, with or without channels, path_like, PIL.Image.Image, str, float or None
-        The marks: an image of the same size, or another value that the function allows instead. A bool array is taken as it
-        is. A pixel of an image is marked if its largest channel is at least half of white. An image without any light pixel
-        contains numbers, such as 0 and 1, or labels: each value other than 0 is marked. An image whose transparency varies is
-        a layer of a paint program: each pixel that is at least half opaque is marked.
+        Image of the same size, or another value that the function allows. Bool arrays are used unchanged. A pixel of
+        an image is marked if its largest channel is at least half of white. The values of an image without light
+        pixels are numbers, such as 0 and 1, or labels, and all values except 0 are marked. An image with varying
+        transparency is a layer of a paint program, and its pixels are marked if they are at least half opaque.
     invert : bool
         If True, all pixels that the mask does not mark are marked instead. Default: False.
     threshold : float, optional

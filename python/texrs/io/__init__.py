@@ -139,8 +139,9 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     Returns
     -------
     ndarray
-        Shape (H, W) or (H, W, C) with the dtype of the file. Palettes are applied, and samples of fewer than 8 bits are
-        spread to 8. CMYK is converted to sRGB. The image is turned upright by the Exif orientation of the file.
+        Image of shape (H, W) or (H, W, C) with the dtype of the file. Palettes are applied, and samples of fewer than
+        8 bits are scaled to 8 bits. CMYK is converted to sRGB. The image is turned upright according to the Exif
+        orientation.
 
     Raises
     ------
@@ -277,7 +278,7 @@ def read_volume(
     Returns
     -------
     ndarray
-        Shape (D, H, W) or (D, H, W, C) with the dtype of the file.
+        Volume of shape (D, H, W) or (D, H, W, C) with the dtype of the file.
 
     Raises
     ------
@@ -326,7 +327,7 @@ def write(
     Parameters
     ----------
     path : path_like
-        The suffix decides the format; the table of `texrs.io` lists what each format can hold.
+        File to write. Its suffix decides the format. The table of `texrs.io` lists what each format can store.
     array : array_like
         Image of shape (H, W) or (H, W, C).
     overwrite : bool
@@ -388,8 +389,8 @@ def write_volume(
         it. .tif files store it as ImageJ does, if the dtype is uint8, uint16 or float32. `read_spacing` reads it.
         Default: the spacing of ``like``, or 1.
     like : path_like, optional
-        Volume whose spacing is copied. Orientation, origin and units are also copied between two NRRD files, two NIfTI
-        files or two TIFF files of ImageJ. Default: None.
+        Volume whose spacing is copied. Orientation, origin and units are also copied between two NRRD files or two
+        NIfTI files, and the unit between two TIFF files. Default: None.
 
     Raises
     ------

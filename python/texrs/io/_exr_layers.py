@@ -40,7 +40,7 @@ def _open(path: Path, **options: Any) -> Any:
 
 
 def _read_headers(path: Path) -> list[dict[str, Any]]:
-    """Return the header of each part."""
+    """Return the header of each part of a file."""
     check_file(path)
     with translate_errors(path, "reading"):
         file = _open(path, header_only=True)
@@ -60,7 +60,7 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
             raise FileError(f"{path}: contains deep images, which are not supported")
         for window in ("displayWindow", "dataWindow"):
             check_size(path, _measure(head[window])[1], 1, 4, limit)
-    # A material has many channels, so allow 64 times the bytes of an image of one channel.
+    # A material has many channels, so allow up to 64 channels of ``limit`` pixels.
     count = sum(len(head["channels"]) for head in heads)
     if count * int(np.prod(next(iter(sizes)))) * 4 > 64 * 4 * limit:
         raise LimitExceeded(f"{path}: {count} channels are too many for a limit of {limit} pixels")

@@ -57,7 +57,7 @@ class Correlation:
         return f"Correlation(shape={self.shape})"
 
     def maps(self, template: object) -> Floats:
-        """Return the similarity of a template to each window of the image.
+        """Return the correlation of a template with each window of the image.
 
         Parameters
         ----------

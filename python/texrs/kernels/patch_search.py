@@ -178,7 +178,7 @@ class PatchIndex:
     def best(
         self, patch: object, weight: object = None, *, count: int = 1, separation: int = 4, ratio: float = math.inf
     ) -> list[Match]:
-        """Return the best positions of a patch.
+        """Find the positions in the images that match a patch best.
 
         The search is greedy: the first match is the best position, the second is the best position far enough from the
         first, and so on.
@@ -232,7 +232,7 @@ class PatchIndex:
         separation: int = 4,
         ratio: float = math.inf,
     ) -> list[Match]:
-        """Return the best of some given positions.
+        """Return the best matches among given positions.
 
         Parameters
         ----------

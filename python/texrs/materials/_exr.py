@@ -141,7 +141,7 @@ def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Arra
 
 
 def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role], dict[str, float]]:
-    """Return the maps of a file, the roles that the caller or the header states, and the weights."""
+    """Return the maps of a file (one per layer), their roles, and their weights for decisions."""
     channels, words = read_layers(path)
     known = parse(words, channels)
     full_names = {id(pixels): full for full, pixels in channels.items()}

@@ -50,7 +50,7 @@ VERTICES, INDICES = 34962, 34963
 LINEAR, MIPMAPS, REPEAT = 9729, 9987, 10497
 BEAM = "KHR_materials_emissive_strength"
 APART = 1.15
-"""Distance between the centres of neighbouring shapes, in the unit of their size."""
+"""Distance between the centres of the two shapes, as a multiple of their longer side."""
 WORDS = {"VEC2": 2, "VEC3": 3, "VEC4": 4, "SCALAR": 1}
 
 

@@ -21,7 +21,7 @@ def find_space(role: Role, dtype: np.dtype[Any]) -> Space:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Map:
-    """One map of a material.
+    """Map of a material: its pixels, its role and its encoding.
 
     Attributes
     ----------

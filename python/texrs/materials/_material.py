@@ -368,7 +368,8 @@ class Material(Exports):
         wrap : bool or (bool, bool)
             Axes along which the maps are periodic. They remain periodic.
         size : float, optional
-            Size in pixels above which variation counts as light (see `texrs.materials.flatten_lighting`).
+            Minimum size in pixels, at least 4, of variations that are treated as light (see
+            `texrs.materials.flatten_lighting`).
 
         Returns
         -------

@@ -73,7 +73,7 @@ def render_volume(
         ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. Default: voxels that differ from the most frequent colour are shown in
         their own colour.
     shading : bool
-        If True, surfaces are shaded.
+        If True, surfaces that face away from the light are darkened.
 
     Returns
     -------
