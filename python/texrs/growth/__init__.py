@@ -1,9 +1,9 @@
-"""The coarse-to-fine engine: synthesis by corrected coordinates, in two and three dimensions.
+"""The coarse-to-fine engine: synthesis by correcting source coordinates, in two and three dimensions.
 
-`texrs.growth.engine` is the loop over the levels. It takes a start, a corrector and the constraints of the output.
-`windows` contains the engine's own start and corrector,
-and `start` the other starts. `constraints` holds the constraints of an output, and `settings` the numbers. `sheets` grows
-patches of the sizes in a scale map, and `scales` grows from an atlas of scaled copies.
+`texrs.growth.engine` contains the loop over the levels. Its inputs are a start, a corrector and the constraints of the
+output. `windows` contains the engine's own start and corrector, and `start` the other starts. `constraints` contains
+the constraints of an output, and `settings` the settings. `sheets` stitches patches whose sizes follow a scale map,
+and `scales` synthesises from an atlas of scaled copies.
 """
 
 from texrs.growth.constraints import Conditions, Constraints, Guide, Surroundings

@@ -1,4 +1,4 @@
-"""Constraints of an output: given points, and a guide map to follow."""
+"""Constraints of an output: given points, and a guide map that it should follow."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ from texrs.kernels.gather import gather
 __all__ = ["NOTHING", "Asked", "Conditions", "Constraints", "Guide", "Pins", "Surroundings", "average_points"]
 
 WEIGHT = 1500
-"""Cost of a colour that differs from the given one, in 1/256. A difference of a tenth of the range costs about as much
-as two unrelated windows.
+"""Cost of a squared difference from a given colour, in 1/256.
+
+A difference of a tenth of the range costs about as much as two unrelated windows.
 """
 FOLLOW = 150
-"""Cost of a difference from a guide map, in 1/256. A difference of a third of the range costs about as much as two
-unrelated windows.
+"""Cost of a squared difference from a guide map, in 1/256.
+
+A difference of a third of the range costs about as much as two unrelated windows.
 """
 
 
@@ -34,7 +36,7 @@ unrelated windows.
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Constraints:
-    """Points of an output that are given, by their values or by their source coordinates.
+    """Given points of an output, specified by their values or by their source coordinates.
 
     Attributes
     ----------
@@ -50,7 +52,7 @@ class Constraints:
     Raises
     ------
     InvalidInput
-        If neither values nor coordinates are given, or both.
+        If neither values nor coordinates are given, or if both are given.
 
     Examples
     --------
@@ -75,20 +77,20 @@ class Constraints:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Refuse constraints without exactly one of values and coordinates."""
+        """Raise an error unless exactly one of values and coordinates is given."""
         if (self.values is None) == (self.coordinates is None):
             raise InvalidInput("constraints: must have either values or coordinates of the points that mask marks")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Guide:
-    """Two maps: the output's map is followed by means of the exemplar's map. For exemplars with a trend.
+    """Guide for exemplars with a trend: a map of the exemplar, and the map that the output should follow.
 
     Attributes
     ----------
     exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
-        Guided quantity at each sample of the exemplar, such as its depth. Python accepts finite numbers that broadcast
-        to the exemplar's axes.
+        Quantity at each sample of the exemplar, such as its depth. Python accepts finite numbers that broadcast to the
+        exemplar's axes.
     output : (rows, columns[, C]) or (planes, rows, columns[, C]) array_like
         Requested quantity at each point of the output, in the same unit. Python accepts finite numbers that broadcast
         to the size of the output.
@@ -99,11 +101,11 @@ class Guide:
     Raises
     ------
     InvalidInput
-        If a map has values that are not finite numbers, or the weight is out of its range.
+        If a map contains values that are not finite numbers, or the weight is out of its range.
 
     Examples
     --------
-    An exemplar that grows brighter downwards, synthesised upside down:
+    An exemplar that becomes brighter downwards, synthesised upside down:
 
     >>> import numpy as np
     >>> import texrs
@@ -122,7 +124,7 @@ class Guide:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Check everything that does not depend on a size."""
+        """Check the values of the maps and the weight, which do not depend on a size."""
         as_float(self.weight, "weight", 0, 100)
         for name, given in (("exemplar", self.exemplar), ("output", self.output)):
             values = try_array(given)
@@ -145,11 +147,11 @@ class Asked:
     demand : Demand, optional
         Values that the points should show.
     held : (points) bool, optional
-        Points whose coordinates are fixed.
+        True for points whose coordinates are fixed.
     given : (points * A) int32, optional
-        Coordinates of the fixed points, in units of 1/4096 of a sample. None if the points have them already.
+        Coordinates of the fixed points, in units of 1/4096 of a sample. None if the level already contains them.
     surrounds : bool
-        If True, the start receives the fixed points and grows from them.
+        If True, the start also receives the fixed points, and places its blocks around them.
 
     """
 
@@ -159,7 +161,7 @@ class Asked:
     surrounds: bool = False
 
     def place(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the coordinates with the given ones inserted."""
+        """Insert the given coordinates into the coordinates of a level."""
         if self.held is None or self.given is None:
             return places
         return np.where(np.repeat(self.held, len(places) // len(self.held)), self.given, places)
@@ -172,26 +174,27 @@ class Held(Protocol):
     """Points of the output whose coordinates are fixed."""
 
     def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
-        """Return the fixed points of a level, (points) bool, and their coordinates, (points * A) int32."""
+        """Return True for fixed points of a level, (points) bool, and their coordinates, (points * A) int32."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pins:
     """Scattered fixed points.
 
-    A point of a level is fixed if it covers any of them, and takes the coordinates of the first one.
+    A point of a level is fixed if it covers any fixed point of the output. It gets the coordinates of the first one.
 
-    ``mask`` is (size) bool, ``coordinates`` (size, A) float32.
+    ``mask`` is (size) bool, and ``coordinates`` is (size, A) float32.
     """
 
     mask: Bools
     coordinates: Floats
 
     def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
-        """Return the fixed points of a level, and their coordinates."""
+        """Return True for fixed points of a level, and their coordinates."""
         axes = len(region.shape)
         held, places = np.zeros(region.points, bool), np.zeros((region.points, axes), np.int32)
-        # NumPy keeps the last value written to a place, so write in reverse order to keep the first one.
+        # Write in reverse order to keep the first value, because NumPy keeps the last value that is written to a
+        # place.
         at = np.argwhere(self.mask)[::-1]
         theirs = self.coordinates[self.mask][::-1]
         index = np.ravel_multi_index(tuple(np.minimum(at // spacing, np.array(region.shape) - 1).T), region.shape)
@@ -202,18 +205,18 @@ class Pins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """Known points around a hole. A point of a level is fixed if most of the points that it covers are known.
+    """Known points around a hole.
 
-    A point that covers as many known as unknown points is fixed too: otherwise coarse levels have no information about
-    how the surroundings continue. ``mask`` is (size) bool. ``places`` is (size, A) int32, the samples that the points
-    show.
+    A point of a level is fixed if at least half of the points that it covers are known. Otherwise coarse levels would
+    have no information about the known points around a hole. ``mask`` is (size) bool. ``places`` is (size, A) int32,
+    the source sample of each point.
     """
 
     mask: Bools
     places: NDArray[np.int32]
 
     def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
-        """Return the fixed points of a level, and their coordinates."""
+        """Return True for fixed points of a level, and their coordinates."""
         share = average_points(self.mask.astype(np.float32), region.shape, spacing)
         starts = [np.minimum(np.arange(n) * spacing, m - 1) for n, m in zip(region.shape, self.mask.shape, strict=True)]
         first = self.places[np.ix_(*starts)].astype(np.float64)
@@ -222,22 +225,22 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditions:
-    """Constraints and a guide, checked for an exemplar and a size.
+    """Constraints and a guide that were checked for an exemplar and an output size.
 
-    They give the constraints of each level of an output.
+    `at` converts them to the constraints of a level.
 
     Attributes
     ----------
     image : (..., C) array
-        The exemplar.
+        Image or volume of the exemplar.
     mask : (size) bool, optional
-        Mask of the given points.
+        True for given points.
     values : (size, C) array, optional
         Values of the given points.
     pins : Pins, optional
         Source coordinates of the given points.
     maps : (Floats, Floats), optional
-        Guide: the map of the exemplar and the map of the output, both 0 to 1.
+        Guide: the map of the exemplar and the map of the output, both scaled to values from 0 to 1.
     weight : int
         Weight of the guide, in 1/256.
 
@@ -254,12 +257,12 @@ class Conditions:
     def of(
         cls, image: Array, shape: tuple[int, ...], constraints: Constraints | None, guide: Guide | None
     ) -> Conditions:
-        """Check the constraints and the guide of a call for an output of a shape.
+        """Check the constraints and the guide for an output of a given shape.
 
         Raises
         ------
         InvalidInput
-            If constraints or maps have other shapes or types, if coordinates are outside the exemplar, or if a guide
+            If constraints or maps have the wrong shape or type, if coordinates are outside the exemplar, or if a guide
             is combined with values.
 
         """
@@ -291,11 +294,11 @@ class Conditions:
 
     @property
     def free(self) -> bool:
-        """Whether there are neither constraints nor a guide."""
+        """True if there are neither constraints nor a guide."""
         return not self.count and self.maps is None
 
     def show(self, composite: Array) -> Array:
-        """Return the image with the given values inserted exactly."""
+        """Insert the given values into an image, so that they are exact."""
         if self.mask is None or self.values is None or self.pins is not None:
             return composite
         result = composite.copy()
@@ -303,12 +306,12 @@ class Conditions:
         return result
 
     def at(self, level: int, region: Region, spacing: int) -> Asked:
-        """Return the constraints of a level."""
+        """Return the constraints of a level whose points are ``spacing`` pixels apart."""
         held, given = (None, None) if self.pins is None else self.pins.at(region, spacing)
         return Asked(self._make_demand(region, spacing), held, given)
 
     def _make_demand(self, region: Region, spacing: int) -> Demand | None:
-        """Return the demand of the guide's map, or of the mean of the given values that a point of the level covers."""
+        """Return the values that a level should have: means of the guide's map, or of the given values."""
         if self.maps is not None and self.weight:
             mine, theirs = self.maps
             points = _pool(np.ones((*theirs.shape[:-1], 1), np.float32), region.shape, spacing)
@@ -327,7 +330,7 @@ class Conditions:
 
 
 def average_points(values: Array, shape: tuple[int, ...], spacing: int) -> Array:
-    """Return the mean of the output points that each point of a level covers; the last point covers the rest."""
+    """Return the mean of the output points that each point of a level covers. The last point covers the rest."""
     sizes = [np.diff([*_find_starts(n, m, spacing), m]) for n, m in zip(shape, values.shape, strict=True)]
     return np.asarray(_pool(values, shape, spacing) / np.maximum(np.multiply.outer(*sizes), 1))
 
@@ -376,14 +379,14 @@ def _check_maps(guide: Guide, mine: tuple[int, ...], theirs: tuple[int, ...]) ->
 
 
 def _as_channels(values: Array, image: Array) -> Floats:
-    """Return up to four channels in units of the exemplar's range."""
+    """Return up to four channels, scaled so that the exemplar's range is 0 to 1."""
     low = image.reshape(-1, image.shape[-1]).min(axis=0).astype(np.float64)
     span = float((image.reshape(-1, image.shape[-1]).max(axis=0) - low).max()) or 1.0
     return np.asarray((values[..., :4].astype(np.float64) - low[:4]) / span, np.float32)
 
 
 def _code(values: Floats) -> NDArray[np.int16]:
-    """Return values in [0, 1] as four numbers of 12 bits each."""
+    """Return values from 0 to 1 as four 12-bit integers per point."""
     flat = values.reshape(-1, values.shape[-1])
     out = np.zeros((len(flat), 4), np.int16)
     out[:, : flat.shape[1]] = np.clip(np.rint(flat * 2047), -2048, 2047)
@@ -391,19 +394,19 @@ def _code(values: Floats) -> NDArray[np.int16]:
 
 
 def _find_starts(count: int, length: int, spacing: int) -> NDArray[np.intp]:
-    """Return the first output coordinate of each point of a level along an axis."""
+    """Return the first output coordinate that each point of a level covers, along an axis."""
     return np.minimum(np.arange(count) * spacing, length - 1)
 
 
 def _pool(values: Floats, shape: tuple[int, ...], spacing: int) -> Floats:
-    """Return the sums of output values over the points of a level."""
+    """Sum output values over the points that each point of a level covers."""
     for axis, n in enumerate(shape):
         values = np.add.reduceat(values, _find_starts(n, values.shape[axis], spacing), axis=axis)
     return values
 
 
 def _shrink(exemplar: Floats, spacing: int) -> Floats:
-    """Return the mean of the samples that a sample of a level covers. Remaining samples at the ends are left out."""
+    """Average an exemplar's map over the samples of a level. Remaining samples at the ends are left out."""
     axes = exemplar.ndim - 1
     trimmed = exemplar[tuple(slice(0, n // spacing * spacing) for n in exemplar.shape[:axes])]
     for axis in range(axes):

@@ -1,11 +1,11 @@
-"""The coarse-to-fine engine: the one loop over the levels for all synthesis by corrected coordinates.
+"""The coarse-to-fine engine: one loop over the levels for every synthesis that corrects source coordinates.
 
-A level of the output has half the points of the next finer level along each axis. Each point has a place in fixed
-point: the sample of the exemplar that it shows. The steps of each level are:
+A level of the output has half as many points along each axis as the next finer level. Each point has a place: the
+coordinates of its source sample in the exemplar, in fixed point. The steps of each level are:
 
 1. The **start** gives the first level its places: patch-based initialisation, patches stitched along minimum cuts, or
   a draft
-   (`texrs.growth.start`);
+   a given draft (`texrs.growth.start`);
 2. Each finer level is **upsampled** from the one before, with the Jacobians of the frames.
 3. The **constraints** of the level are inserted (`texrs.growth.constraints`).
 4. The **corrector** changes places until every window of the output resembles a window of the exemplar
@@ -47,16 +47,15 @@ __all__ = [
 
 Places: TypeAlias = NDArray[np.int32]
 FramesAt: TypeAlias = Callable[[Region, int], NDArray[np.int16]]
-"""Return the Jacobians of a region whose points have a given distance in pixels, as `texrs._engine.pyramid.to_fixed`.
-"""
+"""Function that returns the Jacobians of a region, for points a given number of pixels apart (`to_fixed`)."""
 Ask: TypeAlias = Callable[[int, Region, int], Asked]
-"""Return the constraints of a level, from its number, its region and the distance of its points in pixels."""
+"""Function that returns the constraints of a level from its number, region and distance of points in pixels."""
 Show: TypeAlias = Callable[[Places, Region, int], Array]
-"""Return an image of the places of a region whose points have a given distance in pixels."""
+"""Function that returns an image of the places of a region, for points a given number of pixels apart."""
 
 
 class Corrector(Protocol):
-    """Correct the places of a level, which it may overwrite."""
+    """Function that corrects the places of a level. It may overwrite them."""
 
     def __call__(
         self,
@@ -67,12 +66,12 @@ class Corrector(Protocol):
         asked: Asked,
         progress: Progress | None,
     ) -> Corrected:
-        """Return the places after correction."""
+        """Return the corrected places."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patches:
-    """Patches that the places come from.
+    """The patches that an output was stitched from.
 
     Attributes
     ----------
@@ -81,11 +80,11 @@ class Patches:
     frames : (patches, A, A) float32
         Jacobian at the centre of each patch.
     bent : bool
-        If True, the patches also follow the field inside.
+        If True, the patches bend with the field. If False, they are rotated and scaled as a whole.
     seams : float
-        Mean cost of the seams at a point.
+        Mean cost of the seams per point.
     healed : int
-        Number of moves that repaired a torn element or removed it.
+        Number of moves that repaired or removed a torn element.
 
     """
 
@@ -96,24 +95,24 @@ class Patches:
     healed: int
 
     def report(self) -> dict[str, Any]:
-        """Return the figures as JSON types."""
+        """Return these values for a report, in JSON types."""
         count = len(np.unique(self.labels))
         return {"patches": count, "bent": self.bent, "seams": round(self.seams, 6), "healed": self.healed}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """The first level of an output and how its places are computed.
+    """The first level of an output, and the function that computes its places.
 
     Attributes
     ----------
     level : int
-        The first level.
+        Number of the first level.
     make : callable
-        Function that returns the places and the patches that they come from, if any. Its arguments are a region, its
-        frames, the constraints and the progress to report.
+        Function that returns the places, and their patches or None. Its arguments are a region, its frames, the
+        constraints and the progress function.
     name : str
-        Name of its image among the stages. Empty if it has no image.
+        Name of the start's image among the stages, or "" if it has no image.
 
     """
 
@@ -124,14 +123,14 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class LevelDone:
-    """Work done at a level: the passes, and the share of the points that the last two passes changed, if known."""
+    """Work at a level: its shape, number of passes, and the share of points that the last two passes changed."""
 
     shape: tuple[int, ...]
     passes: int
     changed: float
 
     def report(self) -> dict[str, Any]:
-        """Return the figures as JSON types."""
+        """Return these values for a report, in JSON types."""
         return {"shape": list(self.shape), "passes": self.passes, "changed": round(self.changed, 6)}
 
 
@@ -146,9 +145,9 @@ class Grown:
     levels : tuple of LevelDone
         Work done at each level, from the first one on.
     stages : mapping of str to array
-        Images of the start and of each level except the last, whose places are the result.
+        Images of the start and of each level except the last, whose image is the result.
     patches : Patches, optional
-        Patches of the start, if no later step changed them.
+        Patches of the start, or None if a later step changed their places.
 
     """
 
@@ -171,7 +170,7 @@ def keep(
     asked: Asked,
     progress: Progress | None,
 ) -> Corrected:
-    """Return the places unchanged, because stitched patches are complete."""
+    """Corrector that returns the places unchanged, for stitched patches."""
     return Corrected(places, 0, 0.0)
 
 
@@ -191,11 +190,11 @@ def grow(
     Parameters
     ----------
     region : Region
-        The output.
+        Region of the output at full resolution.
     levels : int
         Number of levels of the exemplar's pyramid. The last one has the resolution of the output.
     start : Start
-        First level and its places.
+        Number of the first level, and the function that computes its places.
     correct : Corrector
         Function that corrects the places of a level.
     frames : callable
@@ -203,9 +202,9 @@ def grow(
     ask : callable
         Function that returns the constraints of a level.
     show : callable, optional
-        Function that makes the images of the stages. No images are made by default.
+        Function that returns the images of the stages. Default: no images.
     progress : callable, optional
-        Called with the stage and its completed share. An exception that it raises stops the work.
+        Function called with the stage and its completed share. An exception that it raises stops the work.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Synthesis from an atlas: elements of the sizes in a scale map, around fixed points."""
+"""Synthesis from an atlas of scaled copies: elements have the sizes in a scale map, also around fixed points."""
 
 from __future__ import annotations
 
@@ -20,36 +20,39 @@ from texrs.growth.windows import Windows
 __all__ = ["FROM_ATLAS", "Scales", "grow_from_atlas"]
 
 FROM_ATLAS = Settings(passes=(12, 8, 4), reaches=(2, 2, 2), coarsest=32, rounds=6, candidates=1024)
-"""Settings for growth from an atlas. They try more candidates, because much of an atlas does not have the requested
-scale, and coarse levels must tell more scales apart.
+"""Settings for synthesis from an atlas.
+
+They try more candidates, because many places of an atlas do not have the requested scale. The coarsest level has 32
+samples, so that scales can be distinguished there.
 """
 
 WEIGHT = 1264
-"""Cost of a scale that differs from the requested one, in 1/256. A factor of 1.6 costs as much as two unrelated
-windows.
+"""Cost of a squared difference in scale from the requested one, in 1/256.
+
+A factor of 1.6 costs as much as two unrelated windows.
 """
 SLAB = 1 << 15
-"""Number of points of the target that are processed at once, to bound memory."""
+"""Number of points of the target that are processed at once, to limit memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scales:
-    """Constraints that request the scales of a target.
+    """Constraints that request a scale at each point of an output.
 
-    They prefer unscaled copies of the exemplar, and allow no barred places.
+    Unscaled copies of the exemplar are preferred, and excluded places of the atlas are not used.
 
     Attributes
     ----------
     atlas : Atlas
-        Atlas to copy from.
+        Atlas that the output is synthesised from.
     settings : Settings
-        Settings. Only their weights are used.
+        Settings of the engine. Only their weights are used.
     target : (rows, columns) float32, optional
-        Requested scales. None if sizes do not count.
+        Requested scale of each pixel. None if scales are not restricted.
     strength : float
-        Weight of the scales.
+        Factor on the weight of the scales. The usual weight is 1.
     held : Held, optional
-        Fixed points, by the samples of the atlas that they show.
+        Fixed points, by their source samples in the atlas.
 
     """
 
@@ -60,7 +63,7 @@ class Scales:
     held: Held | None = None
 
     def at(self, level: int, region: Region, spacing: int) -> Asked:
-        """Return the constraints of a level."""
+        """Return the constraints of a level whose points are ``spacing`` pixels apart."""
         here = self.atlas.levels[level]
         share = self.settings.at(level, len(self.atlas.levels)).weight * self.strength
         weight = np.array([min(round(WEIGHT * share), 65535)], np.uint16)
@@ -69,13 +72,13 @@ class Scales:
         return Asked(demand, held, given, True)
 
     def _ask_scales(self, region: Region, spacing: int) -> NDArray[np.int16]:
-        """Return the mean logarithm of the target at each point, (points)."""
+        """Return the mean logarithm of the requested scales at each point, (points)."""
         asked = np.zeros(region.shape, np.int16)
         if self.target is not None:
             thick = max(1, SLAB // (spacing * self.target.shape[1]))
             for first in range(0, len(asked), thick):
                 band = asked[first : first + thick]
-                # The last point of a closed axis also covers the rest of the axis.
+                # The last point of a periodic axis also covers the rest of the axis.
                 last = (first + thick) * spacing if first + thick < len(asked) else len(self.target)
                 logs = log_single(self.target[min(first * spacing, len(self.target) - 1) : last])
                 band[...] = code_logs(average_points(logs, band.shape, spacing))
@@ -94,33 +97,33 @@ def grow_from_atlas(
     show: Show | None = None,
     progress: Progress | None = None,
 ) -> Grown:
-    """Synthesise a region at the scales of a target.
+    """Synthesise a region from an atlas, with the scales of a target.
 
     Parameters
     ----------
     atlas : Atlas
-        Atlas to copy from.
+        Atlas that the output is synthesised from.
     region : Region
         Region to fill.
     target : (rows, columns) float32, optional
-        Requested scales.
+        Requested scale of each pixel. Default: scales are not restricted.
     settings : Settings
         Settings of the engine.
     strength : float
-        Weight of the scales.
+        Factor on the weight of the scales. Default: 1.
     held : Held, optional
-        Points that are given.
+        Fixed points, by their source samples in the atlas.
     seed : int
         Seed of the random choices.
     show : callable, optional
-        Function that makes the images of the stages.
+        Function that returns the images of the stages.
     progress : callable, optional
-        Called with the stage and its completed share.
+        Function called with the stage and its completed share.
 
     Returns
     -------
     Grown
-        The result, whose places are coordinates of the atlas.
+        The result, whose places are source coordinates in the atlas.
 
     """
     windows = Windows(tuple(level.appearance for level in atlas.levels), settings, seed)

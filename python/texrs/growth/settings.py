@@ -1,4 +1,4 @@
-"""Settings of the engine: amounts of work, and weights."""
+"""Settings of the engine: numbers of passes and candidates, and weights."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Settings:
     reaches : (int, int, int)
         Distance of the neighbours whose matches are tried, 1 or 2 points.
     votes : (int, int, int)
-        Radius within which windows vote on a point. If 0, each point takes its own match.
+        Radius of the windows whose matches vote on a point. If 0, each point uses its own match.
     weights : (float, float, float)
         Weight of the requested scales compared with similarity to the exemplar.
     radii : sequence of int
@@ -26,21 +26,21 @@ class Settings:
     coarsest : int
         Minimum side of the exemplar at the coarsest level, in samples.
     cell, rounds, candidates : int
-        Patch-based initialisation: side of a cell, number of half-rounds of choosing, and candidates of each choice.
+        Settings of the blocks of the start: side of a cell in points, number of half-rounds of choosing, and number of
+        candidates per choice.
     contrast, continuation, repetition : float
-        Patch-based initialisation. ``contrast``: division of misfits by the contrast of the pieces, from 0 to 1.
-        ``continuation``: cost of continuing exactly where a neighbour ends. ``repetition``: cost of showing the same
-        samples as a neighbour.
+        Settings of the blocks of the start. ``contrast``: extent of dividing a misfit by the contrast of the block,
+        from 0 to 1. ``continuation``: cost of continuing exactly where a neighbour ends. ``repetition``: cost of using
+        the same samples as a neighbour.
     acceptance : float
-        Acceptance threshold: the minimum improvement of a random match over the present one.
+        Acceptance threshold: the minimum improvement for which a random match replaces the present one.
     coherence : float
-        Coherence penalty: cost of each neighbour that does not continue the same piece of the exemplar.
+        Coherence penalty: the cost of each neighbour that does not continue the same piece of the exemplar.
     settled : float
-        Share of points. A level is finished when two passes change fewer points, because later changes depend on all
-        points.
+        Share of points. A level is finished when two passes change fewer points. If 0, a level always has all passes.
     exhaustive : int
-        Maximum number of pairs of windows that a pass of the coarsest level compares exhaustively. Above it no pass is
-        exhaustive.
+        Maximum number of pairs of windows for exhaustive comparison in the passes of the coarsest level. Above it, no
+        pass is exhaustive.
 
     """
 
@@ -62,7 +62,7 @@ class Settings:
     exhaustive: int = 0
 
     def at(self, level: int, levels: int) -> Step:
-        """Return the settings of a level, counted from the coarsest."""
+        """Return the settings of a level; 0 is the coarsest."""
         which = 2 if level == levels - 1 else 1 if level else 0
         return Step(self.passes[which], self.reaches[which], self.votes[which], self.weights[which])
 

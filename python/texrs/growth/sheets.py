@@ -1,4 +1,4 @@
-"""Synthesis from a sheet: patches of the sizes in a scale map, stitched along minimum cuts, around fixed points."""
+"""Synthesis from a sheet, an image with copies of several sizes: patches follow a scale map, around fixed points."""
 
 from __future__ import annotations
 
@@ -20,18 +20,17 @@ __all__ = ["FromSheet", "stitch_sheet"]
 LEAST, MOST = 8.0, 160.0
 """Minimum and maximum side of a patch, in samples of the sheet."""
 FITS = 0.7
-"""Maximum side of a patch, as a share of the sheet's shorter side, so that a patch has several positions."""
+"""Maximum side of a patch, as a share of the sheet's shorter side, so that a patch has several source positions."""
 OVERLAP = 0.33
 """Overlap of neighbouring patches, as a share of the patch side."""
 CANDIDATES = 4
-"""Number of positions tried for each patch. The best is used."""
+"""Number of source positions that are tried for each patch. The best one is used."""
 COLOUR, SURPRISE = 0.4, 0.5
-"""Weights of seams. Colours count more than in textures of one scale, because edges rarely meet edges of the same
-size.
-"""
+"""Weights of seams. Colours have more weight than for textures of one scale: edges of equal size rarely meet."""
 UNIT = 512
-"""Weight of a scale error. An error by a factor of e then costs as much as two unrelated windows. Unit:
-1/256 of a squared unit of log scale.
+"""Weight of a scale error, in 1/256 of a squared unit of log scale.
+
+An error by a factor of e costs as much as two unrelated windows at this weight.
 """
 
 
@@ -44,11 +43,11 @@ class FromSheet:
     coordinates : (rows, columns, 2) float32
         Source coordinates of each pixel in the exemplar.
     patches : (rows, columns) uint32
-        Patch of each pixel. Given pixels have the number after the last patch.
+        Patch of each pixel. Fixed pixels have the number after the last patch.
     frames : (rows, columns, 2, 2) float32
-        Jacobian dS/dp of each pixel.
+        Jacobian of the source coordinates at each pixel, dS/dp.
     error : float
-        Median absolute difference of log scale from the target.
+        Median absolute difference of the log scale from the target.
     side : float
         Side of the patches, in samples of the sheet.
     stitched : Stitched
@@ -87,23 +86,24 @@ def stitch_sheet(
     region : Region
         Region to fill, of the size of the target.
     target : (rows, columns) float32
-        Requested scales.
+        Requested scale of each pixel.
     strength : float
-        Weight of the scales. The usual weight is 1.
+        Factor on the weight of the scales. Default: 1.
     side : float, optional
-        Side of a patch, in samples of the sheet. Default: chosen from the available area.
+        Side of a patch, in samples of the sheet. Default: chosen from the sheet's usable area.
     seed : int
         Seed of the random choices.
     held : (rows, columns) bool, optional
         Pixels whose coordinates are fixed.
     given : (rows, columns, 2) int32, optional
-        Coordinates of the fixed pixels in the sheet, in fixed point.
+        Coordinates of the fixed pixels in the sheet, in units of 1/4096 of a sample.
     loose : (rows, columns) bool, optional
         Fixed pixels that patches may still replace if this makes seams less visible.
     frames : (N, 2, 2) int16, optional
-        Jacobians of the sheet, one for all pixels or one per pixel, in fixed point. Default: derived from the target.
+        Jacobians of the sheet, one for all pixels or one per pixel, in units of 1/4096. Default: derived from the
+        target.
     progress : callable, optional
-        Called with the stage and its completed share.
+        Function called with the stage and its completed share.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def stitch_sheet(
     patch = float(max(min(wanted, FITS * min(sheet.free.shape), MOST), LEAST))
     frames = sheet.frames(target, region.wrap) if frames is None else frames
     weight = np.array([round(UNIT * sheet.weight)], np.uint16)
-    # Request the scales as a guide, which weighs them against the visibility of seams.
+    # Request the scales as a guide, so that they are weighed against the visibility of seams.
     made = stitcher.stitch(
         region,
         frames,
@@ -137,7 +137,7 @@ def stitch_sheet(
     )
     places = made.places.reshape(*region.shape, 2)
     coordinates, seen = sheet.locate(places.reshape(-1, 2))
-    # Sum in double precision and in one order, because matrix products differ in the last bit between processors.
+    # Sum in double precision and in a fixed order, because matrix products differ in the last bit between processors.
     jacobians = np.einsum("...ij,...jk->...ik", seen, frames / np.float64(ONE), dtype=np.float64).astype(np.float32)
     return FromSheet(
         coordinates.reshape(places.shape),

@@ -1,6 +1,6 @@
-"""Starts of the engine: how an output gets its first places. The caller passes one of them.
+"""Starts of the engine: functions that compute the first source coordinates of an output.
 
-The engine's own is the patch-based initialisation by hashed blocks at the coarsest level (`texrs.growth.windows`).
+The engine's own start, hashed blocks at the coarsest level, is in `texrs.growth.windows`.
 """
 
 from __future__ import annotations
@@ -22,23 +22,30 @@ from texrs.growth.engine import Patches, Places, Start
 __all__ = ["bends_with", "from_draft", "from_patches", "patch_side", "weights_of"]
 
 PATCH = {2: 0.45, 3: 0.68}
-"""Side of a patch, as a share of the exemplar's shorter side. Larger patches copy too much of it in one piece."""
+"""Side of a patch, as a share of the exemplar's shortest side, by number of axes.
+
+Larger patches copy too much in one piece.
+"""
 MOST = {2: 256.0, 3: 64.0}
-"""Maximum side of a patch, in samples. Cuts of larger ones take longer and gain nothing."""
+"""Maximum side of a patch in samples, by number of axes. Cuts of larger patches take longer without better results."""
 OVERLAP = {2: 0.33, 3: 0.4}
-"""Overlap of neighbouring patches, as a share of the patch side."""
+"""Overlap of neighbouring patches, as a share of the patch side, by number of axes."""
 GUIDED = 0.4
-"""Factor on the patch side if a guide or values are followed. Within a patch the exemplar's own trend continues."""
+"""Factor on the patch side if a guide or values are given.
+
+Patches are smaller because the exemplar's own trend continues within a patch.
+"""
 DIRECTED = 0.3
-"""Minimum agreement in direction of the edges for patches to bend with a field: such textures continue along it."""
+"""Minimum agreement in direction of an exemplar's edges, 0 to 1, above which its patches bend with a field."""
 SEPARATE, ANY = Weights(surprise=0.5), Weights()
-"""Costs of seams if the elements are known, and if they are not."""
+"""Costs of seams for separate elements, and for exemplars without known elements."""
 GUESSED = Weights(surprise=0.5, contact=0.0, joint=0.0, jump=0.0, depth=0.15, presence=0.0)
-"""Costs of seams if the elements are guessed. Objects in a heap touch and overlap, so only seams inside elements are
-charged.
+"""Costs of seams if the elements are unreliable.
+
+Objects in a heap touch and overlap, so only seams inside elements have a cost.
 """
 PLAIN = replace(GUESSED, depth=0.0)
-"""Costs of seams if elements are ignored."""
+"""Costs of seams for methods that ignore elements."""
 
 
 def from_patches(
@@ -51,23 +58,23 @@ def from_patches(
     larger: float = 1.0,
     plain: bool = False,
 ) -> Start:
-    """Return the start from patches stitched along minimum cuts, which keep elements whole.
+    """Return a start that stitches patches along minimum cuts, which keeps elements whole.
 
     Parameters
     ----------
     exemplar : Exemplar
         Exemplar that patches are cut from.
     level : int
-        First level, counted from full resolution.
+        Number of the start's level. Use 0 with one level, so that patches are stitched at full resolution.
     seed : int
-        Seed that chooses the patches.
+        Seed of the choice of patches.
     candidates : int
-        Number of positions tried for each patch. The best is used.
+        Number of source positions that are tried for each patch. The best one is used.
     bend : bool, optional
-        If True, patches bend with a field. Default: they bend if the exemplar's edges have a direction and its
-        elements are not separate.
+        If True, patches bend with a field. Default: True if the exemplar's edges have a direction and its elements are
+        not separate.
     larger : float
-        Factor on the usual side of the patches.
+        Factor on the usual side of the patches; 1 is the usual side.
     plain : bool
         If True, elements do not change the costs of seams.
     """
@@ -93,7 +100,7 @@ def from_patches(
             demand=asked.demand,
             progress=stage(progress, "patches"),
         )
-        # Given points form a patch of their own.
+        # Give the fixed points a patch of their own, with an unrotated frame.
         jacobians = np.concatenate([made.frames, np.eye(axes)[np.newaxis] * ONE]) / ONE
         labels = np.minimum(made.patches, np.uint32(len(made.frames)))
         patches = Patches(labels, jacobians.astype(np.float32), bent, made.seams, made.healed)
@@ -103,9 +110,9 @@ def from_patches(
 
 
 def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bool:
-    """Return whether patches bend with a field.
+    """Return True if patches of an exemplar bend with a field.
 
-    They bend as requested, or if edges have a direction and elements are not separate.
+    The request ``bend`` decides. Without it, patches bend if edges have a direction and elements are not separate.
     """
     if bend is not None or not varies:
         return varies and bool(bend)
@@ -113,16 +120,16 @@ def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bo
 
 
 def weights_of(exemplar: Exemplar) -> Weights:
-    """Return the seam costs for an exemplar."""
+    """Return the seam costs for an exemplar, which depend on its elements."""
     stitcher = exemplar.stitcher
     return SEPARATE if stitcher.separate else GUESSED if stitcher.guessed else ANY
 
 
 def patch_side(shape: tuple[int, ...]) -> float:
-    """Return the side of the patches of an exemplar, in samples."""
+    """Return the usual side of the patches of an exemplar, in samples."""
     return min(MOST[len(shape)], PATCH[len(shape)] * min(shape))
 
 
 def from_draft(level: int, draft: Callable[[Region], Places]) -> Start:
-    """Return the start from existing places of the level's region, which may be overwritten."""
+    """Return a start that uses given source coordinates, which may be overwritten."""
     return Start(level, lambda region, frames, asked, progress: (draft(region), None))

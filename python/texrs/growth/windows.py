@@ -1,4 +1,4 @@
-"""The engine's own start and corrector: they make windows of the output resemble windows of the exemplar."""
+"""The engine's own start and corrector. They make windows of the output similar to windows of the exemplar."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Windows:
         show: Show | None = None,
         progress: Progress | None = None,
     ) -> Grown:
-        """Synthesise a bounded region with free borders from a start, by default from `initialise`."""
+        """Synthesise a bounded region with free borders. Default start: `initialise`."""
         first = start or Start(0, lambda *given: (self.initialise(*given), None), "blocks")
         frames = partial(to_fixed, self.field)
         return grow(region, len(self.levels), first, self.correct, frames, ask=ask, show=show, progress=progress)
@@ -60,8 +60,8 @@ class Windows:
         return self.settings.at(level, len(self.levels))
 
     def frames(self, level: int, region: Region) -> NDArray[np.int16]:
-        """Return the Jacobians at the points of a level."""
-        # Take the field at the points themselves, because averages of rotated frames would shrink.
+        """Return the Jacobians at the points of a region of a level."""
+        # Evaluate the field at the points themselves, because averages of rotated frames would shrink.
         return to_fixed(self.field, region, 1 << (len(self.levels) - 1 - level))
 
     def initialise(
@@ -73,9 +73,9 @@ class Windows:
         *,
         margin: int = 0,
     ) -> Places:
-        """Return patch-based places of the coarsest level: hashed blocks that fit each other.
+        """Return the source coordinates of the coarsest level: hashed blocks that fit each other.
 
-        A margin will be cut off.
+        ``margin`` is the number of points at the border that will be cut off.
         """
         s = self.settings
         return self.levels[0].blocks(
@@ -107,7 +107,7 @@ class Windows:
         first: int = 0,
         passes: int | None = None,
     ) -> Corrected:
-        """Return places corrected by windows, matches and votes, in a number of passes from a first one on."""
+        """Correct the source coordinates of a level by comparing windows, in passes from the number ``first`` on."""
         here, step, s = self.levels[level], self.step(level), self.settings
         wanted = step.passes if passes is None else passes
         advance = stage(progress, f"level {level + 1} of {len(self.levels)}")
@@ -132,7 +132,7 @@ class Windows:
         )
 
     def _count_pairs(self, region: Region, asked: Asked) -> int:
-        """Return the number of pairs of windows of the coarsest level that can be compared."""
+        """Return the number of pairs of windows that an exhaustive pass of the coarsest level would compare."""
         demand = asked.demand
         drawn = 0 if demand is None else demand.order.size
         return region.points * (drawn or int(np.prod(self.levels[0].shape)))

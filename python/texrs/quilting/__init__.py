@@ -1,29 +1,29 @@
 """Quilting: patches of images stitched into a texture of any size.
 
-Patches are placed in raster order after Efros and Freeman, "Image quilting", SIGGRAPH 2001. Each patch is cut into the
+Patches are placed in raster order as in Efros and Freeman, "Image quilting", SIGGRAPH 2001. Each patch is cut into the
 existing texture along the minimum seam. On a periodic axis the last patch meets the first one, so it is chosen and cut
 to fit both neighbours.
 
-Departures, with their reasons:
+Departures from the paper, with their reasons:
 
-- A patch is cut at once into everything that it overlaps, by the minimum cut of the stitcher
-  (`texrs._engine.stitcher`). It is not cut in strips, one for each neighbour and row by row. The costs of existing
-  seams are known, and a patch covers them where this lowers the total cost.
+- A patch is cut into all its neighbours at once, by the minimum cut of the stitcher (`texrs._engine.stitcher`). The
+  paper cuts one strip for each neighbour, row by row. The costs of existing seams are known, and a patch covers them
+  if this lowers the total cost.
 - Costs are squared differences, which keep seams away from edges that do not meet. Division by the local gradient, as
-  in Kwatra et al., leads seams along strong edges, where the rest of the seams is visible.
-- A seam also costs the depth of its two pixels inside elements. With this cost, the differences at seams are 1.12
-  times the usual ones over 22 textures, and 0.8 % are beyond the 99th percentile. With plain differences in strips,
-  the figures are 1.32 and 2 %. The stitcher's cost for rarely adjacent colours gives the lowest figure (0.94), but it
+  in Kwatra et al., leads seams along strong edges, where other parts of the seams are visible.
+- A seam also costs the depth of its two pixels inside elements. The differences at seams are then 1.12 times the usual
+  differences, averaged over 22 textures, and 0.8 % are above the 99th percentile. With plain differences in strips,
+  these values are 1.32 and 2 %. The stitcher's cost for rarely adjacent colours gives the lowest value (0.94), but it
   fuses similar elements such as coins and olives.
-- On a lattice, a patch also pays for pixels that do not fit. A seam through plain background does not show that the
-  patch is out of step.
-- A patch pays for repeating samples that other patches show, and for continuing exactly where a neighbour ends. A
-  charge that multiplied the match would be zero for the exact continuation, which would always win.
-- A texture with courses is quilted along them only: its images are placed so that their joints coincide.
-- Several rows of patches of a large texture are cut in parallel, each row two patches behind the row above. Each patch
-  pays for repetitions of patches that precede all of these.
-- A patch that shows the mirror image of its overlap is refused. The two meet
-  without a seam at the mirror axis, but the mirror is conspicuous.
+- If the texture has a lattice, a patch also has a cost for pixels that do not fit. A seam through plain background
+  would not show that a patch is out of step with the lattice.
+- A patch has a cost for samples that other patches already use, and for continuing exactly where a neighbour ends. The
+  cost is added, because a factor on the match would be zero for an exact continuation, which would always win.
+- A texture with courses is only quilted along the courses. Its images are placed so that their joints coincide.
+- For large textures, several rows of patches are cut in parallel, each row two patches behind the row above. A patch's
+  cost for repetition counts patches that were cut before all of these rows' present patches.
+- A patch is rejected if it is the mirror image of its overlap. The two would meet without a seam at the mirror axis,
+  but the symmetry is conspicuous.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ from texrs.source_map import SourceMap
 __all__ = ["Picture", "quilt"]
 
 LARGE, AT_ONCE = 2**22, 4
-"""Minimum pixels of a texture for cutting several rows of patches in parallel, and the number of rows. It takes half
-the time on two cores.
+"""Minimum number of pixels of a texture whose rows of patches are cut in parallel, and number of these rows.
+
+This halves the time on two cores.
 """
 
 
@@ -54,31 +55,31 @@ def quilt(
     seed: int,
     progress: Callable[[float], object],
 ) -> SourceMap:
-    """Stitch patches of images into a texture.
+    """Synthesise a texture by stitching patches of images.
 
     Parameters
     ----------
     pictures : sequence of Picture
-        Images that patches are taken from. They are made from one exemplar and fit each other.
+        Images that patches are copied from. They are variants of one exemplar, and fit each other.
     size : (rows, columns)
-        Size of the texture.
+        Size of the texture, in pixels.
     patch, overlap : int
-        Side of a patch and overlap of neighbours, in pixels. The overlap is at most half the patch, and grows so that
-        patches divide the texture evenly.
+        Side of a patch and overlap of neighbours, in pixels. The overlap is at most half the patch, and is increased
+        so that patches divide the texture evenly.
     wrap : (bool, bool)
         Axes along which the texture is periodic.
     fixed : int, optional
-        Axis along which patches keep their positions in the images. The images must then be as long as the texture,
-        plus a patch if the axis is periodic.
+        Axis along which patches keep their positions in the images. The images must then be as long as the texture
+        along this axis, plus a patch if the axis is periodic.
     seed : int
-        Seed that chooses the first patch and the origin of a periodic texture.
+        Seed of the choice of the first patch, and of the origin of a periodic texture.
     progress : callable
-        Called with the completed share.
+        Function called with the completed share.
 
     Returns
     -------
     SourceMap
-        Source map into the exemplars.
+        Source coordinates in the exemplars.
 
     """
     sides = [min(p.colours.shape[axis] for p in pictures) for axis in range(2)]
@@ -91,9 +92,9 @@ def quilt(
         first.corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
         for axis, n in enumerate(free)
     )
-    progress(0.0)  # A small texture is finished before the kernel first reports.
+    progress(0.0)  # A small texture is finished before the kernel reports progress.
     place, label = stitch(pictures, size, wrap, fixed, (first, which, (row, column)), waves, progress)
     progress(1.0)
-    # A periodic texture may begin anywhere.
+    # Choose a random origin along periodic axes.
     rolled = {axis: uniform(seed, axis, 0, 0, 6) for axis in range(2) if wrap[axis]}
     return finish(pictures, place, label, rolled)

@@ -1,4 +1,4 @@
-"""Input and result of a quilt. Compiled code chooses and cuts the patches."""
+"""Prepare the data of a quilt for the compiled code, which chooses and cuts the patches, and build its source map."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from texrs.source_map import SourceMap
 from texrs.source_map._pixels import Pixels
 
 COLOUR, DEPTH = 1.0, 1.0
-"""Weights of a seam: of squared colour differences, and of the depth of its pixels inside elements."""
+"""Weights of a seam's cost: squared colour differences, and depth of its pixels inside elements."""
 CELL = 8
-"""Side of the cells that count use, in pixels."""
+"""Side of the square cells of the exemplar for which uses are counted, in pixels."""
 CALM, RUN = 64, 9
-"""Number of lines that are searched for a calm one, and length in pixels of a visible piece of an edge."""
+"""Number of lines that are searched for a calm one, and length of the pieces of a line that are averaged, in pixels.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """Image that patches are taken from, made from one exemplar."""
+    """Image that patches are copied from, such as the exemplar or a variant of it."""
 
     colours: Floats
-    """(h, w, C)"""
+    """Colours, (h, w, C), of any scale."""
     source: SourceMap
     depth: Floats
-    """(h, w): depth of each pixel inside an element; 0 between elements, where seams are cheap."""
+    """Depth of each pixel inside an element, (h, w); 0 between elements, where seams are cheap."""
     regular: bool = False
-    """Whether the texture repeats on a lattice."""
+    """True if the texture repeats on a lattice."""
     lattice: NDArray[np.float64] | None = None
-    """(2, 2): the lattice, a shift (row, column) in each column, if the texture has one."""
+    """Lattice of the texture, (2, 2), with a translation (row, column) in each column; None without a lattice."""
 
 
 def stitch(
@@ -47,25 +48,25 @@ def stitch(
     waves: Sequence[Sequence[Window]],
     progress: Callable[[float], object],
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Fill a texture with patches: one is placed whole, then one is cut into each window.
+    """Fill a texture with patches: place the first one completely, and cut the others into their windows.
 
-    The pixels of all images are in one row. The source of an output pixel is its position in this row.
+    The pixels of all images are numbered consecutively. The result contains these numbers.
 
     Parameters
     ----------
     pictures, size, wrap, fixed
         As in `texrs.quilting.quilt`.
     first : (Window, int, (int, int))
-        A window, and the image and the position in it of the window's patch.
+        The first patch: its window, the index of its image, and its position in the image.
     waves : sequence of sequences of Window
-        The other windows. Those of a wave are apart from each other and are chosen in parallel.
+        The other windows. Windows of one wave do not touch, and their patches are chosen in parallel.
     progress : callable
-        Called with the completed share.
+        Function called with the completed share.
 
     Returns
     -------
     place, label : (H, W) uint32
-        Position in the row of each pixel, and the number of its patch.
+        Number of the source pixel of each pixel, and number of its patch.
 
     """
     channels = pictures[0].colours.shape[2]
@@ -100,11 +101,10 @@ def finish(
     label: NDArray[np.uint32],
     rolled: Mapping[int, float],
 ) -> SourceMap:
-    """Return the source map into the exemplars. The arrays are consumed.
+    """Return the source map of a quilt. The arrays ``place`` and ``label`` are overwritten.
 
-    Axes in ``rolled`` begin at a calm line, so that the border of the texture does not follow an edge. They begin
-    at the
-    first calm line for 0, and at the last one for 1.
+    Along axes in ``rolled`` the texture is shifted so that it begins at a calm line. The border of the texture then
+    does not follow an edge. The values, from 0 to 1, select the line: 0 is the first calm line.
     """
     channels = pictures[0].colours.shape[2]
     colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
@@ -112,14 +112,14 @@ def finish(
         lines = np.moveaxis(place, axis, 0)
         found = find_calm_lines(colours[lines[: CALM + 1]])
         start = found[int(chance * len(found))]
-        # Process one array after the other, so that at most one exists twice.
+        # Shift one array after the other, so that only one is copied at a time.
         place = np.roll(place, -start, axis)
         label = np.roll(label, -start, axis)
     return SourceMap.from_selection([p.source for p in pictures], place, label, overwrite=True)
 
 
 def number_cells(source: SourceMap) -> NDArray[np.int64]:
-    """Return the number of the exemplar cell that each pixel shows."""
+    """Return the number of the exemplar's cell that contains each pixel's source."""
     which = int(source.exemplar[0, 0])
     first = sum((h // CELL + 1) * (w // CELL + 1) for h, w in source.shapes[:which])
     cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // CELL
@@ -128,7 +128,7 @@ def number_cells(source: SourceMap) -> NDArray[np.int64]:
 
 
 def mark_hands(source: SourceMap) -> Bools:
-    """Return a mask of the pixels that show an exemplar and not its mirror image."""
+    """Return True for pixels whose source is not mirrored."""
     frame = source.jacobian_array()
     if frame is None:
         return np.ones(source.shape, np.bool_)
@@ -137,7 +137,7 @@ def mark_hands(source: SourceMap) -> Bools:
 
 
 def find_calm_lines(lines: Floats) -> list[int]:
-    """Return the lines whose difference from the previous line is at most usual, on average and at the maximum."""
+    """Return the indices of lines whose difference from the previous line is not larger than usual."""
     from scipy.ndimage import uniform_filter1d
 
     jumps = np.abs(np.diff(lines, axis=0)).mean(axis=-1)

@@ -1,4 +1,4 @@
-"""Windows of the patches of a quilt."""
+"""Windows of the patches of a quilt, and the order of cutting."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from itertools import pairwise
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """The part of an axis that a patch covers, and its overlaps with patches that are already there."""
+    """The part of an axis that a patch covers, and its overlaps with patches that were cut before."""
 
     start: int
     extent: int
     before: int
-    """Overlap at the beginning, in pixels."""
+    """Overlap at the start, in pixels."""
     after: int
-    """Overlap at the end. Not 0 only for the last patch of a periodic axis."""
+    """Overlap at the end, in pixels. It is 0 except for the last patch of a periodic axis."""
 
 
 def divide_axis(length: int, side: int, patch: int, overlap: int, wrap: bool) -> list[Span]:
-    """Divide an axis evenly into overlapping patches, none longer than ``side``. A short axis has one patch."""
+    """Divide an axis evenly into overlapping patches of at most ``side`` pixels. A short axis has one patch."""
     if not wrap and length <= patch:
         return [Span(0, length, 0, 0)]
     step = max(1, patch - overlap)
     if wrap:
         count = max(2, math.ceil(length / step))
-        # Only the last patch may meet the first one again.
+        # Limit the extent so that only the last patch meets the first one again.
         most = 2 * (length // count) if count > 2 else length
         extent = min(side, math.ceil(length / count) + overlap, most)
         starts = [length * i // count for i in range(count)]
@@ -42,31 +42,31 @@ def divide_axis(length: int, side: int, patch: int, overlap: int, wrap: bool) ->
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Window of a patch."""
+    """Window of the texture that a patch covers."""
 
     rows: Span
     columns: Span
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns of the patch."""
+        """Number of rows and columns of the patch."""
         return self.rows.extent, self.columns.extent
 
     @property
     def corner(self) -> tuple[int, int]:
-        """First row and column of the patch."""
+        """First row and column of the patch in the texture."""
         return self.rows.start, self.columns.start
 
     def pack(self) -> tuple[tuple[int, int, int, int], tuple[int, int, int, int]]:
-        """Return the spans as plain numbers."""
+        """Return the numbers of both spans as tuples."""
         return astuple(self.rows), astuple(self.columns)
 
 
 def plan_waves(rows: Sequence[Span], columns: Sequence[Span], at_once: int) -> list[list[Window]]:
-    """Return the windows of a texture in the order of cutting. Windows of one wave are apart from each other.
+    """Return the windows of a texture in the order of cutting, in waves whose windows do not touch.
 
-    The order is raster order, or several rows at once, each two patches behind the row above. Then all patches that a
-    window overlaps exist already, except those beyond the end of a periodic axis.
+    The order is raster order, or several rows at once, each two patches behind the row above. All patches that a
+    window overlaps then exist already, except those beyond the end of a periodic axis.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def plan_waves(rows: Sequence[Span], columns: Sequence[Span], at_once: int) -> l
     [[(0, 0)], [(0, 1)], [(0, 2), (1, 0)], [(0, 3), (1, 1)]]
 
     """
-    # Add a pixel around each window: at half a patch of distance windows are too close to each other.
+    # Require a gap of two pixels between windows two columns apart. They touch if the overlap is half a patch.
     apart = all(b.start - a.start >= a.extent + 2 for a, b in zip(columns, columns[2:], strict=False))
     if at_once == 1 or not apart or len(columns) < 2 * at_once + 2:
         return [[Window(r, c)] for r in rows for c in columns]

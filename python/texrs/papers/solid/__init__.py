@@ -171,7 +171,7 @@ def solid(
         - ``guided``: True if a guide was given.
         - ``elements``: Number of separate elements that were found in the exemplar, or None if they were not searched.
         - ``stitched``: Number of ``patches``, whether they are ``bent`` with the field, mean cost of the ``seams`` per
-          point, and number of ``healed`` patches. None for quality "fast".
+          point, and number of moves that ``healed`` torn elements. None for quality "fast".
         - ``levels``: One entry per level: its ``shape``, number of ``passes``, and share of points that the last
           passes ``changed``.
         - ``spacing``: (plane, row, column) voxel size, if it was given.

@@ -449,8 +449,7 @@ class Texture(Endless):
         return self._how if interpolation is None else as_interpolation(interpolation, self._exemplar, "cubic")
 
     def _look(self, region: Region, progress: Progress | None) -> tuple[Places, SourceMap]:
-        """Return the source coordinates of a window, and its source map with the Jacobians of patches or of the field.
-        """
+        """Return the source coordinates of a window, and its source map with Jacobians of patches or the field."""
         field, start = self._field, region.origin
         varies = field is not None and field.constant is None
         if field is not None and varies and any(start):
