@@ -55,7 +55,7 @@ def flatten_lighting(
     amount : float
         Fraction of the unevenness to remove, 0 to 1. Default: 1.
     wrap : bool or (bool, bool)
-        Axes along which the image is periodic. It remains periodic.
+        Axes along which the image is periodic. It remains periodic. Default: False.
     size : float, optional
         Minimum size in pixels, at least 4, of variations that are treated as light. Elements should be smaller.
         Default: a quarter of the shorter side.

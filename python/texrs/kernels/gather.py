@@ -48,7 +48,8 @@ def gather(
         Interpolation between samples. Interpolated integers are rounded. Integers beyond 2^53 are not interpolated,
         and the nearest sample is used. Default: "nearest".
     wrap : bool or one per axis
-        Axes along which the exemplars are periodic. Along other axes, the samples at the border are repeated.
+        Axes along which the exemplars are periodic. Along other axes, the samples at the border are repeated. Default:
+        False.
 
     Returns
     -------

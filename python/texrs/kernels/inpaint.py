@@ -94,27 +94,28 @@ def inpaint(
     keep : (H, W) array_like of bool, optional
         Known pixels that patches must not replace. Default: no pixels, so seams can run through all known pixels.
     count : int
-        Maximum number of matches to compare, 1 to 1000.
+        Maximum number of matches to compare, 1 to 1000. Default: 5.
     separation : int
         Distance in pixels, 0 to 2^31. The rows or the columns of two matches in one exemplar differ by more than this.
+        Default: 4.
     ratio : float
-        Maximum cost of a match, as a multiple of the best one, 1 to 1e9.
+        Maximum cost of a match, as a multiple of the best one, 1 to 1e9. Default: 3.
     wrap : bool or (rows, columns)
-        Axes along which the image is periodic. One value for both axes, or one for each.
+        Axes along which the image is periodic. One value for both axes, or one for each. Default: False.
     seed : int
-        Random seed, 0 to 2^64 - 1. It is only used if no pixel is known, to choose patches.
+        Random seed, 0 to 2^64 - 1. It is only used if no pixel is known, to choose patches. Default: 0.
     paper : bool
         If True, follow Shen, Jin, Mao and Feng (2006) literally. Holes are then filled in scan order, and windows are
         centred on unknown pixels instead of the place with most known pixels. All known pixels have the same weight,
         instead of a higher weight near the hole. The exact best matches are compared, by plain cut costs. With
-        ``count=1`` this is their completion.
+        ``count=1`` this is their completion. Default: False.
     shown : int, optional
         Index in ``index`` of the exemplar that is this image itself, if there is one. Surroundings of a hole are then
         not copied or mirrored into it from there. Patches never repeat their neighbours, and mirror images in
-        ``index`` are recognised.
+        ``index`` are recognised. Default: None.
     progress : callable, optional
         Function that is called with the filled fraction of the holes, 0 to 1. An exception that it raises stops the
-        work.
+        work. Default: None.
 
     Returns
     -------

@@ -47,15 +47,16 @@ def mean_shift(
         Maximum colour difference in the units of the image, 0 to 1e15.
     max_iterations : int
         Maximum number of steps per pixel, 0 to 2^31 - 1. For most pixels, five steps are enough, as in OpenCV.
+        Default: 5.
     tolerance : float, optional
         Maximum colour change, 0 to 1e15, of a pixel that has converged. Its rounded position must also not change. A
         value of 0.05 times ``range`` continues until the colour has converged too, which takes about twice the time.
         Default: only the position counts, as in OpenCV.
     wrap : bool or (bool, bool)
-        Axes along which the image is periodic. One value for both axes, or one for each.
+        Axes along which the image is periodic. One value for both axes, or one for each. Default: False.
     progress : callable, optional
         Function that is called with the name of the stage and its completed share, 0 to 1. An exception that it raises
-        stops the work.
+        stops the work. Default: None.
 
     Returns
     -------

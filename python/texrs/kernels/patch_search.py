@@ -191,12 +191,13 @@ class PatchIndex:
             Weight of each pixel, at least 0, or a bool mask. Use 0 for unknown pixels. If all weights are 0, every
             position costs 0 and the first positions are returned. Default: 1 everywhere.
         count : int
-            Maximum number of matches, 1 to 2^31 - 1.
+            Maximum number of matches, 1 to 2^31 - 1. Default: 1.
         separation : int
             Distance in pixels, 0 to 2^31 - 1. The rows or the columns of two matches in one image differ by more than
-            this.
+            this. Default: 4.
         ratio : float
-            Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed.
+            Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed. Default:
+            infinity.
 
         Returns
         -------
@@ -243,12 +244,13 @@ class PatchIndex:
         candidates : iterable of (exemplar, row, column)
             Integer positions to compare. The masks ``allowed`` are ignored.
         count : int
-            Maximum number of matches, 1 to 2^31 - 1.
+            Maximum number of matches, 1 to 2^31 - 1. Default: 1.
         separation : int
             Distance in pixels, 0 to 2^31 - 1. The rows or the columns of two matches in one image differ by more than
-            this.
+            this. Default: 4.
         ratio : float
-            Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed.
+            Maximum cost of a match, as a multiple of the lowest cost; at least 1. Infinity is allowed. Default:
+            infinity.
 
         Returns
         -------
@@ -294,7 +296,7 @@ class PatchIndex:
         weight : (p, q) array_like, optional
             Weight of each pixel, at least 0, or a bool mask. Use 0 for unknown pixels. Default: 1 everywhere.
         exemplar : int
-            Index of the image, from 0.
+            Index of the image, from 0. Default: 0.
 
         Returns
         -------

@@ -51,14 +51,15 @@ def solve(
         and the last column are only used if the axis is periodic.
     screening : float
         Weight of the image compared with the gradients, at least 0. With 0 this is the Poisson equation. Changes of
-        colour fade over about ``screening ** -0.5`` pixels.
+        colour fade over about ``screening ** -0.5`` pixels. Default: 0.01.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
         Condition at the ends of the axes: the border pixels keep their values, the axis is periodic, or the border is
-        free. One value for both axes, or a pair for the row axis and the column axis.
+        free. One value for both axes, or a pair for the row axis and the column axis. Default: "dirichlet".
     mask : (H, W) array_like of bool, optional
         Pixels to compute. All other pixels keep their values. Default: all pixels.
     progress : callable, optional
-        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work.
+        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work. Default:
+        None.
 
     Returns
     -------
@@ -127,14 +128,16 @@ def spread(
         Requested divergence, contiguous, writeable and finite. It is overwritten with the solution, which is 0 at
         fixed pixels.
     screening : float
-        Weight of the image compared with the gradients, at least 0. With 0 this is the Poisson equation.
+        Weight of the image compared with the gradients, at least 0. With 0 this is the Poisson equation. Default:
+        0.01.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
         Condition at the ends of the axes: the border pixels are 0, the axis is periodic, or the border is free. One
-        value for both axes, or a pair for the row axis and the column axis.
+        value for both axes, or a pair for the row axis and the column axis. Default: "dirichlet".
     mask : (H, W) array_like of bool, optional
         Pixels to compute. All other pixels are 0. Default: all pixels.
     progress : callable, optional
-        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work.
+        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work. Default:
+        None.
 
     Raises
     ------
@@ -188,9 +191,9 @@ def blend(
         completely to the target. With 1, they hardly change. Default: 0.
     mixed : bool
         If True, use the larger of the gradients of source and target at each pair of pixels. The texture of the target
-        is then visible in smooth parts of the source.
+        is then visible in smooth parts of the source. Default: False.
     wrap : bool or (bool, bool)
-        Axes along which the images are periodic. One value for both axes, or one for each.
+        Axes along which the images are periodic. One value for both axes, or one for each. Default: False.
 
     Returns
     -------

@@ -26,7 +26,7 @@ def reconstruct(seed: object, mask: object, *, wrap: bool | tuple[bool, bool] = 
     seed, mask : (H, W) array_like
         Images of any real dtype, converted to float32. Seed values above the mask are lowered to the mask.
     wrap : bool or (bool, bool)
-        Axes along which the images are periodic. One value for both axes, or one for each.
+        Axes along which the images are periodic. One value for both axes, or one for each. Default: False.
 
     Returns
     -------

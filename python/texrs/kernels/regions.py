@@ -46,14 +46,14 @@ def felzenszwalb(
         Tolerance of a single pixel, in the units of the image, 0 to 1e15. Larger values give larger regions. For
         images from 0 to 1, scikit-image's ``scale`` is 255 times this value.
     blur : float
-        Standard deviation, in pixels, of the Gaussian with which the image is smoothed first, 0 to 64.
+        Standard deviation, in pixels, of the Gaussian with which the image is smoothed first, 0 to 64. Default: 0.8.
     least : int
-        Minimum area of a region in pixels. Smaller regions are merged with the most similar neighbour.
+        Minimum area of a region in pixels. Smaller regions are merged with the most similar neighbour. Default: 20.
     wrap : bool or (bool, bool)
-        Axes along which the image is periodic. One value for both axes, or one for each.
+        Axes along which the image is periodic. One value for both axes, or one for each. Default: False.
     progress : callable, optional
         Function that is called with the name of the stage and its completed share, 0 to 1. An exception that it raises
-        stops the work.
+        stops the work. Default: None.
 
     Returns
     -------

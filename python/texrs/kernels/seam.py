@@ -143,7 +143,7 @@ def cut(
         image. Default: none.
     penalty : float or array_like of float, optional
         Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean
-        penalty of its two pixels. Penalties keep seams out of elements that should stay whole.
+        penalty of its two pixels. Penalties keep seams out of elements that should stay whole. Default: none.
     old : OldSeams, optional
         Costs of seams that A already contains, which B can cover. If an old seam costs more than the two seams that
         replace it, this sum is used instead. That only occurs with a cost that violates the triangle inequality.
@@ -151,9 +151,9 @@ def cut(
     cost : {"gradient", "paper"}
         Cost of separating neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed over channels.
         "gradient": this value divided by ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``, which hides seams along edges. Both
-        add 1e-4, so that the shorter of two equal seams is chosen.
+        add 1e-4, so that the shorter of two equal seams is chosen. Default: "gradient".
     wrap : bool or sequence of bool
-        Axes along which the canvas is periodic. One value for all axes, or one for each.
+        Axes along which the canvas is periodic. One value for all axes, or one for each. Default: False.
 
     Returns
     -------
@@ -243,10 +243,10 @@ def cut_strip(
         independent. Default: False.
     penalty : float or (H, W) array_like of float, optional
         Penalty of each pixel, at least 0. The cost of a pair is multiplied by one plus the mean penalty of its two
-        pixels.
+        pixels. Default: none.
     cost : {"gradient", "paper"}
         Cost of separating neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed over channels.
-        "gradient": this value divided by ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``.
+        "gradient": this value divided by ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``. Default: "gradient".
 
     Returns
     -------
@@ -296,7 +296,7 @@ class Strip:
     axis : {0, 1}
         Axis that the seam crosses.
     penalty : float or (H, W) array_like of float, optional
-        Penalty of each pixel, at least 0, as in `cut`.
+        Penalty of each pixel, at least 0, as in `cut`. Default: none.
 
     Examples
     --------
@@ -321,9 +321,9 @@ def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "g
     strips : sequence of Strip
         Strips, which can differ in shape.
     cyclic : bool
-        If True, all seams are closed, because the axis along the seam is periodic.
+        If True, all seams are closed, because the axis along the seam is periodic. Default: False.
     cost : {"gradient", "paper"}
-        Cost of separating neighbours in all strips (see `cut_strip`).
+        Cost of separating neighbours in all strips (see `cut_strip`). Default: "gradient".
 
     Returns
     -------
@@ -377,7 +377,7 @@ def binary_labels(
         next point. An entry can also be a tuple of two arrays: for False followed by True, and for True followed by
         False.
     wrap : bool or sequence of bool
-        Axes along which the grid is periodic. One value for all axes, or one for each.
+        Axes along which the grid is periodic. One value for all axes, or one for each. Default: False.
 
     Returns
     -------

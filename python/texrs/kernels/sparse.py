@@ -37,7 +37,7 @@ class Cholesky:
     matrix : (n, n) scipy.sparse matrix or array_like
         Finite matrix of any real dtype, including its diagonal. Only the lower triangle is read.
     limit : int
-        Maximum number of bytes of the factor and its working memory, 1 to 2^62.
+        Maximum number of bytes of the factor and its working memory, 1 to 2^62. Default: 2^32 (4 GiB).
 
     Raises
     ------
@@ -70,7 +70,7 @@ class Cholesky:
         matrices : sequence of (n, n) scipy.sparse matrices or array_like
             Matrices as for `Cholesky`. They can differ in size.
         limit : int
-            Maximum number of bytes of each factor and its working memory, 1 to 2^62.
+            Maximum number of bytes of each factor and its working memory, 1 to 2^62. Default: 2^32 (4 GiB).
 
         Returns
         -------

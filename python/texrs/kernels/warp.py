@@ -76,7 +76,8 @@ def mesh(
     size : int or (rows, columns), optional
         Size of the output, up to 2^28 pixels. Default: the size of the image.
     progress : callable, optional
-        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work.
+        Function that is called with the completed share, 0 to 1. An exception that it raises stops the work. Default:
+        None.
 
     Returns
     -------

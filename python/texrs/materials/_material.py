@@ -364,12 +364,12 @@ class Material(Exports):
         Parameters
         ----------
         amount : float
-            Fraction of the unevenness to remove, 0 to 1.
+            Fraction of the unevenness to remove, 0 to 1. Default: 1.
         wrap : bool or (bool, bool)
-            Axes along which the maps are periodic. They remain periodic.
+            Axes along which the maps are periodic. They remain periodic. Default: False.
         size : float, optional
             Minimum size in pixels, at least 4, of variations that are treated as light (see
-            `texrs.materials.flatten_lighting`).
+            `texrs.materials.flatten_lighting`). Default: a quarter of the shorter side.
 
         Returns
         -------

@@ -181,7 +181,7 @@ def compare(
         (`texrs.fields.Field.over`). Default: None.
     classes : int or None
         Number of colour classes of the exemplar, 2 to 16. None if both arrays are labels: integers from 0 to 255,
-        without channels.
+        without channels. Default: 4.
     chosen : int or tuple of int, optional
         Classes or labels whose connected components are measured. Default: the lighter half of the classes, or all
         labels except 0.

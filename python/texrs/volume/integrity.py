@@ -77,7 +77,7 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
     source : SourceMap
         Source map of an image or a volume that was synthesised from this exemplar only.
     axes : int
-        Number of spatial axes of an array, 2 or 3.
+        Number of spatial axes of an array, 2 or 3. Default: 3.
 
     Returns
     -------

@@ -82,7 +82,7 @@ def extract_surface(
     spacing : sequence of 3 float
         Distances between planes, rows and columns, in any unit. Default: 1 each.
     closed : bool
-        If True, the surface is closed at the borders of the volume.
+        If True, the surface is closed at the borders of the volume. Default: True.
 
     Returns
     -------

@@ -44,7 +44,8 @@ def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) 
     at : sequence of 3 int, optional
         Plane, row and column of the slices. Negative numbers count from the end. Default: the middle of the volume.
     gap : int
-        Width of the gaps between the slices, in pixels. Gaps and unused areas are white (the largest value).
+        Width of the gaps between the slices, in pixels. Gaps and unused areas are white (the largest value). Default:
+        2.
 
     Returns
     -------
@@ -100,14 +101,14 @@ def oblique_slice(
         (plane, row, column) of a point of the slice, in voxels. Default: the centre of the volume.
     normal : sequence of 3 float, optional
         Normal (plane, row, column) of the slice. The columns of the image are as parallel as possible to the columns
-        of the volume, or to its rows if the normal points along the columns.
+        of the volume, or to its rows if the normal points along the columns. Give either ``normal`` or ``axes``.
     axes : (2, 3) array_like, optional
         Steps (plane, row, column), in voxels, from one row and from one column of the image to the next. They replace
         ``normal``. Default: None.
     size : int or (rows, columns), optional
         Size of the image in pixels, with the point at its centre. Default: large enough for the whole slice.
     interpolation : {"linear", "cubic", "nearest"}
-        Interpolation between voxels. Use "nearest" for labels.
+        Interpolation between voxels. Use "nearest" for labels. Default: "linear".
 
     Returns
     -------
@@ -174,11 +175,11 @@ def render_block(
     size : int
         Longer side of the image in pixels, 16 to 4096. Default: 512.
     azimuth : float
-        Angle of the view to the right of the front, in degrees. If 0, the right face is not visible.
+        Angle of the view to the right of the front, in degrees. If 0, the right face is not visible. Default: 40.
     elevation : float
         Angle of the view above the front, in degrees, -90 to 90. Default: 30.
     interpolation : {"linear", "cubic", "nearest"}
-        Interpolation between voxels. "nearest" shows each voxel as a square.
+        Interpolation between voxels. "nearest" shows each voxel as a square. Default: "linear".
 
     Returns
     -------
@@ -231,22 +232,22 @@ def turntable(
     path : path_like
         File with the suffix .gif. If writing fails, an existing file is unchanged.
     frames : int
-        Number of frames per turn, 2 to 360.
+        Number of frames per turn, 2 to 360. Default: 24.
     size : int
-        Side of the image in pixels, 16 to 1024.
+        Side of the image in pixels, 16 to 1024. Default: 320.
     elevation : float
-        Angle of the view above the front, in degrees, -90 to 90.
+        Angle of the view above the front, in degrees, -90 to 90. Default: 25.
     seconds : float
         Duration of a turn in seconds, 0.1 to 600. Default: 4.
     background : sequence of 3 int
-        Red, green and blue of the background, 0 to 255 each.
+        Red, green and blue of the background, 0 to 255 each. Default: white.
     interpolation : {"linear", "cubic", "nearest"}
-        Interpolation between voxels. "nearest" shows each voxel as a square.
+        Interpolation between voxels. "nearest" shows each voxel as a square. Default: "linear".
     overwrite : bool
-        If True, an existing file is replaced.
+        If True, an existing file is replaced. Default: True.
     progress : callable or True, optional
         Function that is called with the name of the stage and its completed share, 0 to 1. An exception that it raises
-        stops the work. True shows a progress bar.
+        stops the work. True shows a progress bar. Default: None.
 
     Raises
     ------

@@ -213,7 +213,7 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
     exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
         Image or volume, with or without channels.
     count : int
-        Number of classes, 2 to 16. If the exemplar has fewer colours, each colour is a class.
+        Number of classes, 2 to 16. If the exemplar has fewer colours, each colour is a class. Default: 4.
     axes : int, optional
         Number of spatial axes, 2 or 3. Default: from the shape; if there are three axes and the last has up to 4
         entries, these are channels.
@@ -263,7 +263,7 @@ def two_point_correlation(
     mask : array_like
         Mask of the material, bool, (H, W) or (D, H, W).
     reach : int
-        Longest distance in pixels, at least 1. Distances longer than a side give NaN.
+        Longest distance in pixels, at least 1. Distances longer than a side give NaN. Default: 16.
     spacing : sequence of float, optional
         Distances between samples along each axis, in any unit. Column k is then the value at k times the smallest
         spacing, by linear interpolation. Default: the spacing that the file of the volume states, else 1.
@@ -301,7 +301,7 @@ def lineal_path_function(
     mask : array_like
         Mask of the material, bool, (H, W) or (D, H, W).
     reach : int
-        Longest segment in pixels, at least 1. Segments longer than a side give NaN.
+        Longest segment in pixels, at least 1. Segments longer than a side give NaN. Default: 16.
     spacing : sequence of float, optional
         Distances between samples along each axis, in any unit. Column k is then the value at k times the smallest
         spacing, by linear interpolation. Default: the spacing that the file of the volume states, else 1.
@@ -346,7 +346,7 @@ def component_statistics(
         Mask of the material, bool, (H, W) or (D, H, W).
     least : int
         Minimum size of a component in pixels or voxels, at least 1. Smaller components are treated as noise and not
-        counted.
+        counted. Default: 8.
     spacing : sequence of float, optional
         Distances between samples along each axis, in any unit. Sizes and density then use this unit. Default: the
         spacing that the file of the volume states, else 1.

@@ -45,7 +45,7 @@ def autocorrelation(
     values : array_like
         Values (H, W) or (D, H, W), such as the `lightness`.
     reach : int
-        Longest distance in pixels, at least 1. Distances longer than a side give NaN.
+        Longest distance in pixels, at least 1. Distances longer than a side give NaN. Default: 12.
     spacing : sequence of float, optional
         Distances between samples along each axis, in any unit. Column k is then the value at k times the smallest
         spacing, by linear interpolation. Default: the spacing that the file of the volume states, else 1.
@@ -91,7 +91,7 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
         the shortest side.
     whole : bool
         If True, the spectrum of the whole volume is used instead of slices. It does not change when the volume is
-        rotated, whereas in slices oblique layers look wider.
+        rotated, whereas in slices oblique layers look wider. Default: False.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
     values : array_like
         Values (H, W) or (D, H, W), such as the `lightness`.
     wrap : bool or one per axis
-        Axes along which the values are periodic, so that the last plane is adjacent to the first.
+        Axes along which the values are periodic, so that the last plane is adjacent to the first. Default: False.
 
     Returns
     -------
@@ -174,7 +174,7 @@ def speckle(values: ArrayLike, threshold: float = 0.35) -> float:
     values : array_like
         Values (H, W) or (D, H, W), such as the `lightness`.
     threshold : float
-        Difference above which a point counts, in the units of the values, at least 0.
+        Difference above which a point counts, in the units of the values, at least 0. Default: 0.35.
 
     Returns
     -------
@@ -215,7 +215,7 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
     values : array_like
         Values of the output, (H, W) or (D, H, W), whose slices are compared.
     quantiles : int
-        Number of compared quantiles of the distributions, 2 to 2^16.
+        Number of compared quantiles of the distributions, 2 to 2^16. Default: 256.
 
     Returns
     -------
@@ -307,9 +307,9 @@ def orientation_errors(
     normal : array_like, optional
         Normal n of the exemplar, (A,). Default: `texture_normal` of ``values``.
     margin : int
-        Width of the border in pixels that is excluded, because the structure tensor is not reliable there.
+        Width of the border in pixels that is excluded, because the structure tensor is not reliable there. Default: 6.
     step : int
-        Distance between measured points along each axis, in pixels.
+        Distance between measured points along each axis, in pixels. Default: 1.
     spacing : sequence of float, optional
         Distances between samples along each axis, in any unit, so that the field, the normal and the angles are
         correct in space. Default: the spacing that the file of the volume states, else 1.

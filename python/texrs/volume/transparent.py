@@ -60,11 +60,11 @@ def render_volume(
         Volume of shape (D, H, W) or (D, H, W, C). A fourth channel is alpha. If there are more than 4 channels, only
         the first 3 are shown.
     size : int
-        Longer side of the image in pixels, 16 to 4096.
+        Longer side of the image in pixels, 16 to 4096. Default: 512.
     azimuth : float
-        Angle of the view to the right of the front, in degrees. If 0, it is seen from the front.
+        Angle of the view to the right of the front, in degrees. If 0, it is seen from the front. Default: 40.
     elevation : float
-        Angle of the view above the front, in degrees, -90 to 90.
+        Angle of the view above the front, in degrees, -90 to 90. Default: 30.
     transfer : str or sequence of (value, colour, alpha), optional
         Stops of the transfer function, with increasing values, 1 to 256. Colour and alpha are interpolated linearly
         between stops. The value is the lightness, 0 to 1: integers are scaled by their full range, and floats outside
@@ -73,7 +73,7 @@ def render_volume(
         ``0:own:0,0.4:own:0,0.6:#cc3322:0.2``. Default: voxels that differ from the most frequent colour are shown in
         their own colour.
     shading : bool
-        If True, surfaces that face away from the light are darkened.
+        If True, surfaces that face away from the light are darkened. Default: True.
 
     Returns
     -------

@@ -109,6 +109,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
         Field that gives the Jacobian of coherent neighbours. Default: the frames of the source map.
     cell : int
         Side of the exemplar's cells in voxels, at least 1. Smaller cells at the border are weighted by their size.
+        Default: 8.
 
     Returns
     -------

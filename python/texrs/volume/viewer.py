@@ -27,7 +27,7 @@ class Viewer:
     volume : array_like or path_like
         Volume of shape (D, H, W) or (D, H, W, C). If there are not 3 or 4 channels, only the first is shown.
     labels : bool
-        If True, the values are labels, and each label gets a colour.
+        If True, the values are labels, and each label gets a colour. Default: False.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class Viewer:
         path : path_like
             File with the suffix .html. If writing fails, an existing file is unchanged.
         overwrite : bool
-            If True, an existing file is replaced.
+            If True, an existing file is replaced. Default: True.
 
         Raises
         ------
