@@ -307,7 +307,7 @@ def _measure_tears(traits: _Traits, seams: list[_Seam], area: int) -> float:
 
 
 def _measure_breaks(traits: _Traits, seams: list[_Seam], area: int) -> float:
-    """Return the length of lines that break off at seams, minus the usual length, divided by the length of all."""
+    """Return the length of lines that break off at seams, minus the usual length, as a share of all lines."""
     found, _ = _find_breaks(traits.slopes, traits.line, seams)
     excess = float(found.sum()) - traits.broken * len(found)
     return max(0.0, excess) / max(traits.lines * area, 1.0)

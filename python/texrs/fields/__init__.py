@@ -25,7 +25,7 @@ rows and planes.
 `read`               vectors or frames from a file
 ===================  ==========================================================================
 
-Functions that accept a field also accept a text that describes it, an array of vectors or frames, or its file
+Instead of a field, functions also accept a text, an array of vectors or frames, or a file of such an array
 (`as_field`).
 
 A field is stored as a formula instead of a dense array of frames. Its frame at a point depends only on this point.

@@ -65,7 +65,7 @@ class Arguments:
     motion: Choice
     copies: int
     side: int | None
-    """Side of the patches that fill holes, in pixels; None for the default."""
+    """Side of the patches that fill holes, in pixels, or None for the default."""
     screening: float
     literal: bool
     """If True, the paper is followed as printed."""

@@ -45,7 +45,7 @@ class Tile:
     source: SourceMap
     colours: Floats
     holes: float
-    """Share of the tile that was holes before they were filled, 0 to 1."""
+    """Share of the tile that holes covered before they were filled, 0 to 1."""
     mirror: Flip
     """Mirror image of the exemplar that the tile is built from."""
     log: list[dict[str, Any]]

@@ -26,7 +26,7 @@ TRIES = 64
 The order that needs the least stretch is used.
 """
 ALIKE = 0.16
-"""Largest relative difference in height of two courses that may replace each other."""
+"""Largest relative difference in height of two courses that can replace each other."""
 
 
 def lay_sheets(
@@ -81,7 +81,7 @@ def lay_sheets(
     length = shape[1 - axis]
     sheets = []
     for sheet in range(count):
-        # Each sheet has other courses between the same joints.
+        # Each sheet has different courses between the same joints.
         taken = exchange_courses(courses.heights, order, sheet, seed)
         across = np.array(courses.joints)[taken[laid]] + share * courses.heights[taken[laid]]
         along = np.arange(length, dtype=np.float64)

@@ -46,9 +46,9 @@ class Element:
     It is smaller in a thin element, which would have no constraint otherwise.
     """
     axes: NDArray[np.float64]
-    """(3,): standard deviation of its pixels along and across its longest axis, and angle of this axis.
+    """(3,): standard deviation of the element's pixels along and across its longest axis, and angle of this axis.
 
-    The deviations are in pixels, the angle is in degrees, counter-clockwise.
+    The deviations are in pixels, and the angle is in degrees, counter-clockwise.
     """
 
 

@@ -1,6 +1,7 @@
 """Heaps of elements that are so close to each other that they can only exchange their places.
 
-A departure from section 3.3 of `texrs.papers.design`: if all elements of a heap moved, no background would remain.
+This is a departure from section 3.3 of `texrs.papers.design`: if all elements of a heap moved, no background would
+remain.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class Layer:
     source: SourceMap
     colours: Floats
     depth: Floats
-    """Depth of each pixel inside an element, 0 to 1; 0 on the background."""
+    """Depth of each pixel inside an element, 0 to 1. It is 0 on the background."""
     elements: Bools
     """Pixels of elements."""
 

@@ -93,7 +93,7 @@ class Moves:
     shifts: tuple[tuple[int, int], ...] = ()
     """Translations of a lattice, (row, column) in pixels. If there are any, other translations are not permitted."""
     axes: Flip = (True, True)
-    """Axes along which elements may be mirrored, if mirroring is permitted."""
+    """Axes along which elements can be mirrored, if mirroring is permitted."""
 
     @property
     def rotate(self) -> float:

@@ -35,8 +35,8 @@ class DeformationOptions:
         Smallest and largest scale factor, 0.5 to 2. Default: 0.8 to 1.2.
     allow_mirror : bool, optional
         If True, elements, backgrounds and patches may be mirrored along both axes. If False, as for letters, they are
-        not mirrored. The default is False with ``rotate=0``, because the example then has an upper side. Default: True,
-        except for axes along which light or slanted elements would reveal it.
+        not mirrored. With ``rotate=0`` the example has an upper side. Default: True, except if ``rotate`` is 0, and
+        for axes along which light or slanted elements would reveal it.
     start : float, optional
         Start of the logistic map (Eq. 2), within (-1, 1). Default: drawn from the seed for each element.
     growth_rate : float

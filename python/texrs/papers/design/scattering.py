@@ -40,7 +40,7 @@ Closer to the outline its colour is mixed with the background.
 GAP = 1.5
 """Minimum gap between elements, in pixels."""
 SEEN, SEEN_BELOW = 0.65, 0.45
-"""Minimum visible share of an element that others of its own layer overlap, and that elements of any layer overlap."""
+"""Minimum visible share of an element below elements of its own layer, and below elements of all layers."""
 CRUMB = 0.08
 """Minimum size of a visible piece of an overlapped element, relative to the element. Smaller pieces are left out."""
 TRIES, PATIENCE = 24, 80
@@ -54,9 +54,9 @@ CLUSTER, UNEVEN = 4.0, 0.5
 They are only used if the density is not a map.
 """
 CELLS, AROUND, ROUNDS = 0.5, 2.5, 64
-"""Side of the cells that measure density, and distance of the averages of the lack of elements, in element sizes.
+"""Side of the cells that measure density, and averaging distance for missing elements, in element sizes.
 
-The averages include several elements and gaps, because even a full layer has room between two elements.
+The averages include several elements and gaps, because a cell between two elements of a sparse layer is always empty.
 
 Minimum number of times that the lack is measured while a layer is filled.
 """
@@ -310,7 +310,7 @@ class Room:
         # Exclude cells where elements were not requested, and cells that elements above cover.
         open_ = np.isfinite(self.wanted) & (self.free > 0)
         lack = gaussian_filter(np.where(np.isfinite(self.wanted), self.wanted, 0), AROUND / CELLS, mode=self.mode)
-        # If a cell is too full to reach its density, the missing elements must not go to cells that lack none.
+        # If a cell is too full to reach its density, its missing elements must not go to cells that need none.
         wanting = np.where(open_, np.maximum(lack, 0), 0)
         self.lack = np.cumsum(wanting if wanting.any() else open_.astype(np.float64))
 

@@ -35,7 +35,7 @@ LEAST, TERRITORY = 6.0, 0.75
 The size is a share of the shorter side of the exemplars.
 """
 CLOSE = 0.5
-"""Share of the exemplar that elements cover above which they count as close to each other."""
+"""Share of the exemplar's area above which its elements count as close to each other."""
 
 
 def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:

@@ -41,7 +41,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
     Returns
     -------
     Tile
-        The filled tile; its source map refers to the exemplars.
+        The filled tile. Its source map refers to the exemplars.
 
     """
     shape = (plan.guide.shape[0], plan.guide.shape[1])

@@ -13,17 +13,17 @@ steps are:
 
 Departures, with their reasons:
 
-- Whole patches are cut in. The paper corrects windows point by point (Eq. 5 to 7), which tears elements larger than a
-  window. Whole patches reduce the number of cells that look torn by 80 %.
+- Whole patches are stitched. The paper corrects windows point by point (Eq. 5 to 7), which tears elements larger than
+  a window. Whole patches reduce the number of cells that look torn by 80 %.
 - An exemplar that shows a plane is flattened. Its elements then have the same size everywhere, and any of them can be
   shown at any depth. Without flattening, each row of a ramp of sizes would find only a strip of the exemplar, and
   repeat it. A plane is detected by the fit of S to a linear function (of its power 2/3 for a map of areas). Edges are
   also used, which get steeper with distance on a plane. The report contains the result. If the target grows along the
   plane's slope, elements are foreshortened as on this plane. If it grows along another line, elements are seen from
   the front. If its sizes both increase and decrease, elements are half as foreshortened.
-- Other exemplars are used in several sizes, which add samples of each scale. A patch has the additional cost (log S_e
-  - log S_o)^2 at a place, because ratios of scales are visible. The paper treats the scale as another channel of the
-  windows. On planes, a reduced element costs 1/7 of an enlarged one, because enlarged elements are blurred. The
+- Other exemplars are used in several sizes, which add samples of each scale. A patch has an additional cost at each
+  place, (log S_e - log S_o)^2, because ratios of scales are visible. The paper treats the scale as another channel of
+  the windows. On planes, a reduced element costs 1/7 of an enlarged one, because enlarged elements are blurred. The
   output's scale map is not changed.
 - The result is a set of source coordinates. Colours are copied from there instead of averaged, so that they are not
   blurred.
@@ -133,10 +133,10 @@ def perspective(
         copies are used. Elements on a plane have the requested size with any weight above 0, but another sharpness. If
         0, scales are ignored. Default: 1.
     augment_scales : {"auto", True, False} or sequence of float
-        Resizing of the exemplar. If True, a plane is flattened and shown at any depth, and other exemplars are copied
-        in other sizes. "auto" does the same, but without copies if the exemplar has enough of every requested scale.
-        If False, the nearest existing scales replace missing ones, with a warning. Numbers from 1/8 to 4 are the sizes
-        of copies, and planes are not flattened. Default: "auto".
+        Resizing of the exemplar. True flattens a plane and shows it at any depth, and copies other exemplars in other
+        sizes. "auto" does the same, but without copies if the exemplar has enough of every requested scale. False
+        replaces missing scales by the nearest existing ones, with a warning. Numbers from 1/8 to 4 are the sizes of
+        copies, and disable flattening. Default: "auto".
     wrap : bool or (rows, columns), optional
         Axes along which the result is periodic. The target must also be periodic along these axes. Default: none.
     seed : int
@@ -144,8 +144,8 @@ def perspective(
     interpolation : {"nearest", "linear", "cubic"}
         Interpolation between the exemplar's samples where it is resized. Default: "cubic".
     progress : callable or True, optional
-        Called as ``progress(stage, share)`` with the stage and its completed share. An exception that it raises stops
-        the work. True shows a bar.
+        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
+        the work stops. True shows a progress bar. Default: none.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def perspective(
 
         Stages:
 
-        - ``sheet``: The flattened example that patches are cut from.
+        - ``sheet``: The flattened or resized example that patches are cut from.
         - ``target``: The requested scale map, limited to the scales that are available.
         - ``before_blending``: The result.
 
@@ -242,7 +242,7 @@ def perspective(
         laid = lay_out(asked)
     if laid.outside.share > 0 and asked.strength > 0:
         warnings.warn(laid.outside.describe(laid.sizes), stacklevel=2)
-    # Stitch patches of it, each at the requested scale.
+    # Stitch patches of the sheet, each at the requested scale.
     found = stitch_sheet(
         laid.sheet,
         Region.whole(laid.wanted.shape, asked.wrap),

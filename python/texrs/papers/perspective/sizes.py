@@ -27,7 +27,7 @@ ALIKE = 0.1
 
 
 def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Slope | None) -> tuple[float, ...]:
-    """Return the sizes of the copies, starting with 1, or for a plane 1, the minimum and the maximum size."""
+    """Return the sizes of the copies, starting with 1, or (1, smallest, largest possible size) for a plane."""
     if plane is not None:
         return (1.0, SMALLEST, LARGEST)
     given = check_sizes(asked)

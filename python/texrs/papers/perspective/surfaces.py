@@ -36,7 +36,7 @@ class PreparedExemplar:
     frames : (points, 2, 2) int16, optional
         Jacobians of the sheet at each point of the output. None if ``target`` determines them.
     outside : Outside
-        Part of the requested scales that are not available.
+        Part of the requested scales that is not available.
     sizes : sequence of float
         Sizes of the copies, or the possible sizes of a plane, relative to the exemplar.
 
