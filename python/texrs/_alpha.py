@@ -14,7 +14,7 @@ __all__ = ["adapt", "divide", "has_alpha", "multiply", "undo"]
 CLEAR = 0.01
 """Minimum visible level of a colour, 0 to 1. Smaller colours of transparent pixels are noise."""
 MOST = 0.5
-"""Fraction of coloured pixels among those with alpha 0, above which a file is treated as not premultiplied."""
+"""Fraction of coloured pixels among the pixels with alpha 0, above which a file is not premultiplied."""
 
 
 def has_alpha(pixels: Array) -> bool:

@@ -109,7 +109,7 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     FileError
         A path cannot be read.
     LimitExceeded
-        A copy is needed that would take more bytes than the machine has.
+        A copy is needed, but the machine does not have enough memory.
 
     """
     array = as_ndarray(value, name, axes=axes)
@@ -181,7 +181,7 @@ def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | s
     InvalidInput
         The values are not numbers, of the wrong kind, out of range, or have the wrong shape.
     LimitExceeded
-        A copy is needed that would take more bytes than the machine has.
+        A copy is needed, but the machine does not have enough memory.
 
     Examples
     --------

@@ -24,7 +24,7 @@ FULL = 0.25
 FEWEST = 24
 """Minimum number of squares for a fit."""
 BETTER = 0.75
-"""Maximum ratio of the squared residuals to those of the next lower degree. Otherwise the lower degree is used."""
+"""Maximum fraction of the squared residuals that may remain after an increase of the degree by one."""
 ROUNDS, FAR = 6, 4.0
 """Number of steps of the robust fit, and minimum deviation of an outlier in standard deviations."""
 DIGITS = 8

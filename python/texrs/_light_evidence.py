@@ -21,9 +21,9 @@ SQUARES = 32
 MOST = 8
 """Maximum degree of polynomials. It is also twice the maximum number of waves."""
 BETTER = 0.75
-"""Maximum ratio of the residual variance to that of the next lower degree. Otherwise the lower degree is used.
+"""Maximum fraction of the residual variance that may remain after an increase of the degree by one.
 
-The variance is that of typical squares.
+The variance is measured from the median deviation of the squares.
 """
 CHANCE = 2.0
 """Minimum gain of each further term, as a multiple of the gain of one term by chance."""

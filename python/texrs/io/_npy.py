@@ -145,7 +145,7 @@ def read_arrays(path: PathLike, *, limit: int | None = None, choose: Choice | No
         Default: as `texrs.limits` allows.
     choose : callable, optional
         Function that gets the headers (see `read_headers`) before samples are read, and returns the keys of the arrays
-        to read or raises an error. If it is given, the byte limit holds for each array, not for their sum. Default:
+        to read or raises an error. If it is given, the byte limit applies to each array and not to their sum. Default:
         None, which reads all.
 
     Returns

@@ -379,7 +379,7 @@ def _check_segments(path: Path, series: Any, length: int) -> None:
 
 
 def _check_unfolded(path: Path, file: Any, series: Any) -> None:
-    """Check that no strip or tile unpacks to many more bytes than its pixels need, because tifffile has no limit."""
+    """Check that no strip or tile unpacks to many more bytes than its pixels need. tifffile does not check it."""
     for page in series.pages:
         key = None if page is None else page.keyframe
         if key is None or (key.compression not in _UNFOLDING and key.compression not in _PICTURES):

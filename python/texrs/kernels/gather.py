@@ -46,7 +46,7 @@ def gather(
         Index of the exemplar for each pixel, from 0. Default: 0 everywhere.
     interpolation : {"nearest", "linear", "cubic"}
         Interpolation between samples. Interpolated integers are rounded. Integers beyond 2^53 are not interpolated,
-        and the nearest sample is used. Default: "nearest".
+        and the nearest sample is used. Default: "linear".
     wrap : bool or one per axis
         Axes along which the exemplars are periodic. Along other axes, the samples at the border are repeated. Default:
         False.
@@ -59,8 +59,7 @@ def gather(
     Raises
     ------
     InvalidInput
-        Coordinates or samples are not finite, an index is not that of an exemplar, or exemplars differ in dtype or
-        channels.
+        Coordinates or samples are not finite, an index is out of range, or exemplars differ in dtype or channels.
 
     References
     ----------

@@ -180,7 +180,7 @@ def choose_kind(
 
 
 def find_kind(role: Role | None) -> Kind:
-    """Return the type of look-up for maps of a role: "colour", "normal", "vector" or "label"."""
+    """Return how maps of a role are resampled: as "colour", "normal", "vector" or "label"."""
     if role is None:
         return "colour"
     if role.labelled:

@@ -45,12 +45,13 @@ class Exports(Mapping[str, Map]):
         ----------
         tiles : (int, int)
             Number of repetitions (down, across), 1 to 64 each. More than one shows whether the material is tileable.
-            Default: (1, 1).
+            Default: (2, 2).
         light : (float, float)
             Direction of the light (azimuth, elevation) in degrees. The azimuth, -360 to 360, is counter-clockwise from
-            the right, so 135 is the upper left. The elevation above the surface is 1 to 90.
+            the right, so 135 is the upper left. The elevation above the surface is 1 to 90. Default: (135, 45).
         side : int
             Maximum length of the longer side of the image in pixels, 1 to 65536. Larger materials are averaged.
+            Default: 2048.
 
         Returns
         -------
@@ -231,11 +232,12 @@ class Exports(Mapping[str, Map]):
             File with the suffix .glb, which contains everything, or .gltf. With .gltf, a .bin file and the images
             (``stones_basecolor.png``, ...) are written next to it.
         shapes : sequence of {"plane", "sphere"}
-            Shapes that show the material, from left to right.
+            Shapes that show the material, from left to right. Default: both.
         repeat : int
-            Number of repetitions along each side of the plane, and from pole to pole of the sphere, 1 to 64.
+            Number of repetitions along each side of the plane, and from pole to pole of the sphere, 1 to 64. Default:
+            2.
         depth : {8, 16}
-            Bits per channel of the images. Some viewers read only 8.
+            Bits per channel of the images. Some viewers read only 8. Default: 8.
 
         Returns
         -------

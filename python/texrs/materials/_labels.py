@@ -1,4 +1,4 @@
-"""Recognise label images by their values: numbers of regions, between which other values have no meaning."""
+"""Recognise label images by their values, which are numbers of regions and not measurements."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Map:
     role : Role
         Role of the map, such as colour, normal or height.
     space : {"srgb", "linear"}
-        Encoding of the values. Default: "srgb" for integer colours, and "linear" for everything else.
+        Encoding of the values. Files usually have "srgb" for integer colours, and "linear" for everything else.
     file : str
         Name, without the suffix, of the file that the map was read from, and to which it is written again. Empty for a
         map from an array. Default: "".

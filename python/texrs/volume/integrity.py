@@ -33,8 +33,8 @@ class Integrity:
     Attributes
     ----------
     contacts : tuple of float
-        Number of adjacent points, per 1000 points, that are in elements of different colours with no border between
-        them.
+        Number of pairs of adjacent points in elements of different colours without a border between them, per 1000
+        points.
     largest : tuple of float
         Fraction of the points in elements that belongs to the largest connected part.
     mixed : tuple of float
@@ -157,7 +157,7 @@ class _Shown:
         return round(1e5 * total, 2)
 
     def count_contacts(self) -> float:
-        """Return the number of adjacent points in elements of different colours, without a border, per 1000 points."""
+        """Return the number of adjacent pairs in elements of different colours without a border, per 1000 points."""
         total = 0
         for axis in range(self.elements.ndim):
             (p, q), (m, n) = (_pair(a, axis) for a in (self.elements, self.inside))

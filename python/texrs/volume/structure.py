@@ -1,6 +1,6 @@
 """Statistics of the spatial structure of an image or a volume: frequency, orientation and artefacts.
 
-All functions take one value per pixel or voxel, such as the `lightness`.
+Each function needs an array with one value per pixel or voxel, such as the `lightness`.
 """
 
 from __future__ import annotations
