@@ -1,1 +1,1 @@
-"""Private calls of the engine that grows textures by corrected coordinates: fixed-point coordinates, packed windows."""
+"""Python interface of the compiled engine for synthesis by source coordinates: regions, appearance, seams, noise."""

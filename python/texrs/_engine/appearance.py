@@ -1,4 +1,4 @@
-"""Appearance vectors of an exemplar, and growth by them: coherent blocks, and their correction."""
+"""Appearance vectors of an exemplar, and their use in synthesis: coherent blocks, and their correction."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ _PARTS = ("colours", "features", "basis", "bias", "gain", "spacing")
 
 
 class Demand(NamedTuple):
-    """Values that an output should show at its points, in addition to similarity to the exemplar.
+    """Values that the points of an output should have, in addition to similarity to the exemplar.
 
     Attributes
     ----------
     exemplar : (samples * 4) int16
-        Values of the exemplar's samples, -2048 to 2047. Unused ones are zero.
+        Four values of each sample of the exemplar, -2048 to 2047. Unused ones are 0.
     output : (points * 4) or (points) int16
-        Requested values at the points of the output. A single value for each point is the first; the others are then
-        zero.
+        Requested values at the points of the output. If there is a single value per point, it is the first one, and
+        the others are 0.
     weight : (points) or (1) uint16
-        Cost of a squared difference of one, in 1/256. Unrelated windows differ by about 2 * 512^2. 0 if nothing is
-        requested.
+        Cost of a squared difference of one, in 1/256: one number per point, or a single one. Windows that are not
+        related differ by about 2 * 512^2. If 0, nothing is requested.
     order : (any) uint32
-        Samples in rising order of their first value. Random candidates are drawn from samples near the requested
-        value. If empty, they are drawn from all samples.
+        Samples in ascending order of their first value. Random candidates are then drawn from samples near the
+        requested value. If empty, they are drawn from all samples.
     excess : int
-        Weight of an excess of a sample's first value over the requested one, in 1/256 of the weight of a deficit. If
-        it is not 256, only first values count.
+        Weight if a sample's first value is above the requested one, in 1/256 of the weight if it is below. If it is
+        not 256, only first values are compared.
 
     """
 
@@ -51,14 +51,14 @@ class Demand(NamedTuple):
 
 
 class Corrected(NamedTuple):
-    """Coordinates after correction.
+    """Source coordinates after a correction.
 
     Attributes
     ----------
     places : (points * A) int32
         Source coordinates, in units of 1/4096 of a sample.
     passes : int
-        Number of passes.
+        Number of passes that were made.
     changed : float
         Share of the points that the last two passes changed.
 
@@ -70,22 +70,22 @@ class Corrected(NamedTuple):
 
 
 class Appearance:
-    """Description of the surroundings of each sample of an exemplar by 24 numbers.
+    """Description of the surroundings of each sample of an exemplar by 24 numbers, its appearance vector.
 
     Windows of colours, weighted by a Gaussian, are projected onto their leading principal components [1]_. All
-    arithmetic is on integers of 12 bits, so that results are the same on any processor and for any number of threads.
+    arithmetic is on 12-bit integers, so results are the same on any processor and for any number of threads.
 
     Parameters
     ----------
     colours : (..., C) array
-        Colours for the comparison of windows, up to four channels of any scale. Shape (rows, columns[, C]) or (planes,
-        rows, columns[, C]).
+        Colours for the comparison of windows, with up to four channels of any scale. Shape (rows, columns[, C]) or
+        (planes, rows, columns[, C]).
     axes : int
         Number of axes, 2 or 3.
     wrap : bool or one per axis
-        Axes along which the exemplar repeats.
+        Axes along which the exemplar is periodic.
     radius : int
-        Radius of a window; its side is 2 radius + 1.
+        Radius of a window in samples; its side is 2 radius + 1.
 
     Raises
     ------
@@ -118,29 +118,29 @@ class Appearance:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Samples along each axis."""
+        """Number of samples along each axis."""
         return tuple(self._inner.shape)
 
     @property
     def wrap(self) -> tuple[bool, ...]:
-        """Axes along which the exemplar repeats."""
+        """Axes along which the exemplar is periodic."""
         return tuple(self._inner.wrap)
 
     @property
     def radius(self) -> int:
-        """Radius of a window."""
+        """Radius of a window, in samples."""
         return self._inner.radius
 
     @property
     def spacing(self) -> float:
         """Median squared distance from a window to the nearest other one, in variances of all windows.
 
-        It is the natural unit for the acceptance threshold.
+        It is the unit of the acceptance threshold.
         """
         return self._inner.spacing
 
     def arrays(self) -> dict[str, Array]:
-        """Return the analysis as plain arrays for storage. `from_arrays` reads them."""
+        """Return the analysis as plain arrays for storage. `from_arrays` restores it."""
         kept: dict[str, Any] = dict(zip(_PARTS, self._inner.parts(), strict=True))
         kept |= {"shape": self.shape, "wrap": self.wrap, "radius": self.radius, "channels": self._inner.channels}
         return {name: np.asarray(value) for name, value in kept.items()}
@@ -152,7 +152,7 @@ class Appearance:
         Raises
         ------
         InvalidInput
-            If arrays are missing or do not belong together.
+            If arrays are missing or inconsistent.
 
         """
         missing = {*_PARTS, "shape", "wrap", "radius", "channels"} - set(arrays)
@@ -180,7 +180,7 @@ class Appearance:
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle as plain arrays."""
+        """Pickle the analysis as plain arrays."""
         return Appearance.from_arrays, (self.arrays(),)
 
     def blocks(
@@ -210,32 +210,33 @@ class Appearance:
         frames : (1 or points, A, A) int16
             Jacobians over the region (see `texrs._engine.pyramid.to_fixed`).
         cell : int
-            Side of a cell in points, 2 to 256.
+            Side of a cell in points, 2 to 256. Default: 6.
         rounds : int
             Number of half-rounds of choosing, 1 to 64. Cells of even and odd parity alternate.
         candidates : int
             Number of candidates of a cell in each half-round, 1 to 65535.
         contrast : float
-                        Division of misfits by the contrast of the pieces, 0 (none) to 1 (full). A value of 0 prefers
-            pieces of low contrast, because they are near every piece on average.
+            Extent of dividing misfits by the contrast of the pieces, 0 (not divided) to 1 (fully divided). A value of
+            0 prefers pieces of low contrast, because they are near every piece on average.
         continuation : float
-                        Cost of continuing exactly where a neighbour ends, in misfits of unrelated pieces, 0 to 4. A
+            Cost of continuing exactly where a neighbour ends, 0 to 4, relative to the misfit of unrelated pieces. A
             value of 0 copies the exemplar in large pieces.
         repetition : float
-            Cost of showing the same samples as a neighbouring cell, in the same units, 0 to 4.
+            Cost of using the same samples as a neighbouring cell, 0 to 4, in the same unit.
         seed : int
-            Seed of the random choices. Random numbers belong to positions in the world, not to the region.
+            Seed of the random choices. Random numbers depend on positions in the output's coordinates, not on the
+            region.
         margin : int
             Number of points along the borders that will be cut off, up to 2^20. Cells that only affect these points
             are not chosen.
         held : (points) bool, optional
-            Fixed points. The others are chosen to fit them.
+            True for fixed points. The other points are chosen to fit them.
         given : (points * A) int32, optional
-            Coordinates of the fixed points. Others are ignored.
+            Coordinates of the fixed points, in units of 1/4096 of a sample. Values of other points are ignored.
         demand : Demand, optional
-            Values that the points should show.
+            Values that the points should have.
         progress : callable, optional
-            Called with the completed share. An exception that it raises stops the work.
+            Function called with the completed share. An exception that it raises stops the work.
 
         Returns
         -------
@@ -288,7 +289,7 @@ class Appearance:
         overwrite: bool = False,
         progress: Report | None = None,
     ) -> Corrected:
-        """Correct coordinates until every window of the output resembles one of the exemplar.
+        """Correct source coordinates until every window of the output resembles a window of the exemplar.
 
         Parameters
         ----------
@@ -299,28 +300,29 @@ class Appearance:
         passes : int
             Maximum number of passes, up to 1000. Each corrects every other point, as on a chess board.
         first : int
-            Number of the first pass, for work that is done in parts.
+            Number of the first pass, for work that is divided into several calls.
         exhaustive : bool
-            If True, each pass compares each window with all windows of the exemplar. For small exemplars.
+            If True, each pass compares each window with all windows of the exemplar. Use it for small exemplars.
         reach : int
             Distance of the neighbours whose matches are tried, 1 or 2 points.
         acceptance : float
-            Minimum improvement of a random match over the present one, in units of `spacing`, 0 to 100. Good matches
-            are kept.
+            Minimum improvement for which a random match replaces the present one, in units of `spacing`, 0 to 100. It
+            keeps good matches.
         coherence : float
-            Cost of each neighbour that shows another piece of the exemplar, in units of `spacing`, 0 to 100. It keeps
-            pieces whole if several candidates fit equally well.
+            Cost of each neighbour that belongs to another piece of the exemplar, in units of `spacing`, 0 to 100. It
+            keeps pieces together if several candidates fit equally well.
         vote : int
-                        Radius within which windows vote on the coordinates of a point, up to `radius`. If 0, each
-            point takes its own match.
+            Radius of the windows that vote on the coordinates of a point, up to `radius`. If 0, each point uses its
+            own match.
         settled : float
-            Share of points. Stop when two passes change fewer. The result then depends on the whole region.
+            Share of points, 0 to 1. The correction stops when two passes change fewer points. The result then depends
+            on the whole region.
         seed : int
             Seed of the random choices.
         held : (points) bool, optional
-            Points whose coordinates are fixed.
+            True for points whose coordinates are fixed.
         overwrite : bool
-            If True, write the result over ``places``, which saves 4 bytes for each number.
+            If True, the result is written over ``places``, which saves 4 bytes for each number.
         demand, progress
             As for `blocks`.
 
@@ -360,6 +362,6 @@ class Appearance:
         return Corrected(places, passes, changed)
 
     def check(self, region: Region) -> None:
-        """Check that a region has the number of axes of the exemplar."""
+        """Raise an error if a region does not have as many axes as the exemplar."""
         if len(region.shape) != len(self.shape):
             raise InvalidInput(f"region: must have the {len(self.shape)} axes of the exemplar, got {region.shape}")

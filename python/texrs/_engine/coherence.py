@@ -1,4 +1,4 @@
-"""k-coherence: similar samples, and points that choose among the samples that their neighbours suggest."""
+"""k-coherence: each point chooses among samples that are similar to the source samples of its neighbours."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Report = Callable[[float], object]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Similarity:
-    """Sets of samples that may replace each sample of an exemplar.
+    """For each sample of an exemplar, a set of similar samples that may replace it.
 
     Attributes
     ----------
     sets : (samples, k) uint32
-        Row-major positions, the sample itself first. All entries are the sample itself if its window is not inside the
-        exemplar.
+        Row-major positions of the samples in each set, the sample itself first. If the window of a sample is not
+        inside the exemplar, all entries are the sample itself.
     numbers : int
         Number of components of the appearance vectors that are compared.
 
@@ -43,18 +43,18 @@ class Similarity:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the sets."""
+        """Size of the sets in bytes."""
         return self.sets.nbytes
 
 
 def find_similar(
     appearance: Appearance, *, k: int = 3, n: int = 7, numbers: int = 8, progress: Report | None = None
 ) -> Similarity:
-    """Find the samples of an exemplar most similar to each one, far from it and from each other.
+    """Find the most similar samples for each sample of an exemplar, far from it and from each other.
 
-    C_1 is the sample itself. Each further C_j has the nearest appearance vector of all samples that are far enough
-    from all earlier ones. This is more than (n - 1) / 2 samples along some axis [1]_. The whole exemplar is searched,
-    and the result is exact. The first of equally near samples is used.
+    C_1 is the sample itself. Each further C_j is the sample with the nearest appearance vector among all samples that
+    are far enough from the earlier ones. Far enough is more than (n - 1) / 2 samples along some axis [1]_. The whole
+    exemplar is searched, and the result is exact. The first one of equally near samples is used.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ def find_similar(
     k : int
         Number of samples in a set, 1 to 16.
     n : int
-        Side of the box around each chosen sample that excludes other samples; odd.
+        Side of the box around each chosen sample that excludes other samples, an odd number of samples.
     numbers : {8, 24}
         Number of leading components of the vectors that are compared.
     progress : callable, optional
-        Called with the completed share. An exception that it raises stops the work.
+        Function called with the completed share. An exception that it raises stops the work.
 
     Returns
     -------
@@ -112,11 +112,12 @@ def correct(
     kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None = None,
     progress: Report | None = None,
 ) -> NDArray[np.int32]:
-    """Correct coordinates by k-coherence: each point fits the appearance of its diagonal neighbours.
+    """Correct source coordinates by k-coherence, so that each point fits the appearance of its diagonal neighbours.
 
-    A pass visits the 2^A classes of points of the same parity along each axis, in fixed order [1]_. Candidates are the
-    samples similar to those of a point's 2^A diagonal neighbours, warped by the frames and shifted back to the point.
-    They are compared by the appearance vectors of the neighbours. The first of equally good candidates is used.
+    A pass visits the 2^A classes of points with the same parity along each axis, in fixed order [1]_. The source
+    samples of a point's 2^A diagonal neighbours, and samples similar to them, are candidates. They are shifted back to
+    the point, in the direction that the frames give. Candidates are compared by the appearance vectors of the
+    neighbours. The first one of equally good candidates is used.
 
     Parameters
     ----------
@@ -133,15 +134,15 @@ def correct(
     passes : int
         Number of passes, 0 to 1000.
     compensated : bool
-        If True, neighbours are read at the end of the diagonal in the exemplar, as released code does [1]_. Otherwise
-        they are read at the lattice point only.
+        If True, neighbours are read at the end of the diagonal in the exemplar, as in the code released with [1]_. If
+        False, they are read at the lattice point.
     held : (points) bool, optional
-        Points whose coordinates are fixed.
+        True for points whose coordinates are fixed.
     kinds : (samples) uint8 and (points) uint8, optional
         Class of each sample, and the class that each point requires; 255 allows any class. A point without a suitable
         candidate keeps its coordinates.
     progress : callable, optional
-        Called with the completed share. An exception that it raises stops the work.
+        Function called with the completed share. An exception that it raises stops the work.
 
     Returns
     -------
@@ -150,7 +151,7 @@ def correct(
     Raises
     ------
     InvalidInput
-        If an option is out of its range, or arrays do not belong together.
+        If an option is out of its range, or arrays are inconsistent.
     Cancelled
         If the work was stopped.
 
@@ -196,7 +197,7 @@ def jitter(
     level: int = 0,
     held: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int32]:
-    """Displace coordinates by noise that depends on the positions of their points in the world.
+    """Displace source coordinates by noise that depends on the positions of their points in the output.
 
     Parameters
     ----------
@@ -207,9 +208,9 @@ def jitter(
     reach : float
         Maximum displacement along an axis, in samples, 0 to 65536.
     seed, level : int
-        Seed and level of the noise.
+        Seed of the noise, and number of the level, which gives each level its own noise.
     held : (points) bool, optional
-        Points whose coordinates are fixed.
+        True for points whose coordinates are not displaced.
 
     Returns
     -------
@@ -218,7 +219,7 @@ def jitter(
     Raises
     ------
     InvalidInput
-        If an option is out of its range, or arrays do not belong to the region.
+        If an option is out of its range, or arrays do not have the size of the region.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Counter-based noise: a value depends on a seed and a position, not on a stream."""
+"""Counter-based random numbers: a number depends only on a seed and a position, not on earlier numbers."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ __all__ = ["uniform"]
 
 
 def uniform(seed: int, *position: int) -> float:
-    """Return a number in [0, 1) for a seed and up to four integers in [0, 2^32).
+    """Return a random number in [0, 1) for a seed and up to four integers in [0, 2^32).
 
-    Philox4x32-10 of Salmon, Moraes, Dror and Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
+    The generator is Philox4x32-10 of Salmon, Moraes, Dror and Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC
+    2011.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Elements as distances to their outlines, and elements after a motion."""
+"""Shapes of elements: signed distances to their outlines, and shapes after a motion."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from texrs._typing import Bools, Floats, Labels, Matrix
 __all__ = ["Moved", "Window", "measure_outlines", "move_shape"]
 
 Window = tuple[int, tuple[int, int], tuple[int, int]]
-"""A label, the first pixel of the window around it, and the window's rows and columns."""
+"""Label, first pixel (row, column) of the window around its shape, and size (rows, columns) of the window."""
 
 
 def measure_outlines(labels: Labels, windows: Sequence[Window]) -> list[Floats | None]:
-    """Return the signed distances to the outlines of labels, each in its window.
+    """Return signed distances to the outlines of labelled shapes, each in its own window.
 
     Parameters
     ----------
     labels : (H, W) int32
-        Labels of the image, whose edge values continue beyond it.
+        Labels of the image. Beyond the image, its edge values continue.
     windows : sequence of (label, (row, column), (rows, columns))
-        Label, first pixel of its window, and size of the window, which may reach beyond the image.
+        Label of a shape, first pixel of its window, and size of the window, which may extend beyond the image.
 
     Returns
     -------
     list of (rows, columns) float32, or None
-        Distance in pixels from each pixel to the nearest one on the other side of the outline, negative outside. None
-        if all pixels of the window are on one side.
+        Distance in pixels from each pixel to the nearest pixel on the other side of the outline; negative outside the
+        shape. None if all pixels of a window are on the same side.
 
     Examples
     --------
@@ -50,19 +50,19 @@ class Moved(NamedTuple):
     Attributes
     ----------
     window : (slice, slice)
-        Part of the canvas that the shape may cover: h rows, w columns.
+        Part of the canvas that the shape can cover: h rows and w columns.
     coordinates : (h, w, 2) float32
         Source coordinates of each pixel of the window.
     distance : (h, w) float32
-        Distance to the outline, in pixels of the source.
+        Signed distance to the outline at each pixel, in pixels of the original shape.
     inside : (h, w) bool
-        Mask of the pixels whose source coordinates are on the canvas.
+        True for pixels whose source coordinates are on the canvas.
     deep : (h, w) bool
-        Mask of the pixels that are inside, and deeper in the shape than the requested depth.
+        True for pixels whose source is on the canvas and at least ``depth`` inside the shape.
     pixels : int
-        Number of pixels that are inside and in the shape.
+        Number of pixels whose source is on the canvas and in the shape.
     inverse : (2, 2) float64
-        Linear part of the inverse map.
+        Linear part of the map from the moved to the original shape.
 
     """
 
@@ -84,22 +84,23 @@ def move_shape(
     canvas: tuple[int, int],
     depth: float,
 ) -> Moved | None:
-    """Move a shape by ``p -> centre + shift + matrix (p - centre)``. Return None if it leaves the canvas.
+    """Move a shape by ``p -> centre + shift + matrix (p - centre)``. Return None if it is outside the canvas then.
 
     Parameters
     ----------
     distance : (rows, columns) float32
         Signed distance to the outline, positive inside.
     origin : (row, column)
-        First pixel of this array.
+        Row and column of the first value of ``distance`` on the canvas.
     centre, shift : (row, column)
-        See above. If the map takes whole pixels to whole pixels, samples are kept exactly.
+        Centre and shift of the motion, in pixels. If the motion maps whole pixels to whole pixels, samples are copied
+        exactly.
     matrix : (2, 2) floats
-        See above; it must have an inverse.
+        Linear part of the motion. It must have an inverse.
     canvas : (rows, columns)
-        Size of the canvas that the shape comes from and moves on.
+        Size of the canvas. The shape is on it before and after the motion.
     depth : float
-        Minimum depth in pixels of the mask ``deep``.
+        Minimum depth of pixels in the mask ``deep``, in pixels.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Parts of infinite lattices, and the step from one resolution to the next."""
+"""Regions of infinite lattices of points, and the step from one resolution to the next."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from texrs.errors import InvalidInput
 __all__ = ["ONE", "Region", "flatten", "halve", "to_fixed", "upsample"]
 
 ONE = 4096
-"""One sample in fixed point. Fixed-point coordinates make every step exact, on any processor and in any order."""
+"""Fixed-point value of one sample. Integers make every step exact on any processor and in any order."""
 
 _SLAB = 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A part of an infinite lattice.
+    """A box of points of an infinite lattice.
 
     Attributes
     ----------
     shape : tuple of int
         Number of points along each axis.
     origin : tuple of int
-        World coordinates of the first point, on the lattice of its own resolution.
+        Coordinates of the first point, in points of the lattice.
     wrap : tuple of bool
         Axes along which the lattice is periodic.
 
@@ -47,18 +47,18 @@ class Region:
 
     @classmethod
     def whole(cls, shape: Sequence[int], wrap: bool | Sequence[bool] = False) -> Region:
-        """Return the region that begins at the origin of the world."""
+        """Return the region of a shape whose first point is at the origin."""
         sides = tuple(int(n) for n in shape)
         return cls(sides, (0,) * len(sides), as_wrap(wrap, axes=len(sides)))
 
     @property
     def place(self) -> tuple[tuple[int, ...], tuple[int, ...], tuple[bool, ...]]:
-        """Shape, origin and wrap, as the compiled code takes them."""
+        """Shape, origin and wrap as a tuple for the compiled code."""
         return self.shape, self.origin, self.wrap
 
     @property
     def points(self) -> int:
-        """Number of points."""
+        """Number of points in the region."""
         return int(np.prod(self.shape, dtype=np.int64))
 
     def parents(self) -> Region:
@@ -74,41 +74,41 @@ class Region:
         return Region(tuple(shape), tuple(origin), self.wrap)
 
     def grown(self, margin: int) -> Region:
-        """Return the region extended by a number of points on each side of the axes that are not periodic."""
+        """Return the region extended by a number of points on both sides of each axis that is not periodic."""
         pads = [0 if w else margin for w in self.wrap]
         shape = tuple(n + 2 * pad for n, pad in zip(self.shape, pads, strict=True))
         return Region(shape, tuple(o - pad for o, pad in zip(self.origin, pads, strict=True)), self.wrap)
 
     def inside(self, outer: Region) -> tuple[slice, ...]:
-        """Return the position of this region in a larger one, as slices."""
+        """Return the slices of a larger region that this region occupies."""
         starts = [o - p for o, p in zip(self.origin, outer.origin, strict=True)]
         if any(s < 0 or s + n > m for s, n, m in zip(starts, self.shape, outer.shape, strict=True)):
             raise InvalidInput(f"region: must be inside {outer}, got {self}")
         return tuple(slice(s, s + n) for s, n in zip(starts, self.shape, strict=True))
 
     def check_places(self, places: NDArray[np.int32]) -> None:
-        """Check that there are coordinates for each point."""
+        """Check that an array contains source coordinates for each point of a region."""
         count = self.points * len(self.shape)
         if places.dtype != np.int32 or places.shape != (count,):
             raise InvalidInput(f"places: must be int32 of {count} numbers, got {places.dtype} {places.shape}")
 
 
 def flatten(mask: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
-    """Return a mask of points as the compiled code takes it: flat, and empty for None."""
+    """Convert a mask of points to the form of the compiled code: a flat array, which is empty for None."""
     return np.zeros(0, np.bool_) if mask is None else np.ascontiguousarray(mask.reshape(-1))
 
 
 def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.int16]:
-    """Return the Jacobians of a region in fixed point: one if all are the same, else one for each point.
+    """Return the Jacobians of a field over a region in fixed point: one if all are equal, else one for each point.
 
     Parameters
     ----------
     field : Field, optional
         Field of `texrs.fields`. None is the identity.
     region : Region
-        Region of the lattice with points ``step`` voxels apart: point i is at (i + 1/2) step - 1/2.
+        Region of a lattice whose points are ``step`` voxels apart: point i is at (i + 1/2) step - 1/2.
     step : int
-        Distance of the points: 1, 2, 4 ...
+        Distance of the points in voxels: 1, 2, 4 ...
 
     Returns
     -------
@@ -118,7 +118,7 @@ def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.
     Raises
     ------
     InvalidInput
-        If a frame is singular, or makes features less than an eighth as large.
+        If a frame is singular, or reduces features to less than an eighth of their size.
 
     Examples
     --------
@@ -154,14 +154,14 @@ def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) 
     """Return an image or a volume at half the resolution.
 
     Each axis is filtered with (1, 3, 3, 1) / 8. Sample i of the result is between samples 2 i and 2 i + 1. The last
-    sample of an odd axis is left out.
+    sample of an odd axis is omitted.
 
     Parameters
     ----------
     image : (..., [C]) array
-        Any real dtype; sides of at least 2.
+        Image or volume of any real dtype, at least 2 samples along each axis.
     wrap : bool or one per axis
-        Axes along which the image is periodic. Along the others the border repeats.
+        Axes along which the image is periodic. Along other axes, border values are repeated.
     axes : int
         Number of axes without channels, 2 or 3.
 
@@ -172,7 +172,7 @@ def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) 
     Raises
     ------
     InvalidInput
-        If it is not an image, or is too small.
+        If the array is not an image or a volume, or is too small.
 
     Examples
     --------
@@ -194,28 +194,30 @@ def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) 
 def upsample(
     places: NDArray[np.int32], parents: Region, region: Region, frames: NDArray[np.int16]
 ) -> NDArray[np.int32]:
-    """Return the coordinates of a region from those of the region of half the resolution.
+    """Return the source coordinates of a region, from those of the region of half the resolution.
 
-    S(p) = 2 S'(p // 2) + 1/2 + J (p mod 2 - 1/2): a copy stays a copy [1]_.
+    S(p) = 2 S'(p // 2) + 1/2 + J (p mod 2 - 1/2). An exact copy of the exemplar is therefore an exact copy at the next
+    resolution [1]_.
 
     Parameters
     ----------
     places : (points of the parents * A) int32
-        Coordinates in units of 1/4096 of a sample of the coarser exemplar.
+        Source coordinates in units of 1/4096 of a sample of the coarser exemplar.
     parents, region : Region
-        Parts of the coarser and of the finer lattice. The coarser part must contain p // 2 for every p.
+        Regions of the coarser and of the finer lattice. The coarser region must contain p // 2 for every point p of
+        the finer one.
     frames : (1 or points, A, A) int16
         Jacobians over the region (see `to_fixed`).
 
     Returns
     -------
     (points * A) int32
-        Coordinates in units of 1/4096 of a sample of the finer exemplar.
+        Source coordinates in units of 1/4096 of a sample of the finer exemplar.
 
     Raises
     ------
     InvalidInput
-        If the parents do not contain those of the region, or arrays have other sizes.
+        If ``parents`` does not contain the parents of all points, or arrays have the wrong size.
 
     References
     ----------

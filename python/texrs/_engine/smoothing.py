@@ -1,4 +1,4 @@
-"""Gaussian smoothing of arrays: the same bytes as `scipy.ndimage`, several times as fast."""
+"""Gaussian smoothing of arrays, with the same results as `scipy.ndimage` but several times as fast."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def smooth(
     mode: Edge | Sequence[Edge] = "reflect",
     truncate: float = 4.0,
 ) -> NDArray[Number]:
-    """Return an array smoothed by a Gaussian.
+    """Smooth an array with a Gaussian filter.
 
     Parameters
     ----------
@@ -32,9 +32,9 @@ def smooth(
     sigma : float or sequence
         Standard deviation, in samples, as one number or one per axis. 0 leaves an axis unchanged.
     mode : str or sequence
-        Continuation beyond the ends of axes, as in `scipy.ndimage.gaussian_filter`. "constant" is 0 there.
+        Values beyond the ends of axes, as in `scipy.ndimage.gaussian_filter`. For "constant" they are 0.
     truncate : float
-        Radius of the kernel, in standard deviations.
+        Radius of the filter, in standard deviations.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def smooth(
 
 
 def _list_weights(sigma: float, truncate: float) -> list[float]:
-    """Return the weights of values at distances of 0, 1, ... samples."""
+    """Return the weights of the filter at distances of 0, 1, ... samples."""
     if sigma <= 1e-15:
         return []
     reach = int(truncate * sigma + 0.5)

@@ -1,4 +1,4 @@
-"""The stitcher: patches of an exemplar are mapped into the output and cut along the least visible seams."""
+"""The stitcher: it maps patches of an exemplar into an output and cuts them along the least visible seams."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from texrs.errors import InvalidInput
 __all__ = ["FREE", "Pasting", "Samples", "Shown", "Stitched", "Stitcher", "Weights"]
 
 FREE = 2**32 - 1
-"""Value of a pixel that is not copied from any place yet."""
+"""Value of a pixel that has no source sample yet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """Costs of a seam, each 0 to 100.
+    """Weights of the cost of a seam, each 0 to 100.
 
     Attributes
     ----------
     colour : float
-        Cost of squared colour differences across the seam, in the exemplar's standard deviations.
+        Cost of squared colour differences across the seam. Unit: variances of the exemplar's colours.
     contact, jump, depth, joint : float
-        contact: two touching elements. jump: an element that is cut off. depth: a seam inside an element. joint:
-        elements less than two samples apart.
+        Costs at elements. Two touching elements cost ``contact``, and elements less than two samples apart cost
+        ``joint``. An element that is cut off costs ``jump``. A seam inside an element costs ``depth``.
     presence : float
-        Cost of a point without an element. Cuts around elements are shorter, and would leave too few elements without
-        this cost.
+        Cost of a point without an element. Cuts around elements are shorter, so there would be too few elements
+        without this cost.
     surprise : float
-        Cost of colours that are rarely adjacent.
+        Cost of neighbouring colours that are rarely adjacent in the exemplar.
     distortion : float
-        Cost of a point whose patch is bent against the field.
+        Cost of a point where the patch deviates from the field.
     guide : float
-        Cost of a point that does not show the requested value.
+        Cost of a point that does not have the requested value.
 
     """
 
@@ -64,11 +64,11 @@ class Stitched(NamedTuple):
     places : (points * A) int32
         Source coordinates, in units of 1/4096 of a sample.
     patches : (points) uint32
-        Patch of each point. Given points have numbers after the last patch.
+        Patch of each point. Fixed points have numbers after the last patch.
     frames : (patches, A, A) int16
         Jacobian at the centre of each patch, in units of 1/4096.
     seams : float
-        Mean cost of the seams at a point.
+        Mean cost of the seams per point.
     healed : int
         Number of moves that repaired or removed torn elements.
 
@@ -89,14 +89,14 @@ class Shown(NamedTuple):
     places : (points * A) int32
         Source coordinates, in units of 1/4096 of a sample.
     patches : (points) uint32
-        Patch of each point, a row of the table.
+        Patch of each point, as a row of the table.
     seams : (points * A) float32
         Cost of the seam from each point to the next one along each axis.
     distortion : (points) float32
-        Difference of the patch from the field. Empty if all points have one frame.
+        Deviation of the patch from the field at each point. Empty if all points have the same frame.
     table : (patches, K) int32
-        Data of each patch: its centre, relative to the first point of the part; the source coordinates and the
-        Jacobian of the centre. Then the side, in units of 1/4096 of a sample, and whether it is rigid.
+        Data of each patch. They are the position of its centre relative to the first point, and the source coordinates
+        and the Jacobian there. Then follow the side in units of 1/4096 of a sample, and 1 for a rigid patch.
 
     """
 
@@ -108,35 +108,34 @@ class Shown(NamedTuple):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays."""
+        """Size of all arrays in bytes."""
         return sum(array.nbytes for array in self)
 
 
 class Stitcher:
-    """An exemplar that patches are cut from.
+    """An exemplar, prepared so that patches can be cut from it.
 
     Parameters
     ----------
     colours : (..., C) float32
-        Up to four channels of any scale, on two or three axes.
+        Colours of the exemplar: up to four channels of any scale, on two or three axes.
     wrap : one bool per axis
-        Axes along which the exemplar repeats.
+        Axes along which the exemplar is periodic.
     classes : uint8 array
-        Class of each sample.
+        Class of colour of each sample.
     costs : (K, K) float32
-        Cost of two adjacent classes: higher for rarer pairs.
+        Cost of two adjacent classes of colour, higher for rarer pairs.
     labels : uint32 array, optional
-        Element of each sample, from 1; 0 for none.
+        Element of each sample, counted from 1; 0 for the background.
     depth : float32 array, optional
-        Distance of each sample to the background.
+        Distance of each sample to the background, in samples.
     sure : bool
-        If True, the elements are reliable. Unreliable elements are kept whole by the costs of cuts, and are not
-        repaired.
+        If True, the elements are reliable. Unreliable elements only have costs for cuts, and are not repaired.
 
     Raises
     ------
     InvalidInput
-        If the arrays do not belong together.
+        If the arrays are inconsistent.
 
     """
 
@@ -199,31 +198,31 @@ class Stitcher:
         overlap : float
             Overlap of neighbours, as a share of the patch side, 0 to 0.8.
         candidates : int
-            Number of positions that are cut in for each patch, 1 to 64. The cheapest is kept.
+            Number of source positions that are tried for each patch, 1 to 64. The one with the cheapest seam is used.
         bend : bool
             If True, patches bend with the field. Otherwise they are rotated and scaled as a whole.
         recover : float
-            Number of patches that cover the worst seams again, as a share of all patches, 0 to 4. They are kept if
-            they lower the cost.
+            Number of patches that replace the worst seams, as a share of all patches, 0 to 4. They are used if they
+            lower the cost.
         heal : bool
             If True, torn elements are completed or removed.
         weights : Weights
-            Costs of a seam.
+            Weights of the cost of a seam.
         repetition, continuation : float
-            Cost of positions that were used more often than others, and of continuing exactly where a neighbour ends,
-            0 to 100. Unrelated positions differ by 2.
+            Cost of source positions that are used more often than others, and of continuing exactly where a neighbour
+            ends, 0 to 100. For comparison, two unrelated positions differ by 2.
         seed : int
             Seed of the random choices.
         held : (points) bool, optional
-            Points whose coordinates are fixed.
+            True for points whose coordinates are fixed.
         given : (points * A) int32, optional
-            Coordinates of the fixed points. Others are ignored.
+            Coordinates of the fixed points, in units of 1/4096 of a sample. Values of other points are ignored.
         loose : (points) bool, optional
-            Fixed points that patches may still replace if this lowers the cost of seams.
+            True for fixed points that patches may still replace if this lowers the cost of seams.
         demand : Demand, optional
-            Values that the points should show.
+            Values that the points should have.
         progress : callable, optional
-            Called with the completed share. An exception that it raises stops the work.
+            Function called with the completed share. An exception that it raises stops the work.
 
         Returns
         -------
@@ -269,18 +268,18 @@ class Stitcher:
     def judge(
         self, region: Region, places: NDArray[np.int32], patches: NDArray[np.uint32], weights: Weights = Weights()
     ) -> NDArray[np.float32]:
-        """Return the costs of seams, (points * A).
+        """Return the costs of the seams in an output, (points * A), from each point to the next one along each axis.
 
         Parameters
         ----------
         region : Region
             Region of the points.
         places : (points * A) int32
-            Source coordinates of each point.
+            Source coordinates of each point, in units of 1/4096 of a sample.
         patches : (points) uint32
             Patch of each point.
         weights : Weights
-            Costs of a seam.
+            Weights of the cost of a seam.
 
         Raises
         ------
@@ -307,24 +306,26 @@ class Stitcher:
         balance: float = 4.0,
         progress: Report | None = None,
     ) -> Shown:
-        """Cut a patch into a part of a larger output, whose borders stay unchanged.
+        """Cut a patch into a part of a larger output, without changing the borders of the part.
 
-        The result depends only on the content and the frames of the part.
+        The result depends only on the content of the part and on its frames.
 
         Parameters
         ----------
         region : Region
-            The part.
+            Region of the part.
         frames : (1 or points, A, A) int16
             Jacobians over the part.
         shown : Shown
             Content of the part before the call.
         patch : float
-            Maximum side of a patch in samples of the exemplar. If one does not fill the part, several are used.
+            Maximum side of a patch in samples of the exemplar. If a single patch does not fill the part, several are
+            used.
         candidates, bend, recover, heal, weights, repetition, continuation, progress
-            As for `stitch`. Repetition is charged against the patches that the part shows already.
+            As for `stitch`. The cost of repetition counts patches that are already in the part.
         balance : float
-            Cost of points of overrepresented classes. The unit is the number of points on a patch side.
+            Cost of points of overrepresented colour classes, 0 to 100. The unit is the number of points along the side
+            of a patch.
 
         Returns
         -------
@@ -368,11 +369,11 @@ class Pasting:
     Attributes
     ----------
     shown : (h, w) uint32
-        Sample of each pixel, or `FREE`.
+        Sample of each pixel, or `FREE` for pixels without a sample.
     seams : (h, w, 2) float32
         Cost of the seam from each pixel to the next one along each axis.
     mask, core : (h, w) bool
-        Pixels that a patch covers, and pixels that must take it.
+        True for pixels that a patch can cover, and for pixels that it must cover.
 
     """
 
@@ -382,18 +383,18 @@ class Pasting:
     core: Bools
 
     def pack(self) -> tuple[tuple[int, ...], NDArray[np.uint32], Floats, Bools, Bools]:
-        """Return the shape, and the arrays as one flat array."""
+        """Return the shape of the window, and its arrays in flat form."""
         shown, seams = np.ascontiguousarray(self.shown), np.ascontiguousarray(self.seams)
         return self.shown.shape, shown.reshape(-1), seams.reshape(-1), self.mask.reshape(-1), self.core.reshape(-1)
 
 
 class Samples:
-    """Samples of images in one row. Patches found by another search are cut from them without a warp.
+    """Samples of one or several images as a list. Unwarped patches of them can be cut into a window.
 
     Parameters
     ----------
     colours : (n, C) float32
-        Up to four channels of any scale.
+        Colours of the samples: up to four channels of any scale.
     depth : (n) float32
         Depth of each sample inside an element, in pixels; 0 between elements.
     weights : (float, float)
@@ -405,19 +406,19 @@ class Samples:
         self.inner: Final = _rust.PatchSamples(np.ascontiguousarray(colours), np.ascontiguousarray(depth), weights)
 
     def judge(self, pasting: Pasting, patches: NDArray[np.uint32]) -> list[float]:
-        """Return the cost of the window's seams after cutting in each of some patches separately.
+        """Return the cost of a window's seams after cutting in each of several patches alone.
 
         Parameters
         ----------
         pasting : Pasting
-            Window that they are cut into.
+            Window that the patches are cut into.
         patches : (k, h, w) uint32
-            Sample of each pixel. Pixels outside the mask may have any value.
+            Sample of each pixel of each patch. Pixels outside the mask can have any value.
 
         """
         return self.inner.judge(pasting.pack(), patches.reshape(len(patches), -1))
 
     def cut(self, pasting: Pasting, patch: NDArray[np.uint32]) -> tuple[Bools, Floats]:
-        """Cut a patch (h, w) into a window. Return the mask of its pixels, and the new seams of the window."""
+        """Cut a patch (h, w) into a window. Return True for pixels that it covers, and the new seams of the window."""
         take, seams = self.inner.cut(pasting.pack(), patch.reshape(-1))
         return take.reshape(patch.shape), seams.reshape(*patch.shape, 2)
