@@ -345,7 +345,9 @@ def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float6
         return np.zeros(axes)
     at = as_points(place, axes, name)
     if at.ndim > 1 or np.abs(at).max() > FAR:
-        raise InvalidInput(f"{name}: must be {axes} numbers within {FAR:g}, got shape {at.shape}, or larger numbers")
+        raise InvalidInput(
+            f"{name}: must be {axes} numbers from -{FAR:g} to {FAR:g}, got shape {at.shape} or numbers beyond this range"
+        )
     return at
 
 

@@ -89,7 +89,9 @@ def make_grid(
         raise InvalidInput(f"frames: must have shape (R, C, 2, 2) or (P, R, C, 3, 3), got {given.shape}")
     sides = given.shape[:axes]
     if prod(sides) > MAX_FRAMES:
-        raise InvalidInput(f"frames: must be at most {MAX_FRAMES}, got {prod(sides)}; fewer frames are interpolated")
+        raise InvalidInput(
+            f"frames: must be at most {MAX_FRAMES} frames, got {prod(sides)}; give fewer frames, which are interpolated"
+        )
     box = sides if extent is None else as_size(extent, "extent", axes=axes, limit=2**62)
     start = as_place(origin, axes, "origin").tolist()
     step = [n / s for n, s in zip(box, sides, strict=True)]

@@ -47,11 +47,12 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
     given = try_array(direction)
     if given.ndim != 2 or given.dtype.kind not in "iuf" or given.size == 0:
         raise InvalidInput(
-            f"direction: must be degrees, one number or (rows, columns), or a field; got {given.dtype} of {given.shape}"
+            "direction: must be one angle in degrees, an array (rows, columns) of angles, or a field; got "
+            f"{given.dtype} of {given.shape}"
         )
     angles = given.astype(np.float64)
     if not (np.abs(angles) <= FARTHEST).all():
-        raise InvalidInput(f"direction: must be finite degrees within {FARTHEST:g}")
+        raise InvalidInput(f"direction: must be finite angles from -{FARTHEST:g} to {FARTHEST:g} degrees")
     # Remove whole turns first, because the remainder of large angles would be rounded.
     angles = np.radians(angles % 360)
     parts = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
