@@ -1,4 +1,4 @@
-"""The reference of the Python functions: a page for each, grouped by task, and tables of the parameters of the verbs."""
+"""The Python reference, with a page for each function, grouped by task; and tables of parameters for the guides."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ TASKS = (
         ("Synthesis", "SourceMap", "RenderOptions", "CopyStatistics", "ResultList"),
         ("metrics",),
     ),
-    Task("Images to train on", ("augment",), (), ("transforms",)),
+    Task("Augment training images", ("augment",), (), ("transforms",)),
     Task("Files", ("files",), (), ("io",)),
     Task("Limits, threads and errors", ("batch",), ("threads",), ("limits", "errors")),
     Task("Kernels", (), (), ("kernels",)),
@@ -129,11 +129,11 @@ def write_api(folder: Path) -> None:
         text += f"- **[{task.title}]({slug}.rst)**: {shown}{' ...' if len(some) > 6 else ''}\n"
     lead = (
         "Each public function and class has a page. The pages are grouped by task. [The result](../results.md) describes\n"
-        "what all verbs return, and [Conventions](../../conventions.md) the order of axes, sizes and types. The kernels in\n"
-        'Rust have <a href="../../rust/texrs/index.html">a reference of their own</a>.'
+        "the return value of all verbs, and [Conventions](../../conventions.md) describes axes, sizes and types.\n"
+        'The Rust kernels have <a href="../../rust/texrs/index.html">a separate reference</a>.'
     )
     toctree = "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(slugs) + "\n```\n"
-    (folder / "index.md").write_text(f"{NOTICE}# API reference\n\n{lead}\n\n{text}{toctree}", encoding="utf-8")
+    (folder / "index.md").write_text(f"{NOTICE}# Python reference\n\n{lead}\n\n{text}{toctree}", encoding="utf-8")
 
 
 def make_slug(title: str) -> str:

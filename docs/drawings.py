@@ -74,9 +74,9 @@ def source_map() -> Any:
                 arrowstyle="->",
             )
         )
-    show(panels[2], colour_places(source.coordinates, sample.image.shape), "the source map, as colours")
+    show(panels[2], colour_places(source.coordinates, sample.image.shape), "the source map, shown as colours")
     labels = source.render(sample.labels, interpolation="nearest")
-    show(panels[3], volume.label_to_color(labels), "labels through the source map")
+    show(panels[3], volume.label_to_color(labels), "labels looked up through the source map")
     # Draw the colours of all positions in the example as a key.
     key = panels[2].inset_axes((0.02, 0.03, 0.22, 0.3))
     place = np.stack(np.meshgrid(range(112), range(112), indexing="ij"), axis=-1)
@@ -127,7 +127,7 @@ def scale_map() -> Any:
     figure, panels = lay(4)
     # Draw rays from the eye to tiles on a floor, and where the rays meet the image plane.
     side = panels[0]
-    side.set_title("tiles of one size, seen from the side", fontsize=10, color=INK)
+    side.set_title("equal tiles on a floor, from the side", fontsize=10, color=INK)
     side.plot([0, 7], [0, 0], color=INK, lw=2)
     eye, screen = np.array([0.0, 2.0]), 0.9
     for start in (1.2, 2.6, 4.0, 5.4):
@@ -143,7 +143,7 @@ def scale_map() -> Any:
     side.set_xlim(-0.3, 7)
     side.set_ylim(-0.8, 3)
     side.set_axis_off()
-    show(panels[1], floor.image, "a floor, with sizes as circles")
+    show(panels[1], floor.image, "a floor, and circles that show sizes")
     for row in (20, 60, 105, 160):
         for column in (40, 96, 152):
             panels[1].add_patch(plt.Circle((column, row), 10 * scale[row, column], fill=False, ec="white", lw=2))
@@ -246,10 +246,10 @@ def tell(figures: dict[str, Any], names: dict[str, str]) -> Measured:
 
 
 JUDGED = {
-    "torn": "length of seams inside elements, divided by the length of outlines",
-    "broken": "share of lines that break off at seams",
-    "seam_blur": "share of detail that is missing next to seams",
-    "repetition": "exact repetition; 1 is the value of random patches",
+    "torn": "length of seams inside elements, relative to the length of outlines (0 is best)",
+    "broken": "share of lines that end at seams (0 is best)",
+    "seam_blur": "share of detail that is lost next to seams (0 is best)",
+    "repetition": "exact repetition, relative to random patches (1)",
 }
 
 
@@ -293,7 +293,10 @@ def solid() -> tuple[Any, Measured]:
         for name, options in ((PRINTED, {"method": "paper"}), (OURS, {}))
     }
     figures = {name: volume.integrity(stone, each.source_map) for name, each in made.items()}
-    names = {"torn": "share of element voxels in torn elements", "crumbs": "crumbs of elements in 100 000 voxels"}
+    names = {
+        "torn": "share of element voxels in torn elements",
+        "crumbs": "small fragments of elements per 100 000 voxels",
+    }
     shown = [(n, volume.render_block(m.image, 320)) for n, m in made.items()]
     return compare([("the example", volume.render_block(stone, 240))], shown), tell(figures, names)
 

@@ -1,9 +1,10 @@
 """
-Images to train on, with labels and boxes
-=========================================
+Augmented training images
+=========================
 
-One labelled image becomes many: pieces of it are arranged in a new way, and its labels and boxes follow through the
-source map. A box that is cut becomes smaller, and a piece that is copied twice has two boxes.
+From one labelled image, each seed gives another image: pieces of the original are rearranged, and labels and boxes are
+rearranged in the same way. The box of an object that is cut becomes smaller, and an object that is copied twice has
+two boxes.
 """
 
 import matplotlib.pyplot as plt

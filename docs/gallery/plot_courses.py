@@ -1,9 +1,9 @@
 """
-A wall in other courses
-=======================
+A brick wall with another layout
+================================
 
-A layout can be drawn. Here it has courses of three heights. Each of its cells contains one whole brick, and the joints
-keep their width.
+You can draw the layout of a wall. Here it has courses of three heights. Each cell contains one whole brick, and the
+joints keep their width.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,10 @@
 """
-Scattered over a background
-===========================
+Elements scattered over a background
+====================================
 
-Elements of one image are scattered over another, each whole, as densely as a map specifies. Here they are buttons on a
-cloth, with more of them to the right. The report contains the requested and the reached density.
+Whole elements of one image are scattered over another image, with the density that a map specifies. Here they are
+buttons on a cloth, and their density increases to the right. The report contains the requested density and the density
+of the result.
 """
 
 import matplotlib.pyplot as plt

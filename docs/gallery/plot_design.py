@@ -1,9 +1,9 @@
 """
-More of the same stones
-=======================
+A larger texture
+================
 
-One image becomes a larger one, which is tileable along both axes. Elements are found, moved, and stitched back along
-minimum cuts.
+A small image becomes a larger one, which is tileable along both axes. texrs finds the elements, moves them, and joins
+them along minimum cuts.
 """
 
 import matplotlib.pyplot as plt

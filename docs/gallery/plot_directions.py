@@ -1,6 +1,6 @@
 """
-Along a flow
-============
+A texture along a flow
+======================
 
 A field can be an array of vectors, such as the result of a simulation or a painted flow. Here bark follows a flow with
 two eddies.

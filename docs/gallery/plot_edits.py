@@ -2,9 +2,9 @@
 Edit a layout step by step
 ==========================
 
-A layout is edited by a list of steps, which can be kept and replayed. Here the elements are put in order, every other
-row is moved, or the elements are placed on a spiral. Each button keeps its pixels, and the background behind it is
-filled.
+A layout is edited by a list of steps, which can be saved and repeated. Here the elements are arranged regularly, every
+other row is moved, or the elements are placed on a spiral. The pixels of each button do not change, and the background
+behind it is filled.
 """
 
 import matplotlib.pyplot as plt

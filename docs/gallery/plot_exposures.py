@@ -1,9 +1,10 @@
 """
-More than eight bits
-====================
+Values above white
+==================
 
-A result keeps the dtype and the value range of its example. Here the example is a night sky in floating point, whose
-stars are up to 30 times as bright as white. The result is shown at two exposures: the bright stars keep their values.
+A result has the dtype and the value range of its example. Here the example is a night sky in floating point, whose
+stars are up to 30 times as bright as white. The result is shown at two exposures, to show that bright stars keep their
+values.
 """
 
 import matplotlib.pyplot as plt

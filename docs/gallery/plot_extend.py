@@ -1,8 +1,8 @@
 """
-More of the wall
-================
+A wider photograph of a wall
+============================
 
-An oblique image of a wall is continued on both sides, in the same perspective. Its own pixels do not change.
+An oblique image of a wall is continued on both sides, in the same perspective. The pixels of the image do not change.
 """
 
 import matplotlib.pyplot as plt

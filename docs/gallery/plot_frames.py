@@ -1,9 +1,9 @@
 """
-Bark turned by a field
-======================
+Bark rotated by a field
+=======================
 
 A frame gives the directions of the example's axes at a point. The second panel shows frames of a spiral field, and the
-third one shows bark that follows the field.
+third panel shows bark that follows this field.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 A filled hole
 =============
 
-A hole is filled with patches of the known pixels around it. Here ``boundary_width=4`` lets a narrow band of known
-pixels around the hole change, which hides the seam better. All other known pixels stay as they are.
+A hole is filled with patches of the known pixels around it. With ``boundary_width=4``, pixels in a narrow band around
+the hole can also change, which makes the seam less visible. All other known pixels do not change.
 """
 
 import matplotlib.pyplot as plt

@@ -2,9 +2,9 @@
 A material under a light
 ========================
 
-A material is a set of aligned maps. All maps of a result are looked up through one source map, so the result is a
-material too. Here it has colours, heights and roughness. It is shown under a light from the left and under a light
-from below.
+A material is a set of aligned maps. All maps of a result are looked up through one source map, so the result is also a
+material. Here it has colours, heights and roughness. It is shown under a light from the left and under a light from
+below.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,9 @@
 """
-A mesh painted with stone
-=========================
+A mesh textured with stone
+==========================
 
-A mesh is painted with a solid texture: each vertex shows the texture at its place, so the texture continues through
-the body without seams. Each face of this knot is drawn in the mean colour of its vertices.
+A mesh is textured with a volume. Each vertex has the value of the volume at its position, so the texture has no seams.
+Each face of this knot is drawn in the mean colour of its vertices.
 """
 
 import matplotlib.pyplot as plt

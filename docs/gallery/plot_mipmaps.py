@@ -1,10 +1,10 @@
 """
-Smaller and smaller copies
-==========================
+Mipmaps
+=======
 
-Game engines show distant surfaces with smaller copies of their maps (mipmaps). texrs averages colours as linear light.
-Averages of the numbers in the file would be too dark. Black and white lines therefore become the grey that they are
-seen as from a distance.
+Game engines show distant surfaces with smaller copies of their maps (mipmaps). texrs averages colours in linear light,
+because averages of sRGB values are too dark. The average of black and white lines is therefore the grey that the lines
+appear as from a distance.
 """
 
 import tempfile

@@ -2,8 +2,8 @@
 Two textures mixed by a map
 ===========================
 
-A map gives the share of two examples at each pixel. Whole elements of one example are on the other example, so the border
-follows their outlines and not the edge of the map.
+A map gives the share of each example at each pixel. Whole elements of one example are placed on the other example, so
+the border follows the outlines of elements, and not the edge of the map.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,9 @@
 """
-Bricks in a crazy pavement
-==========================
+Bricks in random cells
+======================
 
-Any tessellation can be a layout. Here the cells belong to randomly moved points. Each cell contains one brick, which
-is deformed to fit, and the joints follow the cells.
+Any tessellation can be a layout. Here the cells are the Voronoi cells of randomly moved points. Each cell contains one
+brick, which is deformed to fit. The joints follow the borders of the cells.
 """
 
 import matplotlib.pyplot as plt

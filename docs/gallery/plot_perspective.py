@@ -1,9 +1,9 @@
 """
-A floor with a wave in it
-=========================
+A floor with a wave
+===================
 
-In an oblique image, the apparent size of the elements varies. texrs grows textures with the sizes of any scale map,
-here of a wave.
+In an oblique image, the apparent size of the elements varies. texrs can grow a texture with the sizes in another scale
+map, here the scale map of a wave.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 Find the plane of a wall
 ========================
 
-texrs finds a plane in a single image if its elements are similar everywhere: on the right plane, all of them have one
-size. The second panel shows a grid on the plane that was found, and the third one shows the apparent sizes.
+texrs finds a plane in a single image if its elements have similar sizes in reality. On the correct plane, all elements
+have the same size. The second panel shows a grid on the plane that was found, and the third panel shows the apparent
+sizes.
 """
 
 import matplotlib.pyplot as plt

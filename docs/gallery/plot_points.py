@@ -1,9 +1,9 @@
 """
-Carved out of a texture
-=======================
+Objects carved from a solid texture
+===================================
 
-A solid texture can be sampled at any points, such as those where the rays of a camera meet an object. Nothing is
-unwrapped, so no seam is visible. Here three balls consist of one stone.
+A solid texture can be sampled at any points, such as the points where the rays of a camera meet an object. No UVs are
+needed, so no seam is visible. Here three balls are textured with the same stone.
 """
 
 import matplotlib.pyplot as plt

@@ -2,7 +2,8 @@
 A flattened floor
 =================
 
-texrs finds the plane in the image. The parts that are sharp in the image are grown into a flat texture of any size.
+texrs finds the plane in the image. It makes a flat texture from the sharp parts of the image, and can grow it to any
+size.
 """
 
 import matplotlib.pyplot as plt

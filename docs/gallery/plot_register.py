@@ -2,8 +2,9 @@
 All maps of a material
 ======================
 
-A source map gives the position in the example for each pixel of the result. Any map that is aligned with the example,
-such as heights or labels of stones, therefore gives a map that is aligned with the result. It keeps its own dtype.
+For each pixel of the result, a source map gives a position in the example. If a map is aligned with the example, such
+as heights or labels of stones, it can be looked up through the source map. It is then aligned with the result, and
+keeps its own dtype.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 A regular layout
 ================
 
-The layout of a texture can be edited. Here buttons at random positions are moved to a lattice, and each button keeps
-its pixels.
+The layout of a texture can be edited. Here buttons at random positions are moved to a lattice, and the pixels of each
+button do not change.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Remove an object from a wall
 ============================
 
-texrs removes an object from an image. It finds the plane behind the object, and fills in elements of the size that
-belongs there.
+texrs removes an object from an image. It finds the plane behind the object, and fills it with elements whose sizes fit
+the perspective.
 """
 
 import matplotlib.pyplot as plt

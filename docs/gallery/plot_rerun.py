@@ -2,8 +2,8 @@
 Repeat a result
 ===============
 
-Every file records how it was made. ``texrs rerun`` repeats the command: it gives the same bytes, or names the input
-that changed.
+Every file contains a record of the command that wrote it. ``texrs rerun`` repeats the command. The result has the same
+bytes, or a message names the input that has changed.
 """
 
 import contextlib

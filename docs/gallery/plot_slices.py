@@ -1,8 +1,8 @@
 """
-Cut in any direction
-====================
+Slices in any direction
+=======================
 
-A volume can be shown as slices along its axes, or as a cut in any direction. These particles were grown from a small
+A volume can be shown as slices along its axes, or as a slice in any direction. These particles were grown from a small
 block.
 """
 

@@ -2,7 +2,7 @@
 Wood around an axis
 ===================
 
-A large block is grown from a small one and follows a frame field. Here its layers go around an axis.
+A large block is grown from a small block along a frame field. Here the layers of the wood go around an axis.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,9 @@
 """
-What a source map contains
-==========================
+The contents of a source map
+============================
 
-A source map gives the position in the example that each pixel of the result comes from. Neighbours that come from
-neighbouring positions belong to one patch. The borders between patches are seams.
+For each pixel of the result, a source map gives a position in the example. If neighbouring pixels come from
+neighbouring positions, they belong to one patch. The borders between patches are seams.
 """
 
 import matplotlib.pyplot as plt

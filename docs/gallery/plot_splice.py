@@ -2,8 +2,8 @@
 Elements in another layout
 ==========================
 
-The elements of one texture are moved to the places of the elements of another texture. Rigid elements are copied pixel
-by pixel, and the background between them is synthesised.
+The elements of one texture are moved to the positions of the elements of another texture. Rigid elements are copied
+pixel by pixel, and the background between them is synthesised.
 """
 
 import matplotlib.pyplot as plt

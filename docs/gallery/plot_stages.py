@@ -2,8 +2,8 @@
 Stages of a result
 ==================
 
-Every verb keeps images of its stages. In a design, elements are found and moved, holes are filled, and such copies are
-stitched to a larger texture.
+Every verb returns images of its stages. In ``design``, elements are found and moved, holes are filled, and several
+images of this kind are joined to a larger texture.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 Bricks around objects
 =====================
 
-A target can be a surface. Here the normals of a column and of a ball are given, and circles by an angle for each
-pixel. The bricks are foreshortened as the surface is.
+The target of ``perspective`` can be a surface. The first two surfaces, a column and a ball, are given by their
+normals. In the last image, an angle at each pixel arranges the bricks in circles. Bricks are foreshortened with the
+surface.
 """
 
 import matplotlib.pyplot as plt

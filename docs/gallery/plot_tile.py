@@ -2,8 +2,8 @@
 A tileable photograph
 =====================
 
-The borders of a photograph are joined along the least visible cuts. The rest of the photograph stays where it was. Two
-by two copies of the photograph show its borders as a cross, and copies of the tile show none.
+The borders of a photograph are joined along the least visible cuts. The rest of the photograph does not move. In 2 x 2
+copies of the photograph, the borders are visible as a cross. In 2 x 2 copies of the tile, no border is visible.
 """
 
 import matplotlib.pyplot as plt

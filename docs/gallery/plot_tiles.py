@@ -2,9 +2,9 @@
 Corner tiles
 ============
 
-Corner tiles give an unbounded texture that needs the memory of one image. The corners of the square tiles have
-colours, and tiles are placed so that the colours match. Tiles that match have no seam between them, and any window is
-a look-up.
+Corner tiles give an unbounded texture that needs only the memory of one image. The corners of the square tiles have
+colours, and tiles are placed so that the colours of their corners match. No seam is visible between tiles that match.
+Each window is computed by a look-up.
 """
 
 import matplotlib.pyplot as plt

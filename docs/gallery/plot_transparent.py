@@ -1,9 +1,9 @@
 """
-Look into a block
-=================
+A transparent volume
+====================
 
-A volume can be drawn transparent. By default, all voxels are visible that differ from the most frequent colour. A
-transfer function can instead give the colour and the opacity for each lightness.
+A volume can be drawn transparently. By default, all voxels are visible that differ from the most frequent colour.
+Instead, a transfer function can give the colour and the opacity for each lightness.
 """
 
 import matplotlib.pyplot as plt

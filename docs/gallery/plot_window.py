@@ -2,8 +2,8 @@
 Windows of an unbounded volume
 ==============================
 
-A solid texture has no borders. Any window of it can be requested, in any order, and all windows agree. Here two
-neighbouring windows were computed one after the other, and no seam is visible where they meet.
+A solid texture has no borders. Any window of it can be requested, in any order, and windows are equal where they
+overlap. Here two neighbouring windows were computed one after the other, and no seam is visible where they meet.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,9 @@
 """
-Along one axis, or along both
-=============================
+One or two periodic axes
+========================
 
-``wrap`` gives the axes along which a result is periodic. A frieze continues to the right, and a background in both
-directions. The images are rolled by half of their size, so that their borders are in the middle.
+``wrap`` gives the axes along which a result is periodic. A frieze continues only to the right, and a background
+continues in both directions. The images are rolled by half of their size, so that their borders are in the middle.
 """
 
 import matplotlib.pyplot as plt
