@@ -226,6 +226,6 @@ def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: b
             name = ("rows", "columns")[axis]
             way = "give a target that repeats" if stretched else "make it repeat"
             raise InvalidInput(
-                f"wrap: the target's first and last {name} differ by a factor of {ratio:.2f}, so the result cannot repeat "
-                f"along {name}; {way}, or leave wrap off along {name}"
+                f"wrap: the target's first and last {name} differ by a factor of {ratio:.2f}; {way}, or leave wrap off "
+                f"along {name}"
             )
