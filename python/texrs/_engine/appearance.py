@@ -58,7 +58,7 @@ class Corrected(NamedTuple):
     places : (points * A) int32
         Source coordinates, in units of 1/4096 of a sample.
     passes : int
-        Number of passes that were made.
+        Number of completed passes.
     changed : float
         Share of the points that the last two passes changed.
 

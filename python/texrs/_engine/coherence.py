@@ -63,7 +63,7 @@ def find_similar(
     k : int
         Number of samples in a set, 1 to 16.
     n : int
-        Side of the box around each chosen sample that excludes other samples, an odd number of samples.
+        Side of the box around each chosen sample that excludes other samples; an odd number.
     numbers : {8, 24}
         Number of leading components of the vectors that are compared.
     progress : callable, optional

@@ -406,7 +406,7 @@ class Samples:
         self.inner: Final = _rust.PatchSamples(np.ascontiguousarray(colours), np.ascontiguousarray(depth), weights)
 
     def judge(self, pasting: Pasting, patches: NDArray[np.uint32]) -> list[float]:
-        """Return the cost of a window's seams after cutting in each of several patches alone.
+        """Return the cost of a window's seams for each of several patches, if only this patch is cut in.
 
         Parameters
         ----------

@@ -20,12 +20,12 @@ from texrs.kernels.gather import gather
 __all__ = ["NOTHING", "Asked", "Conditions", "Constraints", "Guide", "Pins", "Surroundings", "average_points"]
 
 WEIGHT = 1500
-"""Cost of a squared difference from a given colour, in 1/256.
+"""Cost of a squared difference from a given colour, in units of 1/256.
 
 A difference of a tenth of the range costs about as much as two unrelated windows.
 """
 FOLLOW = 150
-"""Cost of a squared difference from a guide map, in 1/256.
+"""Cost of a squared difference from a guide map, in units of 1/256.
 
 A difference of a third of the range costs about as much as two unrelated windows.
 """
@@ -145,7 +145,7 @@ class Asked:
     Attributes
     ----------
     demand : Demand, optional
-        Values that the points should show.
+        Values that the points should have.
     held : (points) bool, optional
         True for points whose coordinates are fixed.
     given : (points * A) int32, optional

@@ -4,13 +4,11 @@ A level of the output has half as many points along each axis as the next finer 
 coordinates of its source sample in the exemplar, in fixed point. The steps of each level are:
 
 1. The **start** gives the first level its places: patch-based initialisation, patches stitched along minimum cuts, or
-  a draft
-   a given draft (`texrs.growth.start`);
+   a given draft (`texrs.growth.start`).
 2. Each finer level is **upsampled** from the one before, with the Jacobians of the frames.
 3. The **constraints** of the level are inserted (`texrs.growth.constraints`).
 4. The **corrector** changes places until every window of the output resembles a window of the exemplar
-  (`texrs.growth.windows`,
-   or a corrector of the caller).
+   (`texrs.growth.windows`, or a corrector of the caller).
 
 The caller passes each of these as a function. Levels have the numbers of the exemplar's pyramid, from 0 for the
 coarsest. An output may begin at a coarser level, with a number below 0.
@@ -158,7 +156,7 @@ class Grown:
 
 
 def nothing(level: int, region: Region, spacing: int) -> Asked:
-    """Return no constraints."""
+    """Return no constraints, for any level."""
     return NOTHING
 
 

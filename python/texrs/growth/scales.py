@@ -27,7 +27,7 @@ samples, so that scales can be distinguished there.
 """
 
 WEIGHT = 1264
-"""Cost of a squared difference in scale from the requested one, in 1/256.
+"""Cost of a squared difference from the requested scale (logarithm), in units of 1/256.
 
 A factor of 1.6 costs as much as two unrelated windows.
 """

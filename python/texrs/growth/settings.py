@@ -69,7 +69,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Settings of one level."""
+    """Settings of one level: passes, reach, radius of votes, and weight of the scales."""
 
     passes: int
     reach: int

@@ -51,7 +51,7 @@ class FromSheet:
     side : float
         Side of the patches, in samples of the sheet.
     stitched : Stitched
-        Report of the stitcher.
+        Result of the stitcher.
 
     """
 
@@ -94,11 +94,11 @@ def stitch_sheet(
     seed : int
         Seed of the random choices.
     held : (rows, columns) bool, optional
-        Pixels whose coordinates are fixed.
+        True for pixels whose coordinates are fixed.
     given : (rows, columns, 2) int32, optional
         Coordinates of the fixed pixels in the sheet, in units of 1/4096 of a sample.
     loose : (rows, columns) bool, optional
-        Fixed pixels that patches may still replace if this makes seams less visible.
+        True for fixed pixels that patches may still replace if this makes seams less visible.
     frames : (N, 2, 2) int16, optional
         Jacobians of the sheet, one for all pixels or one per pixel, in units of 1/4096. Default: derived from the
         target.

@@ -43,7 +43,7 @@ Departures from the paper in the corrections (``quality="fast"``):
 - A pass corrects every other point, as on a chess board, and only where pieces of the exemplar meet. If all points
   change at once, the two sides of a seam exchange their values and nothing is gained. Votes also solve this, but
   remove a third of the low-frequency features.
-- The paper omits to compensate windows for the offset of the lattice (o - J step), so rotated textures have the wrong
+- The paper does not compensate windows for the offset of the lattice (o - J step), so rotated textures have the wrong
   scale. Here windows are compensated (``method="paper-compensated"`` adds only this).
 - A row vector in Eq. 1 and a column vector in Eq. 3 rotate in opposite directions. Here J is the inverse of the frame
   in both equations.

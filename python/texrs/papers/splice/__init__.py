@@ -186,8 +186,8 @@ def splice(
     allow_rotation : bool, optional
         If True, cells may be rotated. Default: True, unless light or letters show which side of the texture is up.
     refine : bool
-        If True, deformed pixels between rigid elements, or stretched pixels of cells, are refined. Nets, and
-        backgrounds between separate elements, are never refined. Default: True.
+        If True, deformed pixels between rigid elements, or stretched pixels of cells, are refined. Nets, and separate
+        elements on their own background, are never refined. Default: True.
     screening : float, optional
         Weight of the original values when colours are corrected at the borders between elements and background, 0 to
         1e6, see `texrs.blend`. It only affects separate elements on their background. A texture that is lit from one

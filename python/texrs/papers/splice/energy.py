@@ -89,7 +89,7 @@ def choose_coarseness(shape: Sequence[int]) -> int:
 
 
 def _downsample_mask(rigid: Bools, step: int) -> Bools:
-    """Return True for blocks of ``step`` pixels with a rigid pixel, so that thin joints stay connected."""
+    """Return True for blocks of ``step`` pixels a side with a rigid pixel, so that thin joints stay connected."""
     wide = np.pad(rigid, [(0, -n % step) for n in rigid.shape])
     return np.asarray(wide.reshape(wide.shape[0] // step, step, -1, step).any(axis=(1, 3)))
 

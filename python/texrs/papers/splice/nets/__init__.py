@@ -10,10 +10,8 @@ parts of it. Here lines are not bent. The steps, and the module of each step:
 2. Build the Gabriel graphs of A's points and of the targets, and compute features of each pixel in its graph
    (`graph`).
 
-3. Lay at each target the knot whose surroundings have the most similar features and fit the earlier knots best. It is
-   3. Copy a knot of A to each target. Its surroundings have features similar to the target's, and fit the knots that
-      are already there. The seam is in a band between targets. The knot can be shifted slightly so that lines meet
-      (`knots`).
+3. Copy a knot of A to each target. Its surroundings have features similar to the target's, and fit the knots that are
+   already there. The seam is in a band between targets. The knot can be shifted slightly so that lines meet (`knots`).
 
 4. Fill the pixels far from all knots with patches. The same features guide their choice.
 
