@@ -541,7 +541,7 @@ def test_what_has_no_file_is_a_map_of_its_own_or_reported(tmp_path: Path) -> Non
     assert (files["height"] == draw_channel("height")).all()
     assert (files["porosity"] == draw_channel("porosity")).all()
     bare = Material({"albedo": DOTS.image, "normal_dx": HELD["labPBR"]})
-    with pytest.warns(InputWarning, match=r"normal_dx: channels 3 and 4 are not written: Unreal has no file"):
+    with pytest.warns(InputWarning, match=r"normal_dx: channels 3 and 4 are not written, because Unreal has no file"):
         bare.save(tmp_path / "again", convention="unreal")
 
 
@@ -559,7 +559,7 @@ def test_what_no_map_holds_is_written_as_usual_and_said(tmp_path: Path) -> None:
     material = Material({"albedo": DOTS.image, "metallic": DOTS.image[..., 0]})
     with collect() as notices:
         material.save(tmp_path, convention="unity")
-    assert notices.assumed == ["MetallicSmoothness: no map holds all of it; written with smoothness 0.4"]
+    assert notices.assumed == ["MetallicSmoothness: some of its quantities have no map; written with smoothness 0.4"]
     assert (io.read(tmp_path / "MetallicSmoothness.png")[..., 3] == 102).all()
 
 

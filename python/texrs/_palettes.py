@@ -114,7 +114,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
     tables = [_list_colours(image) for _, image in images]
     for (name, _), origin, table in zip(images, known, tables, strict=True):
         what = name if origin is None else origin[0]
-        assume(f"{what}: {len(table)} colours, looked up to the nearest pixel and never corrected; {OFF}")
+        assume(f"{what}: {len(table)} colours, so pixels are copied from the nearest pixel and not corrected; {OFF}")
     return Palette([image for _, image in images], len(np.unique(np.concatenate(tables))))
 
 
@@ -148,7 +148,10 @@ def keeps_colours(image: Array) -> bool:
     asked = _ASKED.get()
     kept = has_few_colours(image) if asked is None else asked
     if kept:
-        assume("exemplar: few colours, looked up to the nearest pixel; {OFF}")
+        assume(
+            "exemplar: few colours, so pixels are copied from the nearest pixel; "
+            "--no-palette or another interpolation turns this off"
+        )
     return kept
 
 
@@ -164,7 +167,7 @@ def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
     few = asked is not False and made.source_map.axes == 2 and all(has_few_colours(base) for base in bases)
     if not few and not asked:
         return made
-    assume(f"maps: few colours, looked up to the nearest pixel and never corrected; {OFF}")
+    assume(f"maps: few colours, so pixels are copied from the nearest pixel and not corrected; {OFF}")
     return replace(made, source_map=make_plain(made.source_map))
 
 

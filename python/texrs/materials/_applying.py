@@ -169,7 +169,7 @@ def choose_kind(
     if map_type is None and role is not None and usual in ("normal", "vector"):
         assume(f"{title}: read as {usual}s, y {y}")
     elif map_type is None and role is not None and usual == "label":
-        assume(f"{title}: read as labels, the values of which are not mixed")
+        assume(f"{title}: read as labels, whose values are not mixed")
     elif name is not None and map_type is None and role is None and found == "colour":
         # A short name such as stone_n only has a role next to other maps of the same material.
         if cut_name(FilePath(name).stem) != FilePath(name).stem:

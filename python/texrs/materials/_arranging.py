@@ -70,7 +70,7 @@ def arrange_maps(maps: Mapping[str, Map], key: str, axes: int) -> dict[str, Map]
             made[each.file or title] = each
         if each.role.bare and not each.role.packed and each.channels > 2:
             rest = "channel 3 is" if each.channels == 3 else "channels 3 and 4 are"
-            ignore(f"{title}: {rest} not written: {convention.title} has no file for what they hold")
+            ignore(f"{title}: {rest} not written, because {convention.title} has no file for their values")
     return made
 
 

@@ -232,7 +232,7 @@ def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
             why[stem] = f"the folder has other maps of {base}"
     plain = [stem for stem in stems if stem not in found and shared[stem] and Role.COLOUR not in found.values()]
     for stem in plain[:1]:
-        found[stem], why[stem] = Role.COLOUR, "the other maps go on from its name"
+        found[stem], why[stem] = Role.COLOUR, "the names of the other maps begin with its name"
     # A word in the middle of a name gives the role if no other file has this role. Example: rock_albedo_wet, but not
     # rock_color_chart next to rock_color.
     pairs = zip(min(stems, default=""), max(stems, default=""), strict=False)

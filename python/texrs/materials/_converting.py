@@ -107,7 +107,7 @@ def find_shares(name: str, pixels: Array, role: Role) -> Floats:
         if kind == "f" and pixels.min() < 0:
             largest = float(np.abs(pixels).max())
             if role is Role.VECTOR and largest > 1:
-                assume(f"{name}: vectors are written as shares of the largest component, {largest:g}")
+                assume(f"{name}: vectors are divided by their largest component, {largest:g}")
                 pixels = pixels / largest
             return (pixels.astype(np.float32) + np.float32(1)) * np.float32(0.5)
         return to_unit(pixels) if kind == "u" else pixels.astype(np.float32)
@@ -118,11 +118,13 @@ def find_shares(name: str, pixels: Array, role: Role) -> Floats:
         return pixels.astype(np.float32)
     low, high = float(pixels.min()), float(pixels.max())
     if low < 0 or high > 1:
-        assume(f"{name}: values from {min(low, 0):.4g} to {high:.4g} are spread over the range of integers")
+        assume(f"{name}: values from {min(low, 0):.4g} to {high:.4g} are scaled to the range of integers")
     return to_unit(pixels)
 
 
 def report_cut(name: str, values: Array) -> None:
     """Report values outside 0 to 1, which integers cannot store."""
     if values.min() < 0 or values.max() > 1:
-        ignore(f"{name}: values below 0 and above 1 are not kept: integers end there, floats of 32 bits do not")
+        ignore(
+            f"{name}: values below 0 and above 1 are not kept, because integers cannot store them; 32-bit floats can"
+        )
