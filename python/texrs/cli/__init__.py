@@ -1,10 +1,11 @@
 """The command ``texrs``.
 
-Results go to files, and text results to stdout. Progress and errors go to stderr. Exit codes: 0 done, 1 internal
-error, 2 bad input or usage, 3 some jobs of a batch failed, 130 stopped by Ctrl-C. Inputs are checked before the work
-begins as far as possible. Files are written whole or not at all, so that a failure keeps the existing files.
+Results are written to files, and text results to stdout. Progress and errors are written to stderr. Exit codes: 0
+done, 1 internal error, 2 invalid input or usage, 3 some jobs of a batch failed, 130 stopped by Ctrl-C. Inputs are
+checked before the work begins, as far as possible. Files are written completely or not at all, so that a failure keeps
+the existing files.
 
-A command is created when it is used, so that the libraries of other commands are not loaded.
+Each command is created when it is first used, so that the libraries of other commands are not loaded.
 """
 
 from __future__ import annotations
@@ -57,13 +58,13 @@ GROUPS: dict[str, dict[str, str]] = {
         "compare": "Compare methods of texrs and of other installed programs on one page.",
     },
 }
-"""All commands and their purposes, as the help shows them."""
+"""All commands and their purposes by group, as the help shows them."""
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 NAMES.update(COMMANDS)
 
 
 def load(name: str) -> Callable[..., None]:
-    """Return the function of a command."""
+    """Import the module of a command and return its function."""
     match name:
         case "analyse" | "database":
             from texrs.cli import _elements
@@ -115,7 +116,7 @@ def load(name: str) -> Callable[..., None]:
 
 
 def make_command(name: str) -> Any:
-    """Return a command with the options of limits. A command that writes files also gets ``--force``."""
+    """Create a command with its own options and those for limits. A command that writes files also gets ``--force``."""
     from texrs.cli._limits import limit, list_parameters
     from texrs.cli._options import as_command, make_parameter
     from texrs.cli._outputs import OUTPUTS, Command, Force
@@ -127,7 +128,7 @@ def make_command(name: str) -> Any:
     ours = {p.name for p in (*limits, *forced)}
 
     def limited(**given: Any) -> None:
-        # The command itself checks before the work which files it may replace.
+        # The command checks before the work which existing files it can replace.
         with limit(**{p.name: given[p.name] for p in limits}, quiet=given.get("quiet", False)):
             work(**{name: value for name, value in given.items() if name not in ours})
 
@@ -138,21 +139,21 @@ def make_command(name: str) -> Any:
 
 
 class Group(TyperGroup):
-    """Group of all commands. A command is created on demand."""
+    """The group of all commands. Each command is created on demand."""
 
     make_command = staticmethod(make_command)
-    """Function that creates a command, in any process."""
+    """Function that creates a command. It can be sent to other processes."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Create a command. Return None if no command has this name."""
+        """Create the command of a name. Return None if there is none."""
         return make_command(cmd_name) if cmd_name in COMMANDS else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the requested command. Refuse a mistyped one and suggest the most similar name."""
+        """Return the requested command. For a mistyped name, raise an error that suggests the most similar command."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             ctx.fail(f"No such command {args[0]!r}{suggest(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)

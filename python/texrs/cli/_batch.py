@@ -1,7 +1,7 @@
 """The command that runs another command for many images, seeds and presets: ``texrs batch``.
 
-Each result is written whole as soon as it is ready, with a record of its command. The same batch command therefore
-continues a batch that was stopped, even by a power cut. Results of the same command are kept.
+Each result is written completely as soon as it is ready, with a record of its command. The same batch command
+therefore continues a batch that was stopped, even by a power cut, and keeps the results that were written.
 """
 
 from __future__ import annotations
@@ -57,28 +57,28 @@ from texrs.io._annotation import is_unchanged
 from texrs.materials import Material
 
 CELL = 256
-"""Side of a cell of the contact sheet."""
+"""Side of a cell of the contact sheet, in pixels."""
 NOT_ONE = ("batch", "rerun", "info", "demo", "samples", "database")
-"""Commands that do not write one file from other files."""
+"""Commands that a batch cannot run, because they do not write one result from input files."""
 THERE, MADE = "is there", "wrote"
-"""States of a job: its result exists, or was written now. Any other text is the reason of its failure."""
+"""States of a successful job: its result existed, or was written now. Any other text is the reason of a failure."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Outcome of a job, in any process."""
+    """Outcome of a job, which can be sent between processes."""
 
     said: str
     ignored: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
 
     def show(self) -> str:
-        """Return the notices of the job for the end of its line."""
+        """Return the notices of the job as text for the end of its line, or an empty text."""
         parts = [f"{title}: {'; '.join(lines)}" for title, lines in self.list_notices() if lines]
         return f" ({'; '.join(parts)})" if parts else ""
 
     def list_notices(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        """List the notices by title."""
+        """Return the notices of the job, grouped under titles."""
         return ("ignored", self.ignored), ("assumed", self.assumed)
 
 
@@ -141,7 +141,7 @@ def batch_command(
         if inputs:
             raise InvalidInput(f"INPUT: cannot be combined with a recipe, which lists its inputs; got {inputs[0]!r}")
         base, said = os.path.dirname(what) or ".", read_recipe(what)
-        # Paths on the command line are relative to the current folder.
+        # Paths on the command line are relative to the current folder, and not to the folder of the recipe.
         over |= {key: os.path.abspath(over[key]) for key in ("out", "sheet") if over[key] is not None}
     else:
         base, said = ".", {"verb": what, "inputs": inputs or []}
@@ -181,7 +181,7 @@ def batch_command(
 
 
 def make_context(command: Any, verb: str, words: list[str]) -> Any:
-    """Return the values of a job's options. Explain how a batch states a missing argument."""
+    """Return the parsed options of a job. An error about a missing argument explains how a batch specifies it."""
     try:
         return command.make_context(verb, words)
     except UsageFailure as failure:
@@ -195,9 +195,9 @@ def make_context(command: Any, verb: str, words: list[str]) -> Any:
 
 
 def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: bool) -> tuple[list[tuple[Job, str]], int]:
-    """Run the jobs without a result.
+    """Run all jobs whose result is missing.
 
-    Return the failed jobs with reasons, and the number of jobs that ignored a part of an input.
+    Return the failed jobs with the reasons, and the number of jobs that ignored a part of an input.
     """
     failed: dict[int, str] = {}
     total, over, partly = len(work.jobs), 0, 0
@@ -205,7 +205,7 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
         with name_arguments(scheduler="--scheduler", count="--threads"):
             for number, outcome in workers.run(work, range(total), who, threads_each=count, spare=True):
                 over += 1
-                # A task that ended its workers has no outcome of its own.
+                # If a task ended its worker process, its result is only a text.
                 one = outcome if isinstance(outcome, Outcome) else Outcome(str(outcome))
                 said, partly = one.said, partly + bool(one.ignored)
                 job, where = work.jobs[number], f"{number + 1} of {total}"
@@ -224,35 +224,35 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
 
 
 _ALONE = threading.Lock()
-"""Lock of the process for a command, mainly because of its current folder.
+"""Lock that lets only one command at a time run in a process, because commands change the current folder.
 
-A worker of a cluster may have several threads.
+A worker of a cluster can have several threads.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Runs the jobs of a batch, in any process."""
+    """Runs the jobs of a batch, in this or another process."""
 
     load: Callable[[str], Any]
     """Function that creates a command."""
     verb: str
     jobs: list[Job]
     more: list[str]
-    """Arguments that all commands get."""
+    """Additional arguments for all commands."""
     folder: str
-    """Folder that names are relative to."""
+    """Folder that file names are relative to."""
     limited: bool
-    """If True, commands use the number of threads in force."""
+    """If True, commands get the current limit of threads."""
 
     def __call__(self, number: int) -> Outcome:
-        """Run a job if its result is missing. Return its outcome and its notices."""
+        """Run a job if its result is missing, and return its outcome."""
         with _ALONE, silence_warnings(), collect() as notices:
             said = self.attempt(self.jobs[number])
         return Outcome(said, tuple(notices.ignored), tuple(notices.assumed))
 
     def attempt(self, job: Job) -> str:
-        """Run a job if its result is missing. Return its outcome."""
+        """Run a job if its result is missing. Return its state, or the reason of its failure."""
         try:
             with inside(self.folder), hush():
                 return self.do(job)
@@ -262,13 +262,13 @@ class Work:
             return "needs more memory than is available"
         except (TexrsError, OSError) as error:
             return say_error(error)
-        except Exception as error:  # A broken job does not stop the others.
+        except Exception as error:  # An error in one job does not stop the others.
             if isinstance(error, typer.Abort):
                 raise
             return f"internal error: {type(error).__name__}: {error}"
 
     def do(self, job: Job) -> str:
-        """Run a job if its result is missing."""
+        """Run a job if its result is missing. Return its state."""
         command, more = self.load(self.verb), list(self.more)
         if self.limited and any(p.name == "count" for p in command.params):
             more += ["--threads", str(count_threads())]
@@ -281,14 +281,14 @@ class Work:
 
 
 def is_done(command: Any, context: Any, job: Job) -> bool:
-    """Return whether all outputs of a command exist and were made as they would be made now."""
+    """Return True if all outputs of a command exist, and the same command wrote them from the same inputs."""
     record = _provenance.make_record(command, context.params, force=False)
     for option in ("out", "source_map", "page"):
         path = context.params.get(option)
         if path is None:
             continue
         if option == "out" and io.is_store(path):
-            # The writer of a store keeps track of its chunks.
+            # Always run the command, because the writer of a store skips the chunks that exist.
             return False
         if option == "out" and os.path.isdir(path):
             packed = any(context.params.get(option) is not None for option in ("pack", "convention"))
@@ -306,7 +306,7 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
 
 
 def is_folder_done(record: _provenance.Record, folder: str, least: int) -> bool:
-    """Return whether a folder has at least a number of maps, all made as they would be made now."""
+    """Return True if a folder contains enough maps, and the same command wrote them from the same inputs."""
     count = 0
     for path in _provenance.list_folder(folder):
         made = io.read_metadata(path).made
@@ -326,7 +326,7 @@ def is_folder_done(record: _provenance.Record, folder: str, least: int) -> bool:
 
 @contextmanager
 def inside(folder: str) -> Iterator[None]:
-    """Work in a folder: names in a recipe are relative to the recipe's folder."""
+    """Change the current folder during a block, because names in a recipe are relative to its folder."""
     before = os.getcwd()
     os.chdir(folder)
     try:
@@ -336,7 +336,7 @@ def inside(folder: str) -> Iterator[None]:
 
 
 def draw_sheet(paths: Sequence[str]) -> Array:
-    """Return images side by side, each fitted into a cell. Missing images are grey."""
+    """Return a contact sheet of images, each reduced to fit a cell. Cells of missing images are grey."""
     columns = int(np.ceil(np.sqrt(len(paths))))
     sheet = np.full((-(-len(paths) // columns) * CELL, columns * CELL, 3), 64, np.uint8)
     for i, path in enumerate(paths):
@@ -351,7 +351,7 @@ def draw_sheet(paths: Sequence[str]) -> Array:
 
 
 def read_shown(path: str) -> Array:
-    """Read an image, or the middle plane of a volume."""
+    """Read an image, the preview of a material, or the middle plane of a volume."""
     if os.path.isdir(path) and not io.is_store(path):
         return Material.read(path).preview(tiles=(1, 1), side=CELL)
     try:

@@ -22,7 +22,7 @@ from texrs.tiling._borders import SEEN
 
 COPIES = (2, 2)
 BORDERS = {"rows": "bottom to top", "columns": "right to left"}
-"""Axes along which an image tiles, and the border of each."""
+"""Axes along which an image can be tileable, and the border between copies along each."""
 
 
 def check_command(
@@ -61,7 +61,7 @@ def check_command(
 
 
 def list_borders(found: Tiling) -> list[str]:
-    """Return a line for each axis."""
+    """Return one line for each axis: whether the image is tileable, and how visible its border and seams are."""
     lines = []
     for (axis, border), tiles, seam, place in zip(BORDERS.items(), found.tiles, found.seam, found.place, strict=True):
         if seam is None or place is None:
@@ -76,7 +76,7 @@ def list_borders(found: Tiling) -> list[str]:
 
 
 def tell_tiling(result: Synthesis) -> str:
-    """Return the visibility of borders and seams of a result, the changes, and the reason for another size."""
+    """Return a text about the visible borders and seams of a result, its changes, and the reason for another size."""
     report = result.report
     said = []
     if "in_place" in report:

@@ -16,7 +16,7 @@ from texrs.cli._readers import read_picture
 from texrs.errors import InvalidInput
 
 USUAL = ("pebbles", "leaves_and_flowers", "bricks", "weave", "bark", "dots", "brick", "gravel", "grass", "coins")
-"""Default images of the comparison: generated examples and photographs."""
+"""Default images of a comparison: built-in generated examples and photographs."""
 SHOWN = ("more", "tile", "hole")
 
 
@@ -49,7 +49,7 @@ def compare_command(
 ) -> None:
     """Compare methods of texrs and of other installed programs on images: a page of results and figures."""
     start = time.monotonic()
-    # Import here, because this loads all verbs.
+    # Import here, because the comparison loads all functions of texrs.
     from texrs.comparison import compare
 
     if not out:

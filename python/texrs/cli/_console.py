@@ -1,4 +1,4 @@
-"""Connection of commands to the shell: exit codes, one-line errors, signals and progress."""
+"""Run commands in a shell: exit codes, one-line errors, signals and progress."""
 
 from __future__ import annotations
 
@@ -23,20 +23,23 @@ from texrs._progress import show_lines
 from texrs.errors import TexrsError
 
 if TYPE_CHECKING:
-    # Import the typing names only here, because they would load NumPy.
+    # Import typing names only for type checkers, because they would load NumPy.
     from texrs._typing import Progress
 
 DONE, INTERNAL, BAD_INPUT, PARTLY = 0, 1, 2, 3
-"""Exit codes. A command that a signal ends has 128 plus the number of the signal, so 130 for Ctrl-C."""
-TRACEBACK = "TEXRS_TRACEBACK"
-"""Environment variable that requests the traceback of an internal error."""
-PIPE = int(getattr(signal, "SIGPIPE", 13))
-"""SIGPIPE. Windows does not have this signal, but pipes can break."""
-GRACE = 1.0
-"""Seconds after a signal during which further signals are ignored."""
+"""Exit codes: done, internal error, invalid input, some jobs failed.
 
-# Base class of the exceptions that typer raises on wrong usage. It is click's class or typer's own copy, depending on
-# the version of typer.
+A signal ends a command with 128 plus its number, such as 130 for Ctrl-C.
+"""
+TRACEBACK = "TEXRS_TRACEBACK"
+"""Environment variable that turns on the traceback of internal errors."""
+PIPE = int(getattr(signal, "SIGPIPE", 13))
+"""Number of SIGPIPE. Windows does not have this signal, but pipes can break there too."""
+GRACE = 1.0
+"""Time after a signal during which further signals are ignored, in seconds."""
+
+# Base class of the exceptions that typer raises on wrong usage. Depending on the version of typer, this is click's
+# class or typer's own copy.
 UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
 
 
@@ -44,21 +47,21 @@ SIDES = re.compile(r"\((\d+(?:, \d+){1,3})\)")
 ANY_SHAPE = re.compile(r"\([A-Za-z.]\w*,|\(\d+, [A-Za-z]")
 SPEAKS_OF_SIZES = re.compile(r"\b(?:pixels|voxels|sides?|sizes?|shapes?)\b")
 MOST_CHANNELS = 4
-"""How errors speak of sizes."""
+"""Maximum last number of a shape that error texts treat as a number of channels."""
 NAMES: set[str] = set()
 """Names of all commands."""
 PYTHON = {
     r"read (?:it|them) with texrs\.io\.read_volume": "use texrs slice or texrs solid",
     r"a mask, 'alpha', or an image that is a masked array": "a mask, or 'alpha'",
 }
-"""Python words of errors and help texts, and the words of the command line."""
+"""Patterns for Python expressions in errors and help texts, and the replacement of each on the command line."""
 _HUSHED: ContextVar[bool] = ContextVar("hushed", default=False)
 KEPT: list[str] = []
-"""Finished files of a batch, which are kept if the rest fails."""
+"""Names of finished files of a batch, which are listed if the rest fails."""
 
 
 class Stopped(BaseException):
-    """A signal ended the work. This is not a KeyboardInterrupt, because typer handles that by itself."""
+    """A signal ended the work. KeyboardInterrupt is not used, because typer handles it in its own way."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -66,7 +69,7 @@ class Stopped(BaseException):
 
 
 def run(work: Callable[[], object]) -> int:
-    """Run a command and return its exit code. Print one line on stderr about an error, or about the result."""
+    """Run a command and return its exit code. An error is printed as one line on stderr."""
     KEPT.clear()
     code = _run(work)
     if code not in (DONE, PARTLY) and KEPT:
@@ -107,7 +110,7 @@ def _run(work: Callable[[], object]) -> int:
         name = f"{error.filename}: " if isinstance(error.filename, str) else ""
         complain(f"{name}{(error.strerror or str(error)).lower()}")
         code = BAD_INPUT
-    except BaseException as error:  # A panic of the compiled part is not an Exception.
+    except BaseException as error:  # Panics of the compiled part are not Exceptions.
         if os.environ.get(TRACEBACK, "0") not in ("", "0"):
             traceback.print_exception(error)
         else:
@@ -118,17 +121,17 @@ def _run(work: Callable[[], object]) -> int:
 
 
 def say(line: str) -> None:
-    """Print a line of the result."""
+    """Print a line of a result on stdout."""
     try:
         print(line, flush=True)
     except BrokenPipeError:
-        # Handle a broken pipe here, because typer would report it as an error.
+        # Handle a broken pipe here, because typer would report it as an error of the command.
         raise Stopped(PIPE) from None
 
 
 @contextmanager
 def hush() -> Iterator[None]:
-    """Suppress the result lines of commands that run inside another one."""
+    """Suppress result lines during a block, for commands that another command runs."""
     token = _HUSHED.set(True)
     try:
         yield
@@ -143,9 +146,9 @@ def note(line: str, *, quiet: bool) -> None:
 
 
 def say_sizes(message: str) -> str:
-    """Return an error text with sizes in the order of options: the width first.
+    """Return an error text with sizes as on the command line: the width first.
 
-    Functions take rows first, and their errors use this order. Errors about arrays of any shape are not about sizes.
+    Functions take rows first, and so do sizes in their errors. Shapes in errors about arrays are not changed.
 
     Examples
     --------
@@ -162,7 +165,7 @@ def say_sizes(message: str) -> str:
 
     def turn(found: re.Match[str]) -> str:
         sides = [n.strip() for n in found[1].split(",")]
-        # The last number of a shape may be the number of channels. No volume has so few planes.
+        # The last number of a shape is the number of channels if it is small, because no volume has so few planes.
         channels = sides.pop() if len(sides) > 2 and int(sides[-1]) <= MOST_CHANNELS else ""
         many = f" with {channels} channel{'s' if channels != '1' else ''}" if channels else ""
         return " x ".join(reversed(sides)) + many
@@ -171,7 +174,7 @@ def say_sizes(message: str) -> str:
 
 
 def name_commands(message: str) -> str:
-    """Return a text with the names of commands in place of Python functions.
+    """Replace the names of Python functions in a text by the names of commands.
 
     Examples
     --------
@@ -190,16 +193,16 @@ def name_commands(message: str) -> str:
 
 
 EXTRA_PLACES = re.compile(r"extra argument.*\(-?[\d.]+,-?[\d.]+\b")
-"""Message about coordinates that the shell has split."""
+"""Pattern of the message about too many arguments if the shell has split coordinates."""
 
 
 def say_error(error: Exception) -> str:
-    """Return the text of an error in the words of the command line."""
+    """Return the text of an error with command-line names and the width first."""
     return name_commands(say_sizes(str(error)))
 
 
 def suggest(word: str, known: Iterable[str]) -> str:
-    """Return a question about the most similar known word, or nothing if none is similar.
+    """Return a question that suggests the most similar known word. Empty if none is similar.
 
     Examples
     --------
@@ -214,7 +217,7 @@ def suggest(word: str, known: Iterable[str]) -> str:
 
 
 def complain(message: str) -> None:
-    """Print one line to stderr. The message may contain any characters, for example a file name."""
+    """Print one line to stderr. Special characters, for example in file names, are allowed."""
     text = " ".join(message.split())
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
     with suppress(OSError, ValueError):
@@ -223,13 +226,13 @@ def complain(message: str) -> None:
 
 @contextmanager
 def raise_on_signals() -> Iterator[None]:
-    """Raise `Stopped` on Ctrl-C and on termination requests, so that half-written files are removed."""
+    """Raise `Stopped` on Ctrl-C and on requests to terminate, so that partial files are removed."""
     last = -math.inf
 
     def stop(number: int, frame: FrameType | None) -> None:
         nonlocal last
         now = time.monotonic()
-        # Repeated signals must not stop the removal of files.
+        # Ignore repeated signals, because they must not interrupt the removal of partial files.
         if now - last > GRACE:
             last = now
             raise Stopped(number)
@@ -238,7 +241,7 @@ def raise_on_signals() -> Iterator[None]:
     if threading.current_thread() is threading.main_thread():
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             number = getattr(signal, name, None)
-            # Signals that are ignored stay ignored: nohup, and background jobs of a script.
+            # Keep ignoring signals that are ignored already, for nohup and for background jobs of scripts.
             if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
                 before[number] = signal.signal(number, stop)
     try:
@@ -250,7 +253,7 @@ def raise_on_signals() -> Iterator[None]:
 
 @contextmanager
 def silence_warnings() -> Iterator[None]:
-    """Hide warnings for programmers on the terminal, unless Python was asked to show them."""
+    """Hide Python warnings on the terminal, unless Python was started with an option to show them."""
     with warnings.catch_warnings():
         if not sys.warnoptions:
             warnings.simplefilter("ignore")
@@ -259,7 +262,7 @@ def silence_warnings() -> Iterator[None]:
 
 @contextmanager
 def show_progress(*, quiet: bool) -> Iterator[Progress]:
-    """Return a callback that shows progress on stderr: a bar on a terminal, lines elsewhere."""
+    """Return a callback that shows progress on stderr: as a bar on a terminal, otherwise as lines."""
     if quiet or sys.stderr is None:
         yield lambda stage, share: None
     elif sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
@@ -286,9 +289,9 @@ def _show_bar() -> Iterator[Progress]:
 
 
 def _end_stopped(number: int) -> int:
-    """Return the exit code of a command that a signal ended. A broken pipe is not reported."""
+    """Return the exit code of a command that a signal ended, and report it. A broken pipe is not reported."""
     if number == PIPE:
-        # Drop the buffered output, because Python would report at exit that it cannot be written.
+        # Drop the buffered output, because Python would report at exit that writing failed.
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     else:
@@ -297,14 +300,14 @@ def _end_stopped(number: int) -> int:
 
 
 def _describe_usage(failure: Exception) -> str:
-    """Return the error in the arguments, and a hint to the help."""
+    """Return the text of an error in the arguments, with a reference to the help."""
     message = failure.format_message() if hasattr(failure, "format_message") else str(failure)
     wrong = getattr(failure, "option_name", None)
     if wrong and hasattr(failure, "possibilities"):
         message = f"No such option: {wrong}{suggest(wrong, failure.possibilities or ())}"
     context = getattr(failure, "ctx", None)
     parameters = context.command.params if context is not None else ()
-    # Fields of a parameter are joined to its name: "mask_marks" is the marks of MASK.
+    # Use the name of the argument. Fields of a parameter are joined to its name, so "mask_marks" is MASK.
     placed = [p.name.removesuffix("_marks") for p in parameters if p.param_type_name == "argument"]
     if context is not None and wrong is not None and wrong.lstrip("-").replace("-", "_") in placed:
         usage = " ".join(name.upper() for name in placed)
@@ -312,6 +315,6 @@ def _describe_usage(failure: Exception) -> str:
     if EXTRA_PLACES.search(message):
         message += "; put places in quotes, as in '20,20 104,24 110,100 14,112'"
     command = context.command_path if context is not None else "texrs"
-    # The command of a batch is not a subcommand of texrs.
+    # Inside a batch, the name of the command lacks the prefix texrs.
     command = command if command.startswith("texrs") else f"texrs {command}"
     return f"{message.rstrip('.')} ({command} --help lists what is allowed)"

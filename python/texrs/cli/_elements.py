@@ -49,7 +49,7 @@ ACTIONS: dict[str, tuple[Option, ...]] = {
     "splice": tuple(SPLICED),
     "matrix": (*MATRIX, *SPLICED),
 }
-"""Actions on a database, and the options of each."""
+"""Actions on a database, and the options that each accepts."""
 
 
 @take_options(PICTURED, SIMILAR)
@@ -159,14 +159,14 @@ def write_splices(
     *,
     quiet: bool,
 ) -> None:
-    """Splice two textures of a database, or all pairs. Results are written as soon as they are ready."""
+    """Splice two textures of a database, or all pairs. Each result is written as soon as it is ready."""
     if out is None:
         raise InvalidInput(f"--out: must be the name of an image file for {action}")
     if action == "splice" and len(names) != 2:
         raise InvalidInput(f"NAME: must be two names for splice, of elements and of a layout; got {len(names)}")
     records = {record.name: record for record in textures.list()}
     files = {name: os.path.join(textures.path, record.file) for name, record in records.items()}
-    # Names refer to textures in the folder, even if files have the same names.
+    # Do not record names as input files, because they refer to textures in the folder.
     running = RUNNING.get()
     if running is not None:
         running.files = {}
@@ -179,7 +179,7 @@ def write_splices(
     several = dict.fromkeys(("--rows", "--columns", "--cell"))
 
     def alone(a: str, b: str) -> _provenance.Record | None:
-        """Return the record of one of all results."""
+        """Return the record for one of several results of the command."""
         known = [files[n] for n in (a, b) if n in files]
         return _provenance.narrow([str(textures.path), "splice", a, b], several, files=known)
 
@@ -212,7 +212,7 @@ def write_splices(
 
 
 def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | None, *, quiet: bool) -> None:
-    """Add images to a database. ``--place`` refers to the place between the elements."""
+    """Add images to a database."""
     given["background"] = [*(given["background"] or ()), *(i for i in items if re.fullmatch(PLACE, i))]
     images = [i for i in items if not re.fullmatch(PLACE, i)]
     values = ANALYSED.read(given)
@@ -239,7 +239,7 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
 
 
 def sign(path: str, image: str) -> None:
-    """Store the command in an entry of a database."""
+    """Store the record of the command in the file of a database entry."""
     made = _provenance.narrow([None, "add", image], {"--name": Path(path).stem, "--replace": None})
     with (
         _provenance.record(made and replace(made, force=True)),
@@ -249,7 +249,7 @@ def sign(path: str, image: str) -> None:
 
 
 def explain(entry: Any, *, quiet: bool) -> None:
-    """Print the proposed layout, its confidence, and doubts about it."""
+    """Print the proposed layout, its confidence, and warnings about it."""
     sure = entry.report.get("confidence", {})
     for name in entry.report["proposed"]:
         value = {"box": show_box(entry.report["box"]), "layout": entry.layout}.get(name, "as drawn")

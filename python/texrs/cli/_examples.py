@@ -27,7 +27,7 @@ def demo_command(
     quiet: Quiet = False,
 ) -> None:
     """Write a page of results of texrs on built-in examples."""
-    # Import here, because this loads all verbs.
+    # Import here, because the demo loads all functions of texrs.
     from texrs.demo import page
 
     start = time.monotonic()

@@ -1,4 +1,4 @@
-"""Inputs of a batch: files, folders with all subfolders, and patterns. Unused files are reported."""
+"""Find the inputs of a batch: files, folders with all subfolders, and patterns. Unused files are reported."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from texrs.materials._files import DOCUMENTS, SYSTEM
 __all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
 
 OF_VOLUMES = ("solid", "slice")
-"""Commands that take volumes."""
+"""Commands whose inputs are volumes."""
 SHOWN = 8
-"""Maximum number of names in a notice. It counts the others."""
+"""Maximum number of names that a notice lists. It only counts the others."""
 FIELDS = re.compile(r"\{(input|name|folder|suffix|preset|seed|verb|parent(?:[2-9]|[1-9][0-9])?)\}")
-"""Words in braces that are replaced."""
+"""Pattern of the words in braces that are replaced, such as ``{name}``."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """An input of one or several jobs."""
+    """An input of one or several jobs of a batch."""
 
     text: str
-    """Argument of the command."""
+    """Text of the input as a command-line argument."""
     name: str
     suffix: str = ""
-    """Suffix of the file; empty for a material."""
+    """Suffix of the file. Empty for a material."""
     folder: str = ""
-    """Folder of the input, relative to the folder or pattern that was given."""
+    """Folder of the input, relative to the folder or pattern that the user gave."""
     maps: int = 0
-    """Number of maps of a material; 0 for a file."""
+    """Number of maps of a material. 0 for a file."""
 
 
 def find_sources(
@@ -54,18 +54,18 @@ def find_sources(
     templates: Sequence[str] = (),
     out: str = "",
 ) -> list[Source]:
-    """Return the inputs, each once, in the order of the texts.
+    """Return the inputs that texts describe, without duplicates and in the order of the texts.
 
     Parameters
     ----------
     texts : sequence of str
         Files, folders, patterns, or ``sample:NAME``. Folders are searched with all folders in them.
     verb : str
-        Command that takes the inputs.
+        Command that processes the inputs.
     stacked : bool
-        If True, the files of one material are one input.
+        If True, all files of one material are a single input.
     templates : sequence of str
-        Names of other files that jobs read, such as ``masks/{name}.png``. They are not inputs.
+        Names of other files that jobs read, such as ``masks/{name}.png``. These files are not inputs.
     out : str
         Folder of the results, which is not searched.
 
@@ -83,17 +83,17 @@ def find_sources(
 
 @dataclass(slots=True)
 class _Found:
-    """Files of all inputs."""
+    """Files of all inputs, while they are collected."""
 
     suffixes: tuple[str, ...]
     out: str
     files: dict[str, str] = field(default_factory=dict)
-    """Folder of each file that was given or precedes a pattern. Empty for a file that was named."""
+    """Found files, each with the folder that its path is relative to. Empty for files that were named one by one."""
     walked: set[str] = field(default_factory=set)
-    """Folders whose files have all been found."""
+    """Folders that were searched completely."""
 
     def add(self, text: str) -> bool:
-        """Add the files that match a text. Return whether there are any."""
+        """Add the files that a text describes. Return True if there are any."""
         before = len(self.files)
         if text.startswith(SAMPLE) or os.path.isfile(text) or io.is_store(text) or expand_braces(text):
             self.files.setdefault(text, "")
@@ -116,7 +116,7 @@ class _Found:
         for place, folders, names in os.walk(folder, followlinks=True):
             inner = sorted(os.path.join(place, n) for n in folders if not n.startswith("."))
             stores = [p for p in inner if io.is_store(p)]
-            # A link may lead back to a folder above it.
+            # Skip folders that were visited, because a link can lead back to a folder above it.
             go = [p for p in inner if p not in stores and os.path.realpath(p) not in seen | {self.out}]
             seen |= {os.path.realpath(p) for p in go}
             folders[:] = [os.path.basename(p) for p in go]
@@ -125,9 +125,9 @@ class _Found:
         self._take(folder, several, base)
 
     def _take(self, text: str, paths: Sequence[str], base: str) -> None:
-        """Add the files in supported formats, and report the others."""
+        """Add the files with suffixes of supported formats, and report the others."""
         read = [p for p in paths if p.lower().endswith(self.suffixes) or io.is_store(p)]
-        # A pattern may have an unknown suffix, because the content of the file decides.
+        # If no file that matches a pattern has a known suffix, add them all, because the content decides the format.
         read = read or ([] if os.path.isdir(text) else list(paths))
         taken = {*read, *(p for p in paths if os.path.basename(p).lower() in SYSTEM or p.lower().endswith(DOCUMENTS))}
         left = [p for p in paths if p not in taken]
@@ -139,13 +139,13 @@ class _Found:
             self.files.setdefault(path, base)
 
     def drop_used(self, templates: Iterable[str]) -> None:
-        """Drop the files that belong to other inputs."""
+        """Remove the files that the names in ``templates`` refer to, because they are not inputs."""
         known = [list_known(_name(path, base)) for path, base in self.files.items()]
         used = {os.path.realpath(fill(t, each)) for t in templates if t != "{input}" for each in known}
         self.files = {path: base for path, base in self.files.items() if os.path.realpath(path) not in used}
 
     def make_sources(self, *, stacked: bool) -> Iterator[Source]:
-        """Return the inputs. The files of one material are one input."""
+        """Return the inputs for all files. If ``stacked``, the files of one material are a single input."""
         folders: dict[str, list[str]] = {}
         for path in self.files:
             plain = path.startswith(SAMPLE) or not os.path.isfile(path)
@@ -157,7 +157,7 @@ class _Found:
                 yield from self._group(folder, paths)
 
     def _group(self, folder: str, paths: Sequence[str]) -> Iterator[Source]:
-        """Return the inputs in a folder: the folder if it is a material, or its materials and images."""
+        """Return the inputs in a folder: the folder itself if it is one material, else its materials and images."""
         stems = {path: os.path.basename(path)[: -len(find_suffix(Path(path))) or None] for path in paths}
         roles = find_roles(stems)
         keys: dict[str, list[str]] = {}
@@ -169,14 +169,16 @@ class _Found:
             inside = os.path.normpath(folder or ".")
             above = os.path.dirname(os.path.relpath(inside, base)) if base != folder else ""
             name = os.path.basename(os.path.abspath(inside))
-            # A folder that contains other inputs is not read as a whole.
+            # List the files of the material if the folder also contains other inputs, because it would be read as a
+            # whole.
             deeper = any(path.startswith(os.path.join(folder, "")) for path in self.files if path not in paths)
             text = join_braces(paths) if deeper else folder
             yield Source(text, name, folder=above.removeprefix("."), maps=len(roles))
             return
         taken = {path: key for key, own in materials.items() for path in own}
         for path in paths:
-            # A file whose name continues the name of a material belongs to it. The reader reports it.
+            # Assign a file to a material if its name begins with the name of the material. The reader reports unknown
+            # maps.
             starts = [k for k in materials if k and re.match(rf"{re.escape(k)}[_\-. ]", stems[path])]
             if path not in roles and starts:
                 taken[path] = max(starts, key=len)
@@ -193,7 +195,7 @@ class _Found:
 
 
 def _name(path: str, base: str) -> Source:
-    """Return a file as an input."""
+    """Return the input for a file."""
     if path.startswith(SAMPLE):
         return Source(path, path.removeprefix(SAMPLE))
     inside = os.path.relpath(os.path.dirname(path) or ".", base or ".") if base or not os.path.dirname(path) else ""
@@ -207,13 +209,13 @@ def _name(path: str, base: str) -> Source:
 
 
 def find_roles(stems: Mapping[str, str]) -> dict[str, Role]:
-    """Return the roles in file names, by file. Files without a role are left out."""
+    """Return the roles of maps that file names state, by file. Files without a role are omitted."""
     found, _ = guess_roles(list(stems.values()))
     return {path: found[stem] for path, stem in stems.items() if stem in found}
 
 
 def join_braces(paths: Sequence[str]) -> str:
-    """Return one text for some files of a folder, such as ``in/rock_{albedo,normal}.png``."""
+    """Return one text that names several files of a folder, such as ``in/rock_{albedo,normal}.png``."""
     start = paths[0][: _count_alike(paths)]
     rest = [p[len(start) :] for p in paths]
     end = rest[0][len(rest[0]) - _count_alike([r[::-1] for r in rest]) :]
@@ -226,7 +228,7 @@ def join_braces(paths: Sequence[str]) -> str:
 
 
 def _count_alike(texts: Sequence[str]) -> int:
-    """Return the length of the common beginning of all texts."""
+    """Return the number of characters that all texts have in common at their beginning."""
     return sum(1 for _ in itertools.takewhile(lambda each: len(set(each)) == 1, zip(*texts, strict=False)))
 
 
@@ -234,7 +236,10 @@ def _count_alike(texts: Sequence[str]) -> int:
 
 
 def list_known(source: Source) -> dict[str, str]:
-    """Return the values of words in braces: ``{parent}`` is the folder of the input, ``{parent2}`` the one above it."""
+    """Return the values for words in braces.
+
+    ``{parent}`` is the folder of the input, ``{parent2}`` the folder above it.
+    """
     known = {"input": source.text, "name": source.name, "folder": source.folder or ".", "suffix": source.suffix}
     above = Path(os.path.abspath(source.text.removeprefix(SAMPLE))).parents
     names = [] if source.text.startswith(SAMPLE) else [p.name for p in above]
@@ -242,7 +247,7 @@ def list_known(source: Source) -> dict[str, str]:
 
 
 def fill(text: str, known: Mapping[str, str]) -> str:
-    """Return a text with the words in braces replaced. Unknown braces stay."""
+    """Replace the words in braces in a text. Unknown braces are kept."""
     filled = FIELDS.sub(lambda found: known.get(found[1], ""), text)
     return os.path.normpath(filled) if "{folder}" in text else filled
 

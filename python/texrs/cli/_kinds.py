@@ -1,6 +1,6 @@
-"""Kinds of values: their text on the command line, and their conversion.
+"""Define kinds of values: the form of their text on the command line, and the conversion to Python values.
 
-The signatures of the functions contain the rest.
+The other facts about options are taken from the signatures of the functions.
 """
 
 from __future__ import annotations
@@ -53,40 +53,43 @@ from texrs.cli._texts import (
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of value."""
+    """A kind of value on the command line."""
 
     metavar: str | tuple[str, str]
-    """Form of the text. Images and volumes may have different forms."""
+    """Form of the text in the help. Images and volumes can have different forms."""
     read: Callable[[Any, About], Any]
-    """Convert the text or the list of texts to the value."""
+    """Function that converts the text, or the list of texts, to the value."""
     note: str | tuple[str, str] = ""
-    """Description beyond the form."""
+    """Additional description for the help. Images and volumes can have different ones."""
     show: Callable[[Any], str] = str
-    """Convert a default to its text."""
+    """Function that converts a default value to its text."""
     file: bool = False
-    """If True, the text names a file, which is read after the check that the result can be written."""
+    """If True, the text names a file. It is read after checking that the result can be written."""
     words: tuple[str, ...] = ()
-    """Texts that are not file names, and are passed to the function unchanged."""
+    """Texts that do not name a file. They are passed to the function unchanged."""
     many: bool = False
-    """If True, any number of texts is allowed."""
+    """If True, the option accepts several texts."""
     plain: bool = False
-    """If True, this form is used even if typer could read the type."""
+    """If True, this kind is used even for types that typer can convert."""
 
     @staticmethod
     def pick(text: str | tuple[str, str], axes: int) -> str:
-        """Return the text for images, or the text for volumes."""
+        """Return the text for the number of axes: for images (2) or volumes (3)."""
         return text if isinstance(text, str) else text[axes - 2]
 
 
 PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
 EXAMPLE = Kind("FILE|FOLDER", read_example, "A file, a folder of the maps of a material, or sample:NAME.", file=True)
 SOURCE = replace(EXAMPLE, read=lambda text, about: match_alpha(read_example(text, about), about.like))
-"""Image in register with the first one. It may have an alpha channel that the first one lacks."""
+"""Kind of an image that is aligned with the first one.
+
+If only one of them has an alpha channel, it is added or removed.
+"""
 UNKNOWN = replace(EXAMPLE, read=lambda text, about: read_example(text, about, finite=False))
-"""Image whose unknown pixels may have any value."""
+"""Kind of an image whose unknown pixels can have any values, such as NaN."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
 UNKNOWN_VOLUME = replace(VOLUME, read=lambda text, about: read_volume(text, finite=False))
-"""Volume whose unknown voxels may have any value."""
+"""Kind of a volume whose unknown voxels can have any values, such as NaN."""
 ENTRY = Kind(
     "FILE|FOLDER",
     read_entry,
@@ -107,7 +110,7 @@ ENTRIES = replace(
 )
 WHITE = "White pixels are marked. In an image with transparency, opaque pixels are marked."
 WORDS = f"{WHITE} FILE:invert marks the other pixels. FILE:threshold=0.2,grow=4 sets --threshold and --grow of texrs remove."
-"""Description of masks."""
+"""Description of masks in the help."""
 MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WORDS, file=True)
 GROUNDS = replace(
     MASK,
@@ -130,9 +133,9 @@ EACH = Kind(
     f"For several planes, repeat the option in the order of --ground. The word {FOUND} lets texrs find the value.",
     many=True,
 )
-"""One value for each plane of a photograph."""
+"""Kind of a parameter with one value for each plane of a photograph."""
 OBJECT = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
-"""Mask that the function reads, as its other options describe."""
+"""Kind of a mask that the function itself reads, according to other options."""
 FILLED = Kind(
     "FILE|alpha|nan|nodata|VALUE",
     read_hole,
@@ -227,4 +230,4 @@ KINDS = {
     "edit": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
     "steps": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
 }
-"""Kinds of parameters by name, if their type is not enough: a name has the same meaning everywhere."""
+"""Kinds of parameters by name, for names whose type is not sufficient. A name has the same kind in all commands."""

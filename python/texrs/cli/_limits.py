@@ -1,4 +1,4 @@
-"""Limits of every command: options that are in force while it works."""
+"""Define the options of every command that limit its work, such as time and memory."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def limit(
     strict: bool = False,
     quiet: bool = False,
 ) -> Iterator[None]:
-    """Run a command within its limits, and show which parts of its inputs it ignores and what it assumes."""
+    """Run a block within the given limits. Show which parts of inputs were ignored, and what was assumed."""
     memory = None if memory_limit is None else parse_bytes(memory_limit)
     with ExitStack() as stack:
         with name_arguments(pixels="--pixel-limit", seconds="--time-limit", memory="--memory-limit"):

@@ -75,7 +75,7 @@ def apply_command(
         with _provenance.record(made):
             check_free(target)
     read = io.read if places.axes == 2 else io.read_volume
-    # Move all results to their names at the end, or none.
+    # Give all results their final names together at the end, so that a failure leaves none.
     with ExitStack() as stack, threads(count):
         for paths, target, made in zip(groups, targets, records, strict=True):
             images = [read(path) for path in paths]
@@ -104,7 +104,7 @@ def store_map(
     count: int | None,
     quiet: bool,
 ) -> None:
-    """Write a map to a store, chunk by chunk, so that the whole result is never in memory."""
+    """Write a result to a store, chunk by chunk, so that it does not have to fit in memory."""
     if finish.screening is not None or finish.light is not None or finish.fade is not None:
         raise InvalidInput(
             f"--out: {out} is written in parts, but seams can only be blended in the whole result; pass --screening "
@@ -132,7 +132,7 @@ def store_map(
 
 
 def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> RenderOptions:
-    """Return the render options: those of the source map, except for given options."""
+    """Return the render options of the source map, with given options in place of its own."""
     known = places.finish or RenderOptions((True,) * places.axes)
     fields = {path[1]: value for path, value in values.items() if path[0] == "finish"}
     if "screening" in fields:
@@ -149,7 +149,7 @@ def make_map(
     values: Mapping[tuple[str, ...], Any],
     finish: RenderOptions,
 ) -> Array:
-    """Return the rendered map, by the options or else by its name."""
+    """Return a map of the result, rendered according to the options or the name of its file."""
     packed = None if {("map_type",), ("green",)} & values.keys() else find_packed(path)
     if packed is not None:
         return look_up(places, [Map(image, packed, "linear") for image in images], finish, lambda share: None)
@@ -160,17 +160,17 @@ def make_map(
 def read_kind(
     path: str, images: Sequence[Array], places: SourceMap, values: Mapping[tuple[str, ...], Any]
 ) -> tuple[Kind, Green]:
-    """Return the interpretation of a map: as the options state, else by its name."""
+    """Return how a map is interpreted: as the options specify, else according to its name."""
     return choose_kind(path, images, places.axes, values.get(("map_type",)), values.get(("green",)))
 
 
 def fit(finish: RenderOptions, paths: Sequence[str], given: Mapping[str, Any]) -> RenderOptions:
-    """Return render options for maps that may not be colours by their names. Only colours have light."""
+    """Return the render options for a map. Light is only changed in colours, according to the name of the file."""
     return finish if given["finish_flatten_lighting"] is not None else choose_finish(finish, paths[0])
 
 
 def group(maps: Sequence[str], count: int) -> list[list[str]]:
-    """Return maps in groups of one for each exemplar."""
+    """Return the maps in groups, each with one map for each exemplar of the source map."""
     if len(maps) % count:
         raise InvalidInput(
             f"IMAGE: must be {count} images for each result, one for each exemplar of the source map; got {len(maps)}"
@@ -179,7 +179,7 @@ def group(maps: Sequence[str], count: int) -> list[list[str]]:
 
 
 def name_targets(groups: Sequence[Sequence[str]], out: str, inputs: Sequence[str]) -> list[str]:
-    """Return the names of the outputs: the file itself, or files with the names of the maps in a folder."""
+    """Return the names of the outputs: ``out`` itself, or files in this folder with the names of the maps."""
     if len(groups) == 1 and not Path(out).is_dir():
         return [out]
     if not Path(out).is_dir():

@@ -1,7 +1,7 @@
-"""Options of a command, generated from the signature and the docstring of its function.
+"""Generate the options of a command from the signature and the docstring of its function.
 
-Name, default, allowed words and meaning of a parameter are written once, at the function. The command line adds the
-conversion from text, once for all parameters of a kind (`texrs.cli._kinds`).
+Name, default, choices and description of a parameter are only written at the function. The command line adds the
+conversion from text, which is the same for all parameters of a kind (`texrs.cli._kinds`).
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from texrs.errors import InvalidInput
 
 MISSING = inspect.Parameter.empty
 PLACES = re.compile("X,Y|csv|WIDTHx")
-"""Forms of texts that contain places or sizes."""
+"""Pattern of the forms of texts that contain places or sizes."""
 LONGEST = 200
-"""Maximum characters of a help text."""
+"""Maximum length of a help text, in characters."""
 AMERICAN = {"color": "colour", "optimize": "optimise"}
 
 Path: TypeAlias = tuple[str, ...]
-"""A parameter, or a parameter that is a dataclass and a field of it."""
+"""Name of a parameter. If the parameter is a dataclass, the name of a field follows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,35 +40,35 @@ class Option:
     path: Path
     """Path of the parameter."""
     flag: str
-    """Text that users write: ``--seed``, or the name of an argument in capitals."""
+    """Name for users: ``--seed``, or the name of an argument in capitals."""
     type: Any
-    """Type that typer reads."""
+    """Type of the parameter for typer."""
     kind: Kind | None
-    """Kind that converts it to the value. None if no conversion is needed."""
+    """Kind that converts the text to the value. None if typer converts it."""
     default: Any
-    """Default of the function as text. `MISSING` if the command needs a value."""
+    """Default of the function, as text. `MISSING` if the command line must provide a value."""
     required: bool
-    """Whether the function requires it."""
+    """Whether the function has no default for the parameter."""
     info: Any
     """Option or argument object of typer."""
 
     @property
     def name(self) -> str:
-        """Name of the command's parameter."""
+        """Name of the parameter in the function of the command."""
         return "_".join(self.path)
 
     @property
     def argument(self) -> bool:
-        """Whether it is a positional argument."""
+        """Whether this is a positional argument."""
         return not self.flag.startswith("--")
 
     @property
     def file(self) -> bool:
-        """Whether the value is read from a file."""
+        """Whether the value is read from a file that the text names."""
         return self.kind is not None and self.kind.file
 
     def name_value(self, text: object) -> str:
-        """Return its name in errors: the given file, or the option."""
+        """Return the name of the value in errors: the given file, or the option."""
         texts = text if isinstance(text, list) else [text]
         if self.kind is None or not self.kind.file or any(t is None or t in self.kind.words for t in texts):
             return self.flag
@@ -76,33 +76,34 @@ class Option:
 
     def make_parameter(self) -> inspect.Parameter:
         """Return the parameter that defines this option for typer."""
-        # Typer treats an optional value as one that may be None.
+        # A value without a default can be None, which typer must accept.
         annotation: Any = Annotated[self.type if self.default is MISSING else self.type | None, self.info]
         return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=self.default, annotation=annotation)
 
 
 class Options:
-    """The options of a function on the command line.
+    """All options that a function has on the command line.
 
     Parameters
     ----------
     function : callable
-        Function with type annotations and a numpydoc docstring. A parameter that is a dataclass gives an option for each field.
+        Function with type annotations and a numpydoc docstring. A parameter that is a dataclass gives an option for
+        each field.
     arguments : mapping
-        Positional parameters, and their kinds.
+        Names of the positional parameters, and their kinds.
     kinds : mapping
-        Kinds of parameters that neither type nor name determines.
+        Kinds of parameters that neither the type nor the name determines.
     names : mapping
-        Other names of parameters. The name of a dataclass is the prefix of its fields.
+        Names of options that differ from those of parameters. For a dataclass, the prefix of its fields.
     leave : mapping
-        Parameters without an option, and the reasons. Fields are written ``parameter.field``.
+        Parameters without an option, each with the reason. Fields are written ``parameter.field``.
     makers : mapping
-        Functions that compute the values of parameters with several options, if the dataclass is not enough.
+        Functions that compute a parameter from several options, if calling the dataclass is not sufficient.
     only : collection of str
         Parameters to include. Default: all.
     optional : mapping
-        Parameters that default to a value of the command, and the text shown for it. The function does not get them if
-        they are not given.
+        Parameters whose default is chosen by the command, and the text that describes it. If they are not given, the
+        function gets no value for them.
     axes : {2, 3}
         Number of axes of the function's result.
 
@@ -134,7 +135,7 @@ class Options:
         return iter(self.all)
 
     def name_values(self, given: Mapping[str, Any]) -> dict[str, str]:
-        """Return the name of each parameter in errors: the given file, or the option; for several, all given ones."""
+        """Return the names of parameters in errors: the given file or the option, or all given options of a dataclass."""
         called = {option.path[-1]: option.name_value(given[option.name]) for option in reversed(self.all)}
         for name in self.groups:
             inside = [o for o in self if o.path[0] == name and len(o.path) == 2]
@@ -147,7 +148,7 @@ class Options:
     def read(
         self, given: Mapping[str, Any], about: About | None = None, *, which: Callable[[Option], bool] | None = None
     ) -> dict[Path, Any]:
-        """Return the values of the given options. Others keep the default of the function."""
+        """Convert the given options to values. Options that are not given are omitted."""
         values = {}
         for option in self:
             text = given[option.name]
@@ -163,7 +164,7 @@ class Options:
         return values
 
     def call(self, values: Mapping[Path, Any]) -> dict[str, Any]:
-        """Return the arguments of the function. Fields of a dataclass are combined."""
+        """Return the arguments of the function for given values. Fields of a dataclass are combined to one argument."""
         made = {path[0]: value for path, value in values.items() if len(path) == 1}
         for name, group in self.groups.items():
             fields = {path[1]: value for path, value in values.items() if len(path) == 2 and path[0] == name}
@@ -172,13 +173,13 @@ class Options:
                     given = next(o.flag for o in self if o.path == (name, next(iter(fields))))
                     raise InvalidInput(f"{given}: must be combined with {option.flag}")
             if fields:
-                # The command determines the number of axes.
+                # Pass the number of axes, because the user cannot choose it.
                 known = {"axes": self.axes} if "axes" in inspect.signature(group).parameters else {}
                 made[name] = group(**fields, **known)
         return made
 
     def _find(self, only: Collection[str]) -> Iterator[tuple[Path, inspect.Parameter, str]]:
-        """Return each parameter and field with its description."""
+        """Yield each parameter, or each field of a dataclass, with its description."""
         texts = describe(self.function)
         for name, each in inspect.signature(self.function, eval_str=True).parameters.items():
             if each.kind is each.VAR_KEYWORD or name == "self" or name in self.leave or (only and name not in only):
@@ -213,9 +214,9 @@ class Options:
         elif kind is not None and "default" in kind.words and name not in self.optional:
             default = "default"
         shown = self.optional.get(name) or default not in (None, MISSING)
-        # The word default by itself is not a description of the default.
+        # Do not show the word default, because it does not describe the default.
         shows = flag.startswith("--") and bool(shown) and default != "default"
-        # The command shows its own default, so drop the default of the function.
+        # If the command describes its own default, drop the sentence about the default of the function.
         stated = MISSING if self.optional.get(name) else parameter.default
         words = () if kind is None or kind.file else kind.pick(kind.metavar, self.axes).split("|")
         texts = (
@@ -224,7 +225,7 @@ class Options:
         )
         help_ = " ".join(t for t in texts if t)
         if kind is not None and PLACES.search(kind.pick(kind.metavar, self.axes)):
-            # The form of the text has x or the width first.
+            # Drop the order of coordinates from the description, because texts have the x or the width first.
             help_ = re.sub(r" \((?:plane, )?row, column\)| \((?:planes, )?rows, columns\)", "", help_)
             help_ = help_.replace("Plane, row and column", "Place")
         if not flag.startswith("--"):
@@ -239,7 +240,7 @@ class Options:
         return Option(path, flag, type_, kind, default, required, info)
 
     def _find_kind(self, path: Path, parameter: inspect.Parameter) -> tuple[Kind | None, Any]:
-        """Return the kind of a value and the type that typer reads: by command, type or name."""
+        """Return the kind of a value, found by command, type or name, and the type for typer."""
         type_, named = _find_type(parameter.annotation, parameter.default), KINDS.get(path[-1])
         kind = self._kinds.get(".".join(path)) or (type_ if isinstance(type_, Kind) else None)
         if kind is None and named is not None and (named.plain or type_ is None):
@@ -250,12 +251,12 @@ class Options:
 
 
 def make_parameter(name: str, annotation: Any, default: Any = MISSING) -> inspect.Parameter:
-    """Return a parameter that exists only on the command line."""
+    """Return a parameter of a command that its function does not have."""
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 def as_command(work: Callable[..., None], parameters: Iterable[inspect.Parameter]) -> Callable[..., None]:
-    """Return a function with these parameters for typer."""
+    """Return a function with the given parameters as signature, which typer reads."""
 
     def command(**given: Any) -> None:
         work(**given)
@@ -267,9 +268,9 @@ def as_command(work: Callable[..., None], parameters: Iterable[inspect.Parameter
 
 
 def take_options(*several: Options) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add options of functions to a command, as ``given``, which `Options.read` reads.
+    """Add the options of functions to a command. It gets their texts as ``given``, for `Options.read`.
 
-    They replace ``given`` in its signature. Arguments come first.
+    They replace ``given`` in the signature of the command. Positional arguments come first.
     """
     options: dict[str, list[Option]] = {}
     for option in (o for each in several for o in each):
@@ -298,7 +299,7 @@ def take_options(*several: Options) -> Callable[[Callable[..., None]], Callable[
 
 
 def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]], used: str) -> None:
-    """Refuse options that belong to something else than the requested one."""
+    """Raise an error for options that only apply to another choice than the requested one."""
     free = {option.name for option in owners.get(used, ())}
     for option in (o for each in owners.values() for o in each if o.name not in free):
         if given[option.name] not in (None, option.default):
@@ -310,12 +311,12 @@ def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]
 
 
 def _split_union(annotation: Any) -> tuple[Any, ...]:
-    """Return the types of a union, or the single type."""
+    """Return the types of a union. Another type is returned by itself."""
     return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
 
 
 def _find_type(annotation: Any, default: Any) -> Any:
-    """Return the type that typer reads, or the kind of a choice of words. None for all others."""
+    """Return the type that typer can convert, or the kind of a choice of words. None for other types."""
     parts = [part for part in _split_union(annotation) if part is not types.NoneType]
     if all(get_origin(part) is Literal for part in parts):
         return make_choice([word for part in parts for word in get_args(part)], optional=default is None)
@@ -326,7 +327,7 @@ def _find_type(annotation: Any, default: Any) -> Any:
 
 
 def make_choice(words: Sequence[str], make: Callable[[str], Any] | None = None, *, optional: bool = False) -> Kind:
-    """Return the kind of a choice of words. ``default`` may represent None."""
+    """Return the kind of a choice of words. If there is a ``default`` word, it stands for None."""
     allowed = ["default", *words] if optional else list(words)
     chosen = make or {word: word for word in words}.__getitem__
 
@@ -347,7 +348,7 @@ def make_choice(words: Sequence[str], make: Callable[[str], Any] | None = None, 
 
 
 def describe(function: Callable[..., Any]) -> dict[str, str]:
-    """Return the description of each parameter, or of each attribute of a class, in a docstring."""
+    """Return the descriptions of parameters, or of the attributes of a class, from a docstring."""
     found: dict[str, str] = {}
     names: list[str] = []
     section = ""
@@ -367,14 +368,14 @@ def describe(function: Callable[..., Any]) -> dict[str, str]:
 def _shorten(
     text: str, flags: Mapping[str, str], flag: str, default: Any, words: Collection[str], *, shown: bool
 ) -> str:
-    """Return the first sentence or two of a description, or one for each word, in the words of the command line.
+    """Shorten a description to one or two sentences, or one for each word, in the terms of the command line.
 
     A last sentence "Default: ..." is kept, unless the option shows its default.
     """
-    # References and types of arrays are for readers of the documentation only.
+    # Drop references and types of arrays, which are only useful in the documentation.
     text = re.sub(r"\s*\((?:see )?(?:`|section|Eq\.)[^)]*\)|\s*\[\d+\]_|[:;,] see `texrs[^`]*`", "", text)
     text = re.sub(r",? of any real dtype(?: and number of channels)?|, any real dtype", "", text)
-    # Drop the description of None, unless it is the default: users cannot request it.
+    # Drop the description of None unless it is the default, because users cannot give None.
     beside = ("See ", "Python ", "`texrs.", "A `texrs.", *(() if default is None else ("None",)))
     first, *further = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
     last = [further.pop()] if further and further[-1].startswith("Default: ") else []

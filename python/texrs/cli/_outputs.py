@@ -1,4 +1,4 @@
-"""Outputs of commands, declared once and checked before any long work. They never replace inputs."""
+"""Declare the outputs of commands, and check them before the work. Outputs never replace inputs."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ from texrs.io._temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
 
 NEGATIVE = re.compile(r"-[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)
-"""A negative number, which click would take for an option."""
+"""Pattern of a negative number, which click would interpret as an option."""
 SAMPLE = "sample:"
 """Prefix of the names of built-in exemplars."""
 LONGEST_PROBE = 2**17
-"""Longer than a side may be in any format with a limit."""
+"""Side of a test image that is longer than any format with a limit allows, in pixels."""
 STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask|numbers)\.png|report\.json")
-"""Names of files in a folder of stages."""
+"""Pattern of the names of files in a folder of stages."""
 
 MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "Execution"
 """Groups of options in the help."""
 NO_MATERIALS = ("batch", "samples")
 """Commands that do not read folders of maps. They refuse a folder as an input."""
 MATTER = ("out", "folder", "size", "seed", "seeds", "options", "field", "wrap", "slant", "at")
-"""Most important options. The first three of them come first in the help of a command."""
+"""Options that the help of a command lists before the others. The first three of them come first."""
 
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "out": (("--out", "-o"), "OUT", "File to write. Its suffix selects the format."),
@@ -59,7 +59,7 @@ OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "materialx": (("--materialx",), "DIR", "Folder for the material as MaterialX: material.mtlx and its maps."),
     "page": (("--page",), "OUT.html", "HTML page of the elements, for corrections by clicking."),
 }
-"""All options for outputs: their names, types and descriptions."""
+"""Options of all outputs: their names, metavars and descriptions."""
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print neither progress nor notices.")]
 Threads = Annotated[
     int | None,
@@ -89,16 +89,16 @@ def make_option(metavar: str | None, text: str) -> Any:
 
 
 def to_write(name: str, metavar: str | None = None, text: str | None = None) -> Any:
-    """Return the option for one of the outputs. A command may give its own description."""
+    """Return the option of an output. A command can replace its description."""
     flags, usual, purpose = OUTPUTS[name]
     return typer.Option(*flags, metavar=metavar or usual, help=text or purpose, show_default=False)
 
 
 class Command(TyperCommand):
-    """A command that never writes over its inputs. Every file name that is not an output counts as an input."""
+    """A command that never overwrites its inputs. Every file name that is not an output counts as an input."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """List the options in groups: the most important ones, the rest, groups by subject, other files, and the work."""
+        """List the options in groups: the most important ones, the others, groups by subject, other files, and limits."""
         sections: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Arguments", MAIN, MORE)}
         last: dict[str, list[tuple[str, str]]] = {title: [] for title in (FILES, WORK)}
         options = [p for p in self.get_params(ctx) if p.param_type_name == "option"]
@@ -125,7 +125,7 @@ class Command(TyperCommand):
                     formatter.write_dl(entries)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take a negative number for an argument, such as the value of pixels, unless it follows an option."""
+        """Parse the arguments. A negative number is a value, such as that of pixels, unless it follows an option."""
         before = ["", *args]
         shielded = [
             f" {a}" if NEGATIVE.fullmatch(a) and b[:1] != "-" else a for b, a in zip(before, args, strict=False)
@@ -137,7 +137,7 @@ class Command(TyperCommand):
         return rest
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command if no output is an input. Its files record the command."""
+        """Run the command, after checking that no output is an input. Its files contain a record of the command."""
         outputs = {p.name for p in self.params if p.name in OUTPUTS and p.param_type_name == "option"}
         force = ctx.params.get("force", False)
         given = ctx.params.items()
@@ -151,7 +151,7 @@ class Command(TyperCommand):
 
 
 def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> None:
-    """Refuse outputs next to the maps of a material that is read, because they would count as its maps."""
+    """Raise an error if an output is in the folder of a material that is read, because it would become a map of it."""
     read = {os.path.realpath(text): text for text in inputs if os.path.isdir(text)}
     for name, value in outputs.items():
         if isinstance(value, str) and os.path.realpath(value) in read:
@@ -162,7 +162,7 @@ def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> No
 
 
 def list_files(texts: Iterable[str]) -> list[str]:
-    """Return the files of names. A folder gives the files in it."""
+    """Return the files that texts name. A folder stands for the files in it."""
     return [file for text in texts for file in (_provenance.list_folder(text) or [split_tail(text)[0]])]
 
 
@@ -175,9 +175,9 @@ def find_texts(value: object) -> list[str]:
 
 
 def check_outputs(paths: Mapping[str, str | None]) -> None:
-    """Check the other outputs next to the result.
+    """Check the outputs other than the result.
 
-    They must be different files, with a valid name of a source map and a folder for the stages.
+    They must be different files. The source map must have a valid name, and the stages a usable folder.
     """
     seen: dict[str, str] = {}
     for option, path in paths.items():
@@ -201,7 +201,7 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
 
 
 def check_suffix(option: str, path: str, suffix: str = ".npz") -> None:
-    """Check that the suffix of a file name states a format, by default a format of arrays."""
+    """Check that the suffix of a file name belongs to a supported format. Default: formats of arrays."""
     if Path(path).suffix.lower() != suffix:
         raise InvalidInput(f"{as_flag(option)}: must be a name that ends in {suffix}, got {path!r}")
 
@@ -220,20 +220,20 @@ def check_folder(path: str) -> None:
 
 
 def check_stages(folder: str) -> None:
-    """Check that images of the stages can be written to a folder, and replace only such images."""
+    """Check that the images of stages can be written to a folder, and that they replace only such images."""
     check_folder(folder)
     for file in list_stages(folder):
         check_free(file, "stages")
 
 
 def list_stages(folder: str) -> list[str]:
-    """Return the files that images of the stages may replace in a folder."""
+    """Return the existing files in a folder that the images of stages can replace."""
     there = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
     return [os.path.join(folder, name) for name in there if STAGE.fullmatch(name)]
 
 
 def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> None:
-    """Check that no output is an input under any name, and that images of the stages do not replace inputs."""
+    """Check that no output is an input, even under another name or through links, and that stages do not replace inputs."""
     found = [(name, status) for name in inputs if (status := read_status(name)) is not None]
     for option, path in outputs.items():
         if path is None:
@@ -252,7 +252,7 @@ def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> Non
 
 
 class _Enough(Exception):
-    """The attempted write worked."""
+    """Raised to stop a test of writing that succeeded."""
 
 
 def check_output(
@@ -263,17 +263,17 @@ def check_output(
     option: str = "out",
     fills: bool = False,
 ) -> None:
-    """Check that an image with the dtype and channels of ``like`` can be written, without leaving a file.
+    """Check that an image with the dtype and channels of ``like`` can be written. No file is left.
 
-    Without ``like``, only check that a file can be written. An existing file must be the command's own, unless all may
-    be replaced. ``fills`` states that a transparent image can become opaque.
+    Without ``like``, only check that a file can be created. An existing file must be from the same command, unless
+    ``--force`` is given. ``fills``: a transparent image can become opaque.
     """
     with suppress(_Enough), write_output(path, option) as temporary:
         if like is None:
             temporary.touch()
         else:
-            # Use the length of the result, because some formats limit it, and a value that .hdr may refuse. Unknown
-            # images may have any values.
+            # Use the length of the result, which some formats limit, and the least value, which .hdr can reject.
+            # Images of unknown pixels can have any values.
             axes = len(size)
             longest = min(max(size), LONGEST_PROBE)
             least = np.nan_to_num(np.fmin.reduce(like, axis=None))
@@ -299,10 +299,10 @@ def write_output(
     suffix: str = "",
     made: _provenance.Record | None = None,
 ) -> Iterator[Path]:
-    """Return a temporary name that replaces ``path`` at the end. Errors name ``path``.
+    """Provide a temporary name for a file that becomes ``path`` at the end. Errors name ``path``.
 
-    The file records the command as it was called, or as ``made`` states. ``inside`` states that the option names its
-    folder. ``like`` describes the colours of the source image.
+    The file contains the record of the command, or the record ``made``. ``inside``: the option names the folder of the
+    file. ``like``: colour description of the source image.
     """
     if find_suffix(Path(path)).lower() == STORE:
         raise FileError(f"{path}: only texrs solid, synthesize, tiles and apply write Zarr stores")
@@ -324,7 +324,7 @@ def write_output(
 
 @contextmanager
 def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.Record | None = None) -> Iterator[Path]:
-    """Return a temporary folder whose files move to the folder ``path`` at the end. Each file records the command."""
+    """Provide a temporary folder whose files are moved to ``path`` at the end. Each file records the command."""
     os.makedirs(path, exist_ok=True)
     sweep(os.path.realpath(path))
     temporary = Path(tempfile.mkdtemp(prefix=name_prefix(), dir=path))
@@ -347,9 +347,9 @@ def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.
 
 @contextmanager
 def name_arguments(**names: str) -> Iterator[None]:
-    """Name the file or the option in errors that name the argument of a function.
+    """Replace the names of function arguments in errors by the file or the option.
 
-    Arguments that are not given have the option of their own name.
+    Arguments that are not given are replaced by the option of the same name.
     """
     try:
         yield
@@ -360,24 +360,28 @@ def name_arguments(**names: str) -> Iterator[None]:
             raise
         called = dict.fromkeys(names.get(each, as_flag(each)) for each in several)
         said = say_places(rest) if set(several) & set(PLACED) else rest
-        # Other arguments may be in the text. A name of two words does not match one of them.
+        # The text can name other arguments as well. Only replace names with an underscore, because others can be
+        # ordinary words.
         for other in (name for name in names if "_" in name):
             said = re.sub(rf"\b{other}\b", names[other], said)
         raise type(error)(f"{', '.join(called)}:{said}") from None
 
 
 PLACING = ("nrrd", "nii", "nii.gz")
-"""Volume formats that store a position."""
+"""Volume formats that store the position of the voxels."""
 
 
 def find_volume(source: Any, axes: int) -> str | None:
-    """Return the volume file whose spacing, orientation, origin and units the result keeps, or None."""
+    """Return the volume file whose spacing, orientation, origin and units are copied to the result.
+
+    None if there is none.
+    """
     there = axes == 3 and isinstance(source, str) and not source.startswith(SAMPLE)
     return source if there else None
 
 
 def read_kept_spacing(source: Any, out: str, axes: int) -> Sequence[float] | None:
-    """Return the voxel spacing of a file, which the result keeps if its format can store it."""
+    """Return the voxel spacing of a file if the format of the result can store it, else None."""
     suffix = find_suffix(Path(out)).lower()
     volume = find_volume(source, axes)
     return io.read_spacing(volume) if volume is not None and (suffix == RAW or keeps_spacing(suffix)) else None
@@ -393,15 +397,15 @@ def deliver(
     made: _provenance.Record | None = None,
     option: str = "out",
 ) -> None:
-    """Write a result and its additional outputs. ``like`` describes its colours.
+    """Write a result and its additional outputs. ``like``: colour description for the file.
 
-    Voxels have the position of the file ``volume``, with another spacing if that is given.
+    Voxels keep the position of the file ``volume``, with another spacing if ``spacing`` is given.
     """
     out = paths["out"] or ""
     image, axes = np.asarray(result.image), result.source_map.axes
     suffix = find_suffix(Path(out))
     known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
-    # The result gets its name last, after all other files are written.
+    # Move the result to its name last, after all other files are written.
     with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
         if axes == 2:
             palette = None if like is None else like.palette
@@ -413,7 +417,7 @@ def deliver(
 
 
 def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[float] | None = None) -> None:
-    """Write a volume with the position of a file, as far as the format can store it."""
+    """Write a volume with the position of another file, as far as the format can store it."""
     stated = spacing or (None if volume is None else io.read_spacing(volume))
     suffix = find_suffix(path).lower()
     if stated is None or not holds_spacing(image, suffix):
@@ -444,7 +448,7 @@ def deliver_beside(
 
 
 def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str | None]:
-    """Return the output names of one of several results. Each ends with its seed."""
+    """Return the output names for one of several results. The seed is added to each name."""
     for option, path in paths.items():
         if path is not None and not Path(path).name:
             raise InvalidInput(f"{as_flag(option)}: must be a name that a seed can be added to, got {path!r}")
@@ -467,18 +471,18 @@ def make_contact_sheet(images: Sequence[Array]) -> Array:
 
 
 def shrink(image: Array, side: int = 256) -> Array:
-    """Return every n-th pixel, for images of any dtype and number of channels."""
+    """Reduce an image by taking every n-th pixel, for any dtype and number of channels."""
     step = max(1, -(-max(image.shape[:2]) // side))
     small: Array = image[::step, ::step].copy()
     return small
 
 
 def describe(image: Array, axes: int) -> str:
-    """Return the width, height, channels and dtype of an image, and the depth of a volume."""
+    """Return a text with width, height, channels and dtype, and depth for a volume."""
     channels = image.shape[axes] if image.ndim > axes else 1
     return f"{show_sides(image.shape[:axes])}, {channels} channel{'s'[: channels != 1]}, {image.dtype}"
 
 
 def show_sides(shape: Sequence[int]) -> str:
-    """Return sides in the order of options: the width first."""
+    """Return a text of sides as on the command line: the width first."""
     return " x ".join(map(str, reversed(shape)))

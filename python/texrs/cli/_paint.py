@@ -31,7 +31,7 @@ from texrs.papers.solid.window import SolidTexture
 
 
 def read_block(text: str, about: About) -> Any:
-    """Read a volume, or a folder of volumes that are the maps of a material."""
+    """Read a volume, or a material from a folder of volumes."""
     if not os.path.isdir(text):
         return read_volume(text)
     with name_arguments(roles="--role", maps=text):
@@ -87,7 +87,7 @@ def paint_command(
         raise InvalidInput("--directions: cannot be combined with --field")
     if ("along",) in values and ("directions",) not in values:
         raise InvalidInput("--along: must be combined with --directions")
-    # The volume of a folder of maps has no spacing.
+    # A folder of maps does not state a voxel spacing.
     whole = given["exemplar"] if not os.path.isdir(given["exemplar"]) else None
     spacing = values.get(("spacing",)) or read_stated_spacing(whole)
     values |= {("spacing",): spacing} if spacing else {}
@@ -104,7 +104,7 @@ def paint_command(
         texture = SolidTexture(**call)
         painted["atlas"] = None if corners else painted.get("atlas", given["atlas"])
         if followed:
-            # The field must rotate the texture at the scale on the mesh.
+            # The field rotates the texture at the scale that it has on the mesh.
             if "scale" not in painted:
                 painted["scale"] = find_scale(surface, texture, **painted)
             texture = SolidTexture(
@@ -113,7 +113,7 @@ def paint_command(
         made = texture_mesh(surface, texture, **painted, progress=progress)
     depth: Any = bits
     with TemporaryDirectory(prefix=name_prefix(), dir=folder) as beside:
-        # The files name each other, so they are written under their own names first.
+        # Write the files under their final names in a temporary folder first, because they refer to each other.
         *others, last = reversed(made.save(Path(beside, os.path.basename(out)), depth=depth))
         targets = [os.path.join(folder, file.name) for file in others]
         for target in targets:

@@ -1,4 +1,4 @@
-"""Results larger than memory: ``texrs solid``, ``synthesize`` and ``tiles`` in chunks, by any workers."""
+"""Write results larger than memory, in chunks: ``texrs solid``, ``synthesize`` and ``tiles``."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ OPTIONS: dict[str, tuple[Any, str, str]] = {
     "workers": (int, "N", "Number of processes that compute the chunks."),
     "scheduler": (str, "ADDRESS", "Address of a Dask cluster that computes the chunks."),
 }
-"""Options that request a part of an unbounded texture."""
+"""Options for writing a part of an unbounded texture: type, form and description of each."""
 TAKEN = ("exemplar", "field", "seed", "quality", "interpolation", "spacing", "memory_limit")
-"""Parameters that unbounded textures have too."""
+"""Parameters that unbounded textures have in common with the commands."""
 BEYOND = "to OUT.zarr, or with --chunks, it is made in parts"
-"""Remedy in errors about results that are too large for memory."""
+"""Remedy in errors about results that do not fit in memory."""
 PAUSE = 5.0
-"""Seconds between two forecasts."""
+"""Minimum time between two updates of the remaining time, in seconds."""
 
 
 def make_options() -> list[inspect.Parameter]:
-    """Return the options for parts."""
+    """Return the parameters of the options for parts."""
     made = []
     for name, (kind, metavar, text) in OPTIONS.items():
         info = typer.Option(metavar=metavar, help=text, show_default=False, rich_help_panel="Larger than memory")
@@ -67,16 +67,16 @@ def make_options() -> list[inspect.Parameter]:
 
 @dataclass(frozen=True, slots=True)
 class InParts(Verb):
-    """A verb whose result may be as large as a disk. It is then a part of an unbounded texture."""
+    """A command whose result can be larger than memory. Such a result is a part of an unbounded texture."""
 
     def make_parameters(self) -> list[inspect.Parameter]:
-        """Return the verb's own parameters, and the parameters for parts."""
+        """Return the parameters of the command, followed by those for parts."""
         return [*Verb.make_parameters(self), *make_options()]
 
     def make(
         self, *, count: int | None, quiet: bool, notices: Notices, variants: int | None = None, **given: Any
     ) -> None:
-        """Run the command: at once, or in parts if requested."""
+        """Run the command. The result is computed at once, or in chunks if the options request it."""
         said = {name: given.pop(name, None) for name in OPTIONS}
         out = str(given["out"])
         if not (is_stored(out) or out.lower().endswith(RAW)) and all(value is None for value in said.values()):
@@ -121,7 +121,7 @@ class InParts(Verb):
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Description of a part, and of its workers."""
+    """Requested part of an unbounded texture, and the workers that compute it."""
 
     origin: tuple[int, ...]
     chunks: tuple[int, ...] | None
@@ -129,20 +129,20 @@ class Asked:
 
     @classmethod
     def read(cls, said: Mapping[str, Any], axes: int) -> Asked:
-        """Check the options."""
+        """Check the options for parts, and convert them."""
         chunks = None if said["chunks"] is None else parse_size(said["chunks"], "--chunks", axes=axes)
         return cls(_parse_origin(said["origin"], axes), chunks, read_scheduler(said["workers"], said["scheduler"]))
 
 
 def read_scheduler(workers: int | None, scheduler: str | None) -> int | str | None:
-    """Return the scheduler: a number of processes, the workers of a cluster, or None for this process."""
+    """Return a number of processes, the address of a cluster, or None to compute in this process."""
     if workers is not None and scheduler is not None:
         raise InvalidInput("--workers: cannot be combined with --scheduler")
     return scheduler if workers is None else as_int(workers, "--workers", 1, 1024)
 
 
 def is_stored(out: str) -> bool:
-    """Return whether a name is the name of a Zarr store."""
+    """Return True if a name has the suffix of a Zarr store."""
     return out.lower().rstrip("/").endswith(".zarr")
 
 
@@ -156,7 +156,7 @@ def write_part(
     count: int | None,
     quiet: bool,
 ) -> None:
-    """Write a part of an unbounded texture to a store or to a file. An interrupted run is continued."""
+    """Write a part of an unbounded texture to a store or a file. Chunks of an interrupted run are kept."""
     start, running = time.monotonic(), _provenance.RUNNING.get()
     grid = Grid.of(sides, asked.chunks, whole.axes)
     with (
@@ -191,11 +191,11 @@ def write_file(
     count: int | None,
     watch: Progress,
 ) -> Stored:
-    """Fill the part file of a name. The final file records the command."""
+    """Write a file by filling a partial file first. The finished file contains the record of the command."""
     part = whole._read_part(asked.origin, grid.shape)
     check_suffix(out, whole.axes, part.reader.maps[part.base], grid.chunks)
     header = str(Path(out).with_suffix(HEADER)) if Path(out).suffix.lower() == RAW else None
-    # Permission to write and to replace was checked before the work.
+    # Check before the work that the files can be written and replaced.
     for name in filter(None, (out, header)):
         _outputs.check_output(name)
     filled = fill(part.reader, part.base, grid, out, scheduler=asked.scheduler, threads=count, progress=watch)
@@ -208,7 +208,7 @@ def write_file(
 
 
 class _Forecast:
-    """Reports the speed and the remaining time."""
+    """Adds the speed and the remaining time to the progress."""
 
     def __init__(self, watch: Progress, total: int) -> None:
         self.watch, self.total, self.said, self.at = watch, total, "", -math.inf
@@ -230,7 +230,7 @@ def _list(said: Mapping[str, Any]) -> str:
 
 
 def _parse_origin(text: str | None, axes: int) -> tuple[int, ...]:
-    """Return (row, column) of ``X,Y``: the column comes first in the text, like the width in sizes."""
+    """Convert ``X,Y`` to (row, column), or ``X,Y,Z`` to (plane, row, column). Default: zeros."""
     if text is None:
         return (0,) * axes
     wanted = ("X,Y, as in -40,1000", "X,Y,Z, as in 0,-40,1000")[axes - 2]

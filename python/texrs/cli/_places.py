@@ -1,6 +1,6 @@
-"""Places on the command line: x comes first, like the width in sizes, and y grows downwards.
+"""Convert places on the command line, where x comes first, as the width does in sizes, and y grows downwards.
 
-Functions take (row, column) and (plane, row, column), so every option for places reverses the order here.
+Functions take (row, column) and (plane, row, column). Every option for places reverses the order here.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ __all__ = [
 ]
 
 PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
-"""Pattern of an x and a y."""
+"""Pattern of x and y, separated by a comma."""
 PLACED = ("corners", "background", "points", "box", "at", "point", "normal")
-"""Arguments of functions that are places."""
+"""Arguments of functions that contain places."""
 HEADERS = {"x": 0, "column": 0, "columns": 0, "col": 0, "y": 1, "row": 1, "rows": 1}
-"""Names of columns in a file of points, and the coordinate of each."""
+"""Names of columns in a CSV file of points, and the index of the coordinate in x, y order."""
 _ROWS_FIRST: ContextVar[bool] = ContextVar("rows_first", default=False)
 
 
 @contextmanager
 def put_rows_first() -> Iterator[None]:
-    """Read places as row,column in a block. Records without a stated order use this order."""
+    """Interpret places as row,column during a block. Old records without a stated order use this order."""
     token = _ROWS_FIRST.set(True)
     try:
         yield
@@ -54,23 +54,23 @@ def put_rows_first() -> Iterator[None]:
 
 
 def has_rows_first() -> bool:
-    """Return whether places are read as row,column."""
+    """Return whether places are interpreted as row,column."""
     return _ROWS_FIRST.get()
 
 
 def turn(numbers: Sequence[float]) -> list[float]:
-    """Return (row, column) of x,y, or (plane, row, column) of x,y,z."""
+    """Reverse coordinates: x,y to (row, column), or x,y,z to (plane, row, column)."""
     return list(numbers) if has_rows_first() else list(reversed(numbers))
 
 
 def parse_box(text: str, about: About) -> list[float]:
-    """Return (row, column, height, width) of a box."""
+    """Convert a text to a box (row, column, height, width)."""
     numbers = _parse_finite(text, 4, about.option, "X,Y,WIDTH,HEIGHT, as in 92,96,50,50")
     return [*turn(numbers[:2]), *turn(numbers[2:])]
 
 
 def turn_centre(text: str) -> str:
-    """Return the words of a field with its centre as (row, column) or (plane, row, column)."""
+    """Return the words of a field with its centre converted to (row, column) or (plane, row, column)."""
 
     def swap(found: re.Match[str]) -> str:
         return found[1] + "x".join(reversed(re.split("[x×]", found[2])))
@@ -79,19 +79,19 @@ def turn_centre(text: str) -> str:
 
 
 def show_box(box: Sequence[float]) -> str:
-    """Return the text of a box (row, column, height, width) for an option."""
+    """Return the text that gives a box (row, column, height, width) on the command line."""
     row, column, height, width = box
     return f"{column},{row},{width},{height}"
 
 
 def parse_places(texts: Sequence[str], about: About) -> list[list[float]]:
-    """Return the points (row, column) of one text or of several."""
+    """Convert one or several texts to points (row, column)."""
     parts = [p for text in texts for p in re.split(r"[\s;]+", text.strip()) if p]
     return [turn(_parse_finite(p, 2, about.option, "X,Y, as in 125,60")) for p in parts]
 
 
 def parse_corners(text: str, about: About) -> list[list[float]]:
-    """Return four points (row, column)."""
+    """Convert a text to four points (row, column)."""
     points = parse_places([text], about)
     if len(points) != 4:
         raise InvalidInput(
@@ -108,7 +108,7 @@ def _parse_finite(text: str, count: int, option: str, wanted: str) -> list[float
 
 
 def read_points(path: str, about: About) -> list[list[float]]:
-    """Read points (row, column) from a file with two numbers a line. The first line may name them, such as ``x,y``."""
+    """Read points (row, column) from a file with two numbers per line. A header such as ``x,y`` is optional."""
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:
@@ -144,7 +144,7 @@ def read_points(path: str, about: About) -> list[list[float]]:
 
 
 def say_places(message: str) -> str:
-    """Return the text of an error with x first in places, as in options.
+    """Return an error text with places as on the command line: x first.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def say_places(message: str) -> str:
 
 
 def check_corners(corners: Sequence[Sequence[float]], size: Sequence[int]) -> None:
-    """Check that four corners (row, column) form a convex shape inside an image."""
+    """Check that four corners (row, column) form a convex quadrilateral inside an image."""
     points = np.asarray(corners, np.float64)
     said = " ".join(f"{column:g},{row:g}" for row, column in points)
     reason = _find_fault(points, size)
@@ -183,8 +183,8 @@ def check_corners(corners: Sequence[Sequence[float]], size: Sequence[int]) -> No
 
 
 def _find_fault(points: np.ndarray, size: Sequence[int]) -> str:
-    """Return the reason why four points are not the corners of a convex shape in an image, or nothing."""
-    # Corners are placed by hand, so they may be on the border itself.
+    """Return why four points cannot be the corners of a convex quadrilateral in an image, or an empty text."""
+    # Corners are placed by hand, so allow a pixel beyond the border.
     outside = ((points < -1) | (points > np.asarray(size[:2]))).any(axis=1)
     if outside.any():
         return f"{outside.sum()} of the four leave the image"

@@ -1,9 +1,9 @@
-"""Provenance: the record of a command, stored in each file that it writes, and checked before a file is replaced.
+"""Record how files were made: each output contains its command, which is checked before the file is replaced.
 
-The record contains everything that the result depends on. This is the version, the verb, its arguments, the options
-that are not the default, the seed, and the SHA-256 of every input file. Names are relative to the folder of the
-output, so that a folder can be moved with its files. Options without an effect on the result (threads, progress, names
-of outputs) and dates are left out. The same command therefore gives the same bytes.
+The record contains everything that the result depends on. This is the version, the command, its arguments, the options
+that are not the default, the seed, and the SHA-256 of every input file. File names are relative to the folder of the
+output, so that a folder can be moved as a whole. Options without an effect on the result (threads, progress, names of
+outputs) and dates are omitted. The same command therefore gives the same bytes.
 """
 
 from __future__ import annotations
@@ -49,43 +49,43 @@ LEFT = (
     "workers",
     "scheduler",
 )
-"""Parameters of commands without an effect on the result, and parameters that name outputs."""
+"""Parameters that are not recorded: those without an effect on the result, and names of outputs."""
 BRACES = re.compile(r"([^{}]*)\{([^{}/]*,[^{}/]*)\}([^{}/]*)")
-"""Names of several files of a folder."""
+"""Pattern of a text that names several files of a folder."""
 CHANGED = "changed while it was read"
-"""Marker in place of the SHA-256 of such a file."""
+"""Value in place of the SHA-256 of a file that changed while it was read."""
 
 
 @dataclass(slots=True)
 class Record:
-    """Record of a command."""
+    """Record of a command and its inputs."""
 
     verb: str
     arguments: list[str | None]
-    """None represents the output folder."""
+    """Arguments of the command. None represents the output folder."""
     options: dict[str, Any]
-    """Options by flag: a text, a list of texts, or True."""
+    """Options that are not the default: a text, a list of texts, or True."""
     seed: int | None
     files: dict[str, os.stat_result]
-    """Input files, as they were at the start."""
+    """Input files, with their status at the start."""
     places: dict[str, str]
-    """Absolute paths of the inputs and of the folder, because names may be resolved from another folder later."""
+    """Absolute paths of the inputs and of the folder, because the current folder can change during the work."""
     folder: str | None = None
-    """Folder that may contain inputs: a database."""
+    """Folder of a database, or another folder that can contain inputs."""
     stacks: tuple[str, ...] = ()
-    """Folders of maps. All their files are inputs."""
+    """Folders of maps whose files are all inputs."""
     placed: bool = False
-    """Whether the arguments contain places. The record then states their order."""
+    """Whether the arguments contain places, so that the record states the order of their coordinates."""
     force: bool = False
-    """Whether any file may be replaced."""
+    """Whether any existing file can be replaced."""
     original: Mapping[str, str] = field(default_factory=dict)
-    """Names of files at other paths, if a result is made again."""
+    """Recorded names of files that are read from other paths, if a result is made again."""
     checked: set[str] = field(default_factory=set)
-    """Outputs that have been checked."""
+    """Outputs that were checked before."""
     hashes: dict[str, str] = field(default_factory=dict)
 
     def find_hash(self, name: str) -> str:
-        """Return the SHA-256 of an input file."""
+        """Return the SHA-256 of an input file, or `CHANGED` if the file changed during the work."""
         if name not in self.hashes:
             # Hash lazily: a rejected command never needs the hash.
             place = self.places[name]
@@ -96,7 +96,7 @@ class Record:
         return self.hashes[name]
 
     def rename(self, text: Any, folder: str) -> Any:
-        """Return the name of a file relative to a folder. Other texts are returned unchanged."""
+        """Return a file name relative to a folder. Texts that are not inputs are returned unchanged."""
         if isinstance(text, list):
             return [self.rename(t, folder) for t in text]
         if not isinstance(text, str):
@@ -110,13 +110,13 @@ class Record:
         real = self.places[text]
         try:
             return Path(os.path.relpath(real, folder)).as_posix()
-        except ValueError:  # The file is on another drive of Windows.
+        except ValueError:  # The file is on another drive on Windows.
             return Path(real).as_posix()
 
     def tell(self, target: str, *, output: str = "out", inside: bool = False, suffix: str = "") -> str:
-        """Return the record of the file ``target`` as JSON.
+        """Return the record for an output file as JSON.
 
-        It contains the option that wrote the file, and whether the option names its folder.
+        It also states which option named the file, and whether the option named its folder.
         """
         folder = os.path.dirname(os.path.realpath(target))
         said: dict[str, Any] = {
@@ -135,12 +135,12 @@ class Record:
         if self.placed and not has_rows_first():
             said["places"] = "x,y"
         if suffix:
-            # Reports and maps may depend on the format of the result.
+            # Add the suffix, because reports and maps can depend on the format of the result.
             said["suffix"] = suffix
         return json.dumps(said)[:-1] + f", {BLANK}}}"
 
     def _find_used(self) -> set[str]:
-        """Return the file names in this record. A folder gives all files known to be read in it."""
+        """Return the names of the input files that the record mentions. A folder stands for the files read from it."""
         texts = [*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))]
         folders = {Path(f) for f in (self.folder, *(s for s in self.stacks if s in texts)) if f is not None}
         inside = {n for n in self.files if Path(n).parent in folders}
@@ -151,16 +151,16 @@ class Record:
 RUNNING: ContextVar[Record | None] = ContextVar("record", default=None)
 """Record of the running command."""
 ORIGINAL: ContextVar[Mapping[str, str] | None] = ContextVar("original", default=None)
-"""Names of input files that are read again from other paths."""
+"""Recorded names of input files that are read from other paths."""
 
 
 def as_flag(name: str) -> str:
-    """Return the option of a parameter: ``--source-map`` for ``source_map``."""
+    """Return the option of a parameter, such as ``--source-map`` for ``source_map``."""
     return "--" + name.replace("_", "-")
 
 
 def read_status(path: str) -> os.stat_result | None:
-    """Return the status of the regular file or Zarr store at a path, if there is one."""
+    """Return the status of a regular file or Zarr store. None if there is none at the path."""
     with suppress(OSError, ValueError):
         status = os.stat(path)
         if stat.S_ISREG(status.st_mode) or io.is_store(path):
@@ -169,7 +169,7 @@ def read_status(path: str) -> os.stat_result | None:
 
 
 def expand_braces(text: str) -> list[str]:
-    """Return the files in a name such as ``in/rock_{albedo,normal}.png``, or none for other names."""
+    """Return the files that a text such as ``in/rock_{albedo,normal}.png`` names. Empty for other texts."""
     found = BRACES.fullmatch(text)
     if not found or os.path.lexists(text):
         return []
@@ -177,7 +177,7 @@ def expand_braces(text: str) -> list[str]:
 
 
 def list_folder(name: str) -> list[str]:
-    """Return the files in a folder or in a name with braces, or none for other names."""
+    """Return the files in a folder, or those that a text with braces names. Empty for other texts."""
     if not name or "\0" in name or io.is_store(name):
         return []
     if not os.path.isdir(name):
@@ -186,11 +186,11 @@ def list_folder(name: str) -> list[str]:
 
 
 def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Record:
-    """Return the record of a command from the values of its parameters."""
+    """Return the record of a command with given values of its parameters."""
     arguments: list[str | None] = []
     options: dict[str, Any] = {}
     names: list[str] = []
-    # Options of a batch may contain places for any command.
+    # Options in a batch can contain places for any command.
     placed = command.name == "batch"
     for p in command.params:
         value = given.get(p.name)
@@ -207,17 +207,17 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
                 options[flag if value else max(p.secondary_opts, key=len)] = True
             else:
                 options[flag] = texts if isinstance(value, list | tuple) else texts[0]
-                # A word such as the x of --wrap is not a file, even if a file has this name.
+                # Options that do not name files, such as --wrap x, are not inputs even if a file has this name.
                 names += texts if re.search("FILE|csv", p.metavar or "") else []
     shared = any(given.get(name) is not None for name in ("workers", "scheduler"))
     if shared and given.get("origin", "") is None and given.get("chunks") is None:
-        # The scheduler does not change the result, but the use of an unbounded texture does.
+        # Record that the result is part of an unbounded texture, because this changes it. The scheduler does not.
         options["--origin"] = "0,0,0" if command.name == "solid" else "0,0"
     names = [split_tail(name)[0] for name in names]
     files = {name: status for name in names if (status := read_status(name)) is not None}
     stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
     said = [str(text).partition("=")[0] for text in given.get("role") or ()]
-    # Other files in a folder of maps do not count. A batch takes all images.
+    # Only maps of a material in a folder are inputs. A batch reads all images.
     every = command.name == "batch"
     inside = [f for name in stacks for f in (list_folder(name) if every else list_maps(name, said))]
     files |= {f: status for f in inside if (status := read_status(f)) is not None}
@@ -230,7 +230,7 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
 
 
 def list_maps(folder: str, said: Sequence[str]) -> list[str]:
-    """Return the files in a folder that are maps of its material: by name, by content, or by an option."""
+    """Return the files in a folder that are maps of its material, according to names, contents or the option --role."""
     parts = {f: split_suffix(os.path.basename(f)) for f in list_folder(folder)}
     stems = {f: stem for f, (stem, suffix) in parts.items() if suffix}
     known = {*said, *guess_roles(list(stems.values()))[0]}
@@ -243,7 +243,7 @@ def list_maps(folder: str, said: Sequence[str]) -> list[str]:
 
 @contextmanager
 def record(one: Record | None) -> Iterator[None]:
-    """Store this record in all files written in the block."""
+    """Use a record for all files that are written during a block."""
     token = RUNNING.set(one)
     try:
         yield
@@ -257,7 +257,7 @@ def narrow(
     seed: int | None = None,
     files: Sequence[str] | None = None,
 ) -> Record | None:
-    """Return the record of a part of the running command: with other arguments, and changed options (None: not given)."""
+    """Return the record of the running command with other arguments, and with changed options (None: removed)."""
     whole = RUNNING.get()
     if whole is None:
         return None
@@ -268,7 +268,7 @@ def narrow(
 
 
 def add_inputs(*names: str) -> None:
-    """Add files to the inputs in the records of later outputs."""
+    """Add files to the inputs of the running command. Files that are written later record them."""
     running = RUNNING.get()
     if running is not None:
         found = {name: status for name in names if (status := read_status(name)) is not None}
@@ -280,7 +280,7 @@ def add_inputs(*names: str) -> None:
 
 
 def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
-    """Check that writing a file loses nothing: an existing file must come from the same verb and the same arguments."""
+    """Check that a file can be replaced: an existing file must be from the same command with the same arguments."""
     running = RUNNING.get()
     if running is None or running.force:
         return
@@ -309,7 +309,7 @@ def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
 
 
 def _find_other(running: Record, path: str) -> str:
-    """Return why an existing file is not this command's own."""
+    """Return the reason why an existing file is not from the running command, or an empty text."""
     made = io.read_metadata(path).made
     if made is None:
         return "exists, and was not written by a texrs command"

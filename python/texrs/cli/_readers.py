@@ -1,4 +1,4 @@
-"""Readers of values in files, according to the option of the command line."""
+"""Read the values of options from files."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ VOLUMES = "a TIFF of several slices, .npy, .npz, .vti, NRRD, NIfTI or Zarr"
 
 
 MOST_CHANNELS = 4
-"""Maximum length of a third axis that is read as channels without a notice."""
+"""Maximum length of a third axis that is read as channels without reporting it."""
 
 
 def read_picture(text: str, *, finite: bool = True) -> Array:
-    """Read an image file, or make the built-in exemplar of ``sample:NAME``."""
+    """Read an image file, or generate the built-in example of ``sample:NAME``."""
     image: Array = samples.load(text.removeprefix(SAMPLE)).image if text.startswith(SAMPLE) else io.read(text)
     if finite:
         as_image(image, text)
@@ -45,7 +45,7 @@ def read_picture(text: str, *, finite: bool = True) -> Array:
 
 
 def match_alpha(image: Any, like: Array | None) -> Any:
-    """Add an opaque alpha channel to an image, or remove one, so that it matches another image."""
+    """Add an opaque alpha channel to an image, or remove its alpha channel, so that it matches another image."""
     if not isinstance(image, np.ndarray):
         return image
     colours = [1 if a.ndim == 2 else a.shape[2] for a in (image, image if like is None else like)]
@@ -73,19 +73,19 @@ def read_example(text: str, about: About, *, finite: bool = True, single: bool =
 
 
 def is_solid(sample: str) -> bool:
-    """Return whether a built-in example is a volume."""
+    """Return True if a built-in example is a volume."""
     return sample.endswith("solid") or sample in ("particles", "stripes")
 
 
 def find_image(path: str) -> tuple[int, ...] | None:
-    """Return the shape of an image, or None if a file is not an image."""
+    """Return the shape of an image file, or None if the file is not an image."""
     with suppress(FileError):
         return tuple(io.read(path).shape)
     return None
 
 
 def read_volume(text: str, *, finite: bool = True) -> Array:
-    """Read a volume, or make the built-in one of ``sample:NAME``."""
+    """Read a volume file, or generate the built-in volume of ``sample:NAME``."""
     if text.startswith(SAMPLE):
         volume: Array = samples.load(text.removeprefix(SAMPLE)).image
         if volume.ndim != 4:
@@ -105,21 +105,21 @@ def read_volume(text: str, *, finite: bool = True) -> Array:
 
 
 def read_array(path: str, axes: int) -> Array:
-    """Read an image or a volume with any values."""
+    """Read an image or a volume whose values can be of any kind."""
     array: Array = io.read_volume(path) if axes == 3 else io.read(path)
     return array
 
 
 def fit_volume(given: Array, path: str, about: About) -> Array:
-    """Return the values of a volume at the voxels of the result, if both have a spacing and the voxels differ.
+    """Resample a volume to the voxels of the result, if both have a voxel spacing and the spacings differ.
 
-    Both begin at the same corner. The nearest voxel is used, so that no value changes.
+    Both volumes begin at the same corner. The nearest voxel is used, so that values do not change.
     """
     stated = read_stated_spacing(path) if about.axes == 3 and about.spacing is not None and about.size else None
     if stated is None or about.spacing is None or given.shape[:3] == about.size or np.allclose(stated, about.spacing):
         return given
     for axis, (side, mine, theirs) in enumerate(zip(about.size, about.spacing, stated, strict=True)):
-        # Rounding loses less than a voxel.
+        # Allow a difference in extent of less than a voxel, which rounding can cause.
         if abs(side * mine - given.shape[axis] * theirs) > max(mine, theirs):
             spans = [
                 show_extent(each)
@@ -133,24 +133,24 @@ def fit_volume(given: Array, path: str, about: About) -> Array:
 
 
 def show_extent(sides: Iterable[tuple[int, float]]) -> str:
-    """Return the extent of the voxels along x, y and z."""
+    """Return a text with the extent of the voxels along x, y and z, in units of the spacing."""
     return " x ".join(f"{count * step:g}" for count, step in reversed(list(sides)))
 
 
 def read_values(path: str, about: About) -> Array:
-    """Read values like those of the exemplar. A file of one channel may have a channel axis or not."""
+    """Read values of the same kind as the exemplar. A single channel can have an axis or not."""
     given = fit_volume(read_array(path, about.axes), path, about)
     return given[..., np.newaxis] if about.like is not None and given.ndim < about.like.ndim else given
 
 
 def read_numbers(path: str, about: About) -> Array:
-    """Read a number for each point, the mean of several channels."""
+    """Read a number for each point. Several channels are averaged."""
     given = fit_volume(read_array(path, about.axes), path, about)
     return given if given.ndim == about.axes else np.asarray(given.mean(axis=-1))
 
 
 def read_density(text: str, about: About) -> Any:
-    """Read numbers, or shares from an image: the full range of an integer is 0 to 1."""
+    """Read numbers from an array, or shares from an image, where the range of an integer dtype becomes 0 to 1."""
     if re.fullmatch(r"[-+.:0-9eE]+", text.strip()):
         return parse_numbers(text, about.option, "numbers such as 0.3 or 0.3:0.1, or a file")
     given = np.asarray(read_array(text, about.axes))
@@ -159,7 +159,7 @@ def read_density(text: str, about: About) -> Any:
 
 
 def read_mask(path: str, axes: int = 2) -> Array:
-    """Read a mask of any size, according to `texrs.Mask` and the words after its name, and report the marked share."""
+    """Read a mask according to `texrs.Mask` and the words after its name. Report the marked share."""
     mask = make_mask(path)
     path = name_file(mask.marks)
     marked = mark(mask, path, ("planes", "rows", "columns")[3 - axes :])
@@ -170,14 +170,14 @@ def read_mask(path: str, axes: int = 2) -> Array:
 
 
 def name_file(path: str) -> str:
-    """Return the name of a file that is read later, if there is one."""
+    """Return the name of a file that the function reads later. None if it is not given."""
     if not io.is_store(path):
         check_file(Path(path))
     return path
 
 
 def read_hole(text: str, about: About) -> Any:
-    """Return a number, or the name of a file."""
+    """Return a number, or the name of a file as text."""
     return float(text) if is_number(text) else name_file(text)
 
 
@@ -191,7 +191,7 @@ def is_number(text: str) -> bool:
 
 
 def read_scale_map(path: str, encoding: str = "log2") -> Floats:
-    """Read a scale map, with its kind if the file states it. Floats are scales, and grey levels are decoded."""
+    """Read a scale map, with its kind if the file states it. Floats are scales, and grey levels are decoded to scales."""
     from texrs import scale_maps
     from texrs.scale_maps._kinds import keep_kind, parse_kind
 
@@ -209,9 +209,9 @@ def read_scale_map(path: str, encoding: str = "log2") -> Floats:
 
 
 def read_target(text: str) -> Any:
-    """Read the target of an output: a scale map, normals, texture coordinates, or Jacobians.
+    """Read the target of an output: a scale map, normals, texture coordinates or Jacobians.
 
-    The words of a plane stay text.
+    Words that describe a plane are returned unchanged.
     """
     if text.lower().startswith(PLANE):
         return text
@@ -220,7 +220,7 @@ def read_target(text: str) -> Any:
     except FileError:
         if Path(text).suffix.lower() not in (".npy", ".npz"):
             raise
-        # Jacobians have four axes.
+        # Read four axes as Jacobians.
         return io.read_volume(text)
     if values.ndim == 3 and values.shape[2] == 2:
         return values
@@ -233,7 +233,7 @@ def read_target(text: str) -> Any:
 
 
 def read_field(text: str, about: About) -> Any:
-    """Return a field from words, or from frames or directions in a file, over an output of a size."""
+    """Return a field for an output of a given size, from words, or from frames or directions in a file."""
     from texrs import fields
 
     with name_arguments(field=about.option or "--field"):
@@ -242,12 +242,12 @@ def read_field(text: str, about: About) -> Any:
 
 
 def read_stated_spacing(text: str | None) -> tuple[float, float, float] | None:
-    """Return the voxel spacing of a file if the file states it."""
+    """Return the voxel spacing of a file, or None if the file does not state it."""
     return None if text is None or text.startswith(SAMPLE) else io.read_spacing(text)
 
 
 def read_direction(text: str, about: About) -> Any:
-    """Read degrees (a number or an image of numbers), or a field: its words, or frames in a file."""
+    """Read angles in degrees (a number or an image of numbers), or a field from words or from frames in a file."""
     try:
         return float(text)
     except ValueError:
@@ -257,16 +257,16 @@ def read_direction(text: str, about: About) -> Any:
 
 
 def read_entry(text: str, about: About, *, single: bool = True) -> Any:
-    """Read analysed elements, or an image, which the verb analyses."""
+    """Read an analysis of elements, or an image, which the command will analyse."""
     from texrs import elements
 
     return elements.load(text) if text.lower().endswith(".npz") else read_example(text, about, single=single)
 
 
 def read_layout(text: str, about: About) -> Any:
-    """Read analysed elements or an image, as `read_entry` does, or make a layout from JSON.
+    """Read an analysis or an image like `read_entry`, or create a layout from JSON.
 
-    Its labels may be an image.
+    The labels in the JSON can be the name of an image.
     """
     if not text.lower().endswith(".json") and not text.lstrip().startswith("{"):
         return read_entry(text, about)

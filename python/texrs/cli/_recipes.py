@@ -1,4 +1,4 @@
-"""Recipes of a batch, their contents, and their commands."""
+"""Read the recipe of a batch, and list its commands."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ __all__ = [
 
 KEPT = tuple(s for s in WRITTEN_IMAGES if s not in (".gif", ".npz"))
 KEPT_VOLUMES = tuple(s for s in WRITTEN_VOLUMES if s != ".npz")
-"""Formats of inputs that results keep. Other results are .png or .npy."""
+"""Formats that results have in common with their inputs. Inputs of other formats give .png or .npy."""
 LOSSY = (".jpg", ".jpeg", ".webp", ".avif", ".jxl")
 EXACT = ("scale-map",)
-"""Commands whose results are measurements, which a lossy format must not change."""
+"""Commands whose results are measurements. Their results are not written in lossy formats."""
 NAMED = (*READ_IMAGES, *READ_VOLUMES, ".csv", ".json", ".npz")
-"""Suffixes of arguments that are file names."""
+"""Suffixes of arguments that are names of files."""
 KEYS = ("verb", "inputs", "arguments", "out", "seeds", "options", "presets", "sheet")
-"""Keys of a recipe."""
+"""Keys that a recipe can have."""
 MOST = 2**16
-"""Maximum number of results of a batch."""
+"""Maximum number of jobs of a batch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Recipe:
     inputs: list[str]
     """Files, folders, patterns, or ``sample:NAME``."""
     arguments: list[str]
-    """Arguments of the verb. ``{input}`` is one of the inputs."""
+    """Arguments of the command. ``{input}`` stands for an input."""
     out: str
     seeds: list[int]
     options: dict[str, Any]
@@ -64,20 +64,20 @@ class Recipe:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A command of the batch."""
+    """One command of a batch."""
 
     source: str
     out: str
     words: list[str]
     maps: int = 0
-    """Number of maps of its material; 0 for a file."""
+    """Number of maps of the material. 0 for a file."""
 
 
 def read_recipe(path: str) -> dict[str, Any]:
-    """Return the contents of a recipe."""
+    """Read the recipe in a TOML file as a table."""
     try:
         content = Path(path).read_bytes()
-        # Windows editors put a byte order mark before the text, and some write UTF-16.
+        # Windows editors can write a byte order mark or UTF-16.
         wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         return tomllib.loads(content.decode("utf-16" if wide else "utf-8-sig"))
     except OSError as error:
@@ -87,7 +87,7 @@ def read_recipe(path: str) -> dict[str, Any]:
 
 
 def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
-    """Return a recipe after checking the types of its parts."""
+    """Check the types in the table of a recipe, and return the recipe."""
     for key in said:
         if key not in KEYS:
             raise InvalidInput(f"{where}: unknown key {key!r}; must be one of {', '.join(KEYS)}")
@@ -120,7 +120,7 @@ def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
 
 
 def place_input(arguments: list[str]) -> list[str]:
-    """Return the arguments of a command. The input is the first, unless another one is or contains it."""
+    """Return the arguments of the command. The input is the first one, unless an argument contains ``{input}``."""
     return arguments if any("{input}" in text for text in arguments) else ["{input}", *arguments]
 
 
@@ -133,7 +133,7 @@ def as_texts(value: Any, where: str) -> list[str]:
 
 
 def parse_seeds(value: Any, where: str) -> list[int]:
-    """Return the numbers of ``0:32``, of ``1,5,9``, of a number or of a list of numbers."""
+    """Return the seeds that ``0:32``, ``1,5,9``, a number or a list of numbers describes."""
     wanted = f"{where}: must be A:B as in 0:32, numbers as in 1,5,9, or a list of them; got {value!r}"
     if isinstance(value, str):
         found = re.fullmatch(r"\s*(\d{1,20})\s*:\s*(\d{1,20})\s*", value)
@@ -152,12 +152,12 @@ def parse_seeds(value: Any, where: str) -> list[int]:
 
 
 def parse_options(texts: Sequence[str]) -> dict[str, Any]:
-    """Return the options in texts such as ``size=512``. A name without a value sets a flag."""
+    """Return the options in texts such as ``size=512``. A name without a value is a flag."""
     return {(parts := text.partition("="))[0].lstrip("-"): parts[2] if parts[1] else True for text in texts}
 
 
 def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
-    """Return the commands, one for each input, preset and seed."""
+    """Return the commands of a batch: one for each input, preset and seed."""
     base = recipe.out.partition("{")[0]
     every: dict[Source, list[Job]] = {}
     for source in find_sources(
@@ -168,7 +168,7 @@ def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
         out=base if base == recipe.out and not Path(base).suffix else os.path.dirname(base),
     ):
         every[source] = list(expand(recipe, source))
-    # Results of an earlier run are not inputs, even if the input patterns match them.
+    # Exclude results of an earlier run from the inputs, even if a pattern matches them.
     flags = {flag for names, _, _ in OUTPUTS.values() for flag in names}
     made: dict[str, Source] = {}
     for source, jobs in every.items():
@@ -197,7 +197,7 @@ def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
 
 
 def list_files(recipe: Recipe, parameters: Sequence[Any]) -> list[str]:
-    """Return the options that name a file to read, as the recipe has them."""
+    """Return the options of a recipe that name a file to read, with the names as written there."""
     read = {max(p.opts, key=len) for p in parameters if names_file(p)}
     several = {**recipe.options, **{k: v for each in recipe.presets.values() for k, v in each.items()}}
     given = [(f"--{key.replace('_', '-')}", value) for key, value in several.items()]
@@ -205,14 +205,14 @@ def list_files(recipe: Recipe, parameters: Sequence[Any]) -> list[str]:
 
 
 def names_file(parameter: Any) -> bool:
-    """Return whether an option or an argument of a command may name an input file."""
+    """Return whether an option or an argument of a command can name an input file."""
     if parameter.param_type_name == "argument":
         return True
     return parameter.name not in OUTPUTS and re.search("FILE|csv", parameter.metavar or "") is not None
 
 
 def check_files(jobs: Sequence[tuple[Job, Any]], parameters: Sequence[Any]) -> None:
-    """Check that all other input files of the jobs exist. Name all missing ones."""
+    """Check that all other files that jobs read exist. An error names all missing files."""
     missing = {}
     for job, context in jobs:
         for p in parameters:
@@ -231,7 +231,7 @@ def check_files(jobs: Sequence[tuple[Job, Any]], parameters: Sequence[Any]) -> N
 
 
 def place_arguments(recipe: Recipe, parameters: Sequence[Any]) -> Recipe:
-    """Return a recipe with options as arguments if the command has them so, such as ``mask`` of inpaint."""
+    """Return a recipe whose options are moved to arguments if they are arguments of the command, such as ``mask``."""
     options, arguments = dict(recipe.options), list(recipe.arguments)
     flags = {flag.lstrip("-") for p in parameters for flag in p.opts if p.param_type_name == "option"}
     for place, p in enumerate(q for q in parameters if q.param_type_name == "argument"):
@@ -261,9 +261,9 @@ def expand(recipe: Recipe, source: Source) -> Iterator[Job]:
 
 
 def choose_suffix(verb: str, source: Source) -> str:
-    """Return the suffix of a result: the suffix of the input, if the result can be written in this format."""
+    """Return the suffix of a result. It is the suffix of the input if results can be written in this format."""
     if source.maps:
-        # The maps of a material are written to their own folder.
+        # A material is written to a folder, whose name has no suffix.
         return ""
     suffix = source.suffix.lower()
     if verb == "analyse":
@@ -273,7 +273,7 @@ def choose_suffix(verb: str, source: Source) -> str:
 
 
 def check_results(jobs: Sequence[Job]) -> None:
-    """Check that no result replaces an input."""
+    """Check that no result of a batch replaces an input."""
     files = {file: None for job in jobs for file in (expand_braces(job.source) or [job.source])}
     read = {(s.st_dev, s.st_ino): file for file in files if (s := read_status(file)) is not None}
     for job in jobs:
@@ -283,7 +283,7 @@ def check_results(jobs: Sequence[Job]) -> None:
 
 
 def write_option(key: str, value: Any, known: Mapping[str, str]) -> list[str]:
-    """Return an option as the command line takes it."""
+    """Return the command-line arguments for an option and its value."""
     flag = key.replace("_", "-")
     if isinstance(value, bool):
         return [f"--{'' if value else 'no-'}{flag}"]

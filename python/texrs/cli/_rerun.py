@@ -36,34 +36,34 @@ from texrs.materials import Map, Material
 from texrs.source_map import SourceMap
 
 PLACED_FLAGS = {"--at", "--background", "--box", "--corners", "--oblique", "--points"}
-"""Options that took row,column before records stated an order."""
+"""Options whose places were row,column before records stated the order."""
 SHORT = 16
-"""Number of displayed digits of a SHA-256."""
+"""Number of digits of a SHA-256 that are displayed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """Record in a file of how it was made."""
+    """Record, in a file, of the command that wrote it."""
 
     path: str
     text: str
-    """The JSON."""
+    """The record as JSON text."""
     version: str
     verb: str
     arguments: list[str | None]
     options: dict[str, Any]
     inputs: dict[str, str]
-    """SHA-256 by name, relative to the folder of the file."""
+    """SHA-256 of each input, by its name relative to the folder of the file."""
     output: str
     file: str | None
-    """Name within the output folder, if the output is a folder."""
+    """Name of the file within the output folder, if the output is a folder."""
     suffix: str
     rows_first: bool
-    """Whether its places are row,column: the record does not state x,y."""
+    """Whether places in the record are row,column, because it does not state x,y."""
 
     @classmethod
     def read(cls, path: str) -> Recipe | None:
-        """Return the record in a file, or None."""
+        """Read the record in a file. None if there is none."""
         text = io.read_metadata(path).made
         if text is None:
             return None
@@ -89,7 +89,7 @@ class Recipe:
         return one
 
     def make_command(self, names: Mapping[str, str], folder: str) -> list[str]:
-        """Return the command that makes the file in a folder, with the present names of its inputs."""
+        """Return the command that writes the file to another folder, from the present paths of its inputs."""
         target = folder if self.file is not None else os.path.join(folder, os.path.basename(self.path))
 
         def find(text: str) -> str:
@@ -103,12 +103,12 @@ class Recipe:
         if None in self.arguments:
             return words
         if self.output not in ("--out", "--sheet"):
-            # The command also writes its result.
+            # Give the result a name as well, because the command always writes it.
             words += ["--out", os.path.join(folder, f"result{self.suffix or '.npz'}")]
         return [*words, self.output, target]
 
     def show(self) -> str:
-        """Return the command as typed in a shell."""
+        """Return the command as a user would type it in a shell."""
         words = ["texrs", self.verb, *("FOLDER" if a is None else a for a in self.arguments)]
         for flag, value in self.options.items():
             for text in value if isinstance(value, list) else [value]:
@@ -116,11 +116,11 @@ class Recipe:
         return shlex.join(words)
 
     def find_inputs(self) -> dict[str, str]:
-        """Return the present path of each input file. Report all missing or changed ones."""
+        """Return the present path of each input file. An error lists all missing or changed files."""
         folder = os.path.dirname(os.path.realpath(self.path))
         found, wrong = {}, []
         for name, sha in self.inputs.items():
-            # Search relative to the result, relative to the current folder, and next to the result.
+            # Search in the folder of the result, in the current folder, and next to the result.
             places = (os.path.join(folder, name), name, os.path.join(folder, os.path.basename(name)))
             there = [os.path.normpath(p) for p in places if os.path.isfile(p) or io.is_store(p)]
             same = next((p for p in there if hash_file(p) == sha), None)
@@ -136,7 +136,7 @@ class Recipe:
         if wrong:
             raise InvalidInput(f"{self.path}: cannot be made again: {'; '.join(wrong)}")
         for text in (*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))):
-            # All files of a folder of maps are recorded.
+            # A record names all files of a folder of maps.
             inside = [found[name] for name in self.inputs if isinstance(text, str) and os.path.dirname(name) == text]
             if inside and text not in found:
                 found[str(text)] = os.path.dirname(inside[0])
@@ -191,7 +191,7 @@ def rerun_command(
 
 
 def read_recipes(output: str) -> list[Recipe]:
-    """Return the record of a file, or of each file of a folder, which one command wrote."""
+    """Return the record of a file, or the records of the files in a folder that one command wrote."""
     if not os.path.isdir(output):
         recipe = Recipe.read(output)
         if recipe is None:
@@ -199,7 +199,7 @@ def read_recipes(output: str) -> list[Recipe]:
             raise InvalidInput(f"{output}: has no record of how it was made" if there else f"{output}: does not exist")
         return [recipe]
     inside = {entry.path for entry in os.scandir(output) if entry.is_file()}
-    # The record of another file is not a file of its own.
+    # Ignore a file that only contains the record of another file.
     files = sorted(file for file in inside if not (file.endswith(".json") and file.removesuffix(".json") in inside))
     known = [recipe for file in files if (recipe := Recipe.read(file)) is not None and recipe.file is not None]
     if not known:
@@ -210,7 +210,7 @@ def read_recipes(output: str) -> list[Recipe]:
 
 
 def check_same(path: str, recipe: Recipe) -> None:
-    """Check that writing a file to ``path`` loses nothing."""
+    """Check that writing to ``path`` does not replace another file."""
     if os.path.lexists(path) and not (os.path.isfile(path) and os.path.getsize(path) == 0):
         made = io.read_metadata(path).made if os.path.isfile(path) else None
         if made is None or json.loads(made) != json.loads(recipe.text) or not is_unchanged(path, made):
@@ -218,7 +218,7 @@ def check_same(path: str, recipe: Recipe) -> None:
 
 
 def compare(recipe: Recipe, made: str) -> None:
-    """Report whether the new file equals the existing one."""
+    """Print whether the new file equals the existing one."""
     now, then = hash_file(made), hash_file(recipe.path)
     again = io.read_metadata(made).made
     if now == then and again is not None and json.loads(again) == json.loads(recipe.text):
@@ -271,7 +271,7 @@ def info_command(
 
 
 def describe_file(file: str, recipe: Recipe | None) -> list[str]:
-    """Return lines about the contents of any file."""
+    """Return lines that describe the contents of a file of any kind."""
     if not os.path.isfile(file):
         io.read(file)
     suffix = Path(file).suffix.lower()
@@ -309,7 +309,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
 
 
 def describe_folder(folder: str) -> list[str]:
-    """Return lines about the maps of a folder, or about the volume in its slices."""
+    """Return lines that describe the maps in a folder, or the volume in its slices."""
     try:
         return describe_material(folder, "map")
     except FileError as error:
@@ -321,27 +321,27 @@ def describe_folder(folder: str) -> list[str]:
 
 
 def describe_volume(path: str, volume: Array) -> str:
-    """Return a line about a volume: its sides, its values and its stated spacing."""
+    """Return a line that describes a volume: its sides, its values and its stated spacing."""
     spacing = io.read_spacing(path)
     steps = "" if spacing is None else f", voxels of {' x '.join(f'{s:g}' for s in reversed(spacing))}"
     return f"volume: {describe(volume, 3)}, {volume.min()} to {volume.max()}{steps}"
 
 
 def describe_store(path: str) -> str:
-    """Return a line about the array of a Zarr store, with sides from planes to columns."""
+    """Return a line that describes the array of a Zarr store, with its sides in array order."""
     array, _ = io.read_vectors(path)
     return f"store: {' x '.join(map(str, array.shape))} of {array.dtype}, {array.min()} to {array.max()}"
 
 
 def describe_material(path: str, what: str) -> list[str]:
-    """Return lines about the maps of a folder or the layers of a file. Notices name all other files."""
+    """Return lines that describe the maps of a folder or the layers of a file. Notices name the unused files."""
     shown = Material.read(path)
     first = f"material: {show_sides(shown.shape)}, {len(shown)} {what}{'s'[: len(shown) != 1]}"
     return [first, *(describe_layer(name, each) for name, each in shown.items())]
 
 
 def describe_scene(file: str) -> str:
-    """Return a line about a binary glTF file."""
+    """Return a line that describes a binary glTF file."""
     content = Path(file).read_bytes()
     length = int.from_bytes(content[12:16], "little")
     try:
@@ -356,7 +356,7 @@ def describe_scene(file: str) -> str:
 
 
 def describe_document(file: str) -> str:
-    """Return a line about a MaterialX document."""
+    """Return a line that describes a MaterialX document."""
     try:
         root = ElementTree.fromstring(Path(file).read_bytes())
     except ElementTree.ParseError:
@@ -366,7 +366,7 @@ def describe_document(file: str) -> str:
 
 
 def describe_layer(name: str, each: Map) -> str:
-    """Return the name, the role, the encoding and the samples of a map."""
+    """Return a text with the name, role, encoding and samples of a map."""
     space = "sRGB" if each.space == "srgb" else each.space
     return (
         f"{name}: {each.role.value}, {space}, {each.channels} channel{'s'[: each.channels != 1]}, {each.pixels.dtype}"
@@ -374,7 +374,7 @@ def describe_layer(name: str, each: Map) -> str:
 
 
 def describe_map(file: str) -> list[str]:
-    """Return lines about a source map."""
+    """Return lines that describe a source map."""
     places = SourceMap.load(file)
     reuse = places.reuse()
     shapes = " and ".join(show_sides(shape) for shape in places.shapes)
@@ -387,7 +387,7 @@ def describe_map(file: str) -> list[str]:
 
 
 def describe_elements(file: str) -> list[str]:
-    """Return lines about analysed elements."""
+    """Return lines that describe an analysis of elements."""
     from texrs import elements
 
     entry = elements.load(file)
@@ -395,7 +395,7 @@ def describe_elements(file: str) -> list[str]:
 
 
 def describe_arrays(file: str) -> list[str]:
-    """Return a line for each array. A single one with two or three axes is described as an image."""
+    """Return one line for each array of a file. A single array with two or three axes is described as an image."""
     arrays = io.read_headers(file)
     if len(arrays) == 1 or "image" in arrays:
         raise FileError(f"{file}: contains only one array")

@@ -1,4 +1,4 @@
-"""The command that makes scale maps: ``texrs scale-map``."""
+"""The command that writes scale maps: ``texrs scale-map``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from texrs.errors import InvalidInput
 from texrs.scale_maps._kinds import describe_kind, find_kind
 
 FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
-"""Formats that store scales as floats. 8-bit images store them encoded."""
+"""Formats that store scales as floats. Images of 8 bits store scales encoded as grey levels."""
 ANGLES = Options(scale_maps.from_angles, only=("slant", "tilt", "fov"), optional={"slant": "", "tilt": "90"})
 MASKS = Options(scale_maps.from_mask, only=("measure", "window", "trend", "foreshortened"))
 FOUND = Options(scale_maps.auto_mask, only=("min_feature_size",))
@@ -126,13 +126,13 @@ def scale_map_command(
 
 
 def find_fov(image: str) -> dict[str, float]:
-    """Return the angle of view in the metadata of a photograph, as an argument."""
+    """Return the angle of view in a photograph's metadata, as an argument of the function. Empty without metadata."""
     fov = None if image.startswith(_outputs.SAMPLE) else io.read_fov(image)
     return {} if fov is None else {"fov": fov}
 
 
 def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
-    """Return the mask if it has the size of the image."""
+    """Check that a mask has the size of the image, and return it."""
     if mask.shape[:2] != pixels.shape[:2]:
         sizes = (_outputs.show_sides(a.shape[:2]) for a in (pixels, mask))
         raise InvalidInput("{}: must have the size of the image, {}; got {}".format(option, *sizes))
@@ -140,7 +140,7 @@ def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
 
 
 def save(shown: dict[str, Array], report: dict[str, Any], folder: Path) -> None:
-    """Write the images of the stages, and a report."""
+    """Write the images of the stages and the report."""
     for number, (name, picture) in enumerate(shown.items(), start=1):
         io.write(os.path.join(folder, f"{number:02d}-{name}.png"), preview(picture))
     with io.atomic(os.path.join(folder, "report.json")) as temporary:

@@ -31,11 +31,11 @@ from texrs.volume.rendering import as_steps, check_cube, check_turntable
 from texrs.volume.transparent import check_transfer, parse_transfer
 
 _AXES = {"plane": 0, "row": 1, "column": 2, "z": 0, "y": 1, "x": 2}
-"""Names of axes: of arrays, and of places."""
+"""Names of axes, as array axes and as coordinates, and the index of each."""
 
 
 def parse_at(text: str, about: About) -> tuple[int, int] | list[float]:
-    """Return an axis and a position of ``z=30``, or (plane, row, column) of ``10,20,30``."""
+    """Convert ``z=30`` to an axis and a position, or ``10,20,30`` to (plane, row, column)."""
     axis, equals, number = (p.strip() for p in text.partition("="))
     try:
         if equals and axis in _AXES:
@@ -50,7 +50,7 @@ def parse_at(text: str, about: About) -> tuple[int, int] | list[float]:
 
 
 def parse_oblique(text: str, about: About) -> tuple[list[float] | None, list[float]]:
-    """Return a point and a direction (plane, row, column) of ``10,20,30/0,1,1``."""
+    """Convert ``10,20,30/0,1,1`` to a point and a direction, each (plane, row, column)."""
     point, slash, normal = text.partition("/")
     wanted = "X,Y,Z/X,Y,Z, a point and a normal such as 10,20,30/0,1,1, or /0,1,1"
     if not slash:
@@ -185,7 +185,7 @@ def slice_command(
 
 
 def check_view(used: Options, options: dict[str, Any]) -> None:
-    """Check the requested view before the volume is read, which may take long."""
+    """Check the requested view before the volume is read, which can take long."""
     asked = {name: value for name, value in options.items() if name != "interpolation"}
     if used is BLOCK:
         check_cube(**asked)
@@ -202,7 +202,7 @@ def check_view(used: Options, options: dict[str, Any]) -> None:
 
 
 def place_in_cubes(options: dict[str, Any], length: Sequence[int], sides: Sequence[int]) -> None:
-    """Convert places among voxels to places among cubes."""
+    """Convert places in voxels to places in cubic voxels."""
     place = options.get("at")
     if isinstance(place, tuple):
         axis, number = place
@@ -216,7 +216,7 @@ def place_in_cubes(options: dict[str, Any], length: Sequence[int], sides: Sequen
 
 
 def draw(voxels: Array, used: Options, options: dict[str, Any]) -> Array:
-    """Return the requested image."""
+    """Return the image of the requested view."""
     if used is BLOCK:
         return render_block(voxels, **options)
     if used is CLEAR:

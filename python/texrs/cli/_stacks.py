@@ -1,4 +1,4 @@
-"""Materials on the command line: folders of maps, or layers of an EXR file, read and written as a whole."""
+"""Read and write materials, as folders of maps or as layers of an EXR file."""
 
 from __future__ import annotations
 
@@ -80,12 +80,12 @@ OPTIONS: dict[str, Any] = {
         "those of the input",
     ),
 }
-"""Options for reading and writing materials."""
+"""Options for reading and writing materials, by parameter."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """Description of how materials are read and written."""
+    """Options for reading and writing a material."""
 
     roles: Mapping[str, str]
     depth: int | None
@@ -95,7 +95,7 @@ class Stack:
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Stack:
-        """Take the options out of the arguments of a command, and check them."""
+        """Remove these options from the arguments of a command, and check them."""
         roles, depth, suffix, pack, convention = (given.pop(name, None) for name in OPTIONS)
         said = read_roles(roles)
         if depth not in (None, *DEPTHS):
@@ -111,7 +111,7 @@ class Stack:
         return cls(said, depth, None if suffix is None else f".{suffix}", pack, convention)
 
     def list_writing(self) -> dict[str, object]:
-        """Return the values of all options that change how a material is written."""
+        """Return the options that change how a material is written, with their values."""
         return {
             "--depth": self.depth,
             "--format": self.suffix,
@@ -120,7 +120,7 @@ class Stack:
         }
 
     def refuse(self, paths: Mapping[str, str | None]) -> None:
-        """Refuse options that only a material can have."""
+        """Raise an error if options are given that only apply to materials."""
         given = {"--role": self.roles, **self.list_writing()}
         given |= {f"--{name}": paths.get(name) for name in SHOWN}
         for flag, value in given.items():
@@ -130,7 +130,7 @@ class Stack:
                 )
 
     def check_outputs(self, material: Material, paths: Mapping[str, str | None], read: Sequence[str]) -> None:
-        """Check before the work that all files can be written, and replace neither inputs nor other files."""
+        """Check before the work that all files can be written, and that they replace neither inputs nor other files."""
         out = paths["out"] or ""
         if Path(out).suffix.lower() == LAYERED:
             if self.suffix or self.depth or self.pack or self.convention:
@@ -140,7 +140,7 @@ class Stack:
                 )
             _outputs.check_output(out)
             return
-        # `texrs rerun` passes a name with .npz for results that it does not need.
+        # `texrs rerun` passes a name with .npz for results that are not needed.
         if split_suffix(out)[1] not in ("", ".npz") and not os.path.isdir(out):
             raise InvalidInput(f"--out: must be a folder or one {LAYERED} file for the maps of a material, got {out!r}")
         _outputs.check_folder(out)
@@ -151,20 +151,20 @@ class Stack:
             file = f"{each.file or name}{self.suffix or choose_suffix(each, self.depth, material.axes)}"
             _outputs.check_apart(read, {"out": os.path.join(out, file)})
             check_free(os.path.join(out, file))
-            # Try to write next to the existing files, in the folder or where it will be created.
+            # Try to write in the folder, or in the folder where it will be created.
             _outputs.check_output(
                 str(there / f".texrs-{file}"), convert(name, each, self.depth, material.axes).pixels, material.shape
             )
 
     def save(self, material: Material, folder: Path, *, mipmaps: bool = False) -> list[Path]:
-        """Write the maps to a folder, also at half sizes if requested."""
+        """Write the maps to a folder. If ``mipmaps``, also write them at half sizes."""
         depth: Any = self.depth
         pack: Any = self.pack
         how = {"pack": pack, "convention": self.convention, "mipmaps": mipmaps}
         return material.save(folder, depth=depth, suffix=self.suffix, **how)
 
     def save_smaller(self, material: Material, folder: Path) -> None:
-        """Write only the maps at half sizes."""
+        """Write only the smaller versions of the maps, each half as large as the previous one."""
         for file in self.save(material, folder, mipmaps=True):
             if file.parent == folder:
                 file.unlink()
@@ -181,10 +181,10 @@ class Stack:
         made: _provenance.Record | None = None,
         option: str = "out",
     ) -> None:
-        """Write the maps, and the additional outputs."""
+        """Write the maps of a result, and its additional outputs."""
         material, out = result.material, paths["out"] or ""
         assert material is not None
-        # A folder is replaced as a whole.
+        # Write the other outputs first, because the files of the folder replace existing ones together.
         _outputs.deliver_beside(result, paths, Path(out).suffix or "/", made)
         if Path(out).suffix.lower() == LAYERED:
             with _outputs.write_output(out, option, inside=option != "out", made=made) as place:
@@ -196,7 +196,7 @@ class Stack:
             with _outputs.write_output(shown, "preview", made=made) as place:
                 io.write(place, material.preview())
         if (solid := paths.get("gltf")) is not None:
-            # The material in the file has the name of the file, not its temporary name.
+            # Name the material in the file after the final file, not after the temporary one.
             with _outputs.write_output(solid, "gltf", made=made) as place, TemporaryDirectory() as beside:
                 material.save_gltf(file := Path(beside, Path(solid).name))
                 shutil.copyfile(file, place)
@@ -209,7 +209,7 @@ class Stack:
 
 
 def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
-    """Return the given roles of maps."""
+    """Convert texts such as NAME=ROLE to the roles of maps, by name."""
     said = {}
     for text in texts or ():
         name, equals, role = text.partition("=")
@@ -220,7 +220,7 @@ def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
 
 
 def is_stack(text: str) -> bool:
-    """Return whether a name is a folder, several files, or an EXR file of several layers."""
+    """Return True if a text names a material: a folder, several files, or an EXR file with layers."""
     if os.path.isdir(text):
         return not io.is_store(text)
     if expand_braces(text):
@@ -228,7 +228,7 @@ def is_stack(text: str) -> bool:
     if Path(text).suffix.lower() != LAYERED or not os.path.isfile(text):
         return False
     with suppress(Exception):
-        # Names of channels in layers begin with the name of the layer.
+        # Channels of layers have names such as layer.R, with a dot.
         if any("." in name for name in list_channels(Path(text))):
             return True
     with suppress(FileError), collect(show=lambda line: None):

@@ -1,4 +1,4 @@
-"""Words after a file name: the size and type of samples without a header, or the reading of a mask."""
+"""Split the words after a file name from it: size and type of raw samples, or options for reading a mask."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ __all__ = ["make_mask", "split_tail"]
 
 WORD = r"(?:invert|threshold=[^,:]+|grow=[^,:]+)"
 MASKED = re.compile(rf"(?P<path>.+):(?P<words>{WORD}(?:,{WORD})*)")
-"""Form of a mask with reading options, such as ``mask.png:invert,grow=3``."""
+"""Pattern of a mask with options, such as ``mask.png:invert,grow=3``."""
 
 
 def split_tail(text: str) -> tuple[str, str]:
-    """Return a file name, and the words after it with their colon.
+    """Return a file name, and the words after it including their colon.
 
     Examples
     --------
@@ -36,7 +36,7 @@ def split_tail(text: str) -> tuple[str, str]:
 
 
 def make_mask(text: str) -> Mask:
-    """Return the mask in a file, according to the words after its name."""
+    """Return the mask of a file, with the options in the words after its name."""
     path, tail = split_tail(text)
     given: dict[str, Any] = {}
     for word in tail[1:].split(",") if tail else ():

@@ -1,4 +1,4 @@
-"""Values as text on the command line: sizes, axes, numbers, points, edits."""
+"""Convert texts on the command line to values: sizes, axes, numbers, points and edits."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 
 FOUND = "found"
-"""Word for parts of a plane that are not given."""
+"""Word for values of a plane that texrs finds."""
 PLANE = "plane:"
 """Prefix of the words that describe a plane."""
 
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """Context for the text of an option."""
+    """Context for converting the text of an option."""
 
     option: str = ""
-    """Name in errors."""
+    """Name of the option in errors."""
     axes: int = 2
     first: str = ""
     """Text of the first argument, usually the name of the example."""
@@ -33,15 +33,15 @@ class About:
     like: Array | None = None
     """Exemplar, once it is read."""
     spacing: tuple[float, ...] | None = None
-    """Spacing of the exemplar's voxels, z first, if it is stated."""
+    """Voxel spacing of the exemplar, (plane, row, column), if it is stated."""
     roles: Mapping[str, str] = field(default_factory=dict)
-    """Roles of the maps of materials."""
+    """Roles of the maps of a material, by name."""
 
 
 def parse_size(text: str, option: str = "--size", *, axes: int = 2, limit: int | None = None) -> tuple[int, ...]:
-    """Return (rows, columns) of ``1024x512``, which is the width and the height, or of ``512`` for a square.
+    """Convert ``1024x512``, width and height, to (rows, columns). A single number gives a square.
 
-    With three axes the depth comes last in the text, and the planes come first in the result.
+    With three axes, ``WIDTHxHEIGHTxDEPTH`` becomes (planes, rows, columns).
     """
     parts = re.split(r"[x×]", text.strip().lower())
     if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
@@ -52,7 +52,7 @@ def parse_size(text: str, option: str = "--size", *, axes: int = 2, limit: int |
 
 
 def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[bool, ...]:
-    """Return whether each axis is among the letters: x for columns, y for rows, z for planes."""
+    """Return whether each axis is named by a letter in the text: x for columns, y for rows, z for planes."""
     known = "zyx"[-axes:]
     letters = text.strip().lower()
     if letters != "none" and (not letters or set(letters) - set(known) or len(set(letters)) < len(letters)):
@@ -66,7 +66,7 @@ def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[boo
 
 
 def show_axes(wrap: bool | Sequence[bool]) -> str:
-    """Return the letters of the axes."""
+    """Return the letters of the marked axes as text."""
     if isinstance(wrap, bool):
         return "all" if wrap else "none"
     return "".join(letter for letter, cyclic in zip("xyz", reversed(wrap), strict=False) if cyclic) or "none"
@@ -75,7 +75,7 @@ def show_axes(wrap: bool | Sequence[bool]) -> str:
 def parse_numbers(
     text: str, option: str, wanted: str, *, counts: Sequence[int] = (), between: str = ":"
 ) -> list[float]:
-    """Return finite numbers that are separated by a character."""
+    """Convert numbers that are separated by a character. All must be finite."""
     try:
         numbers = [float(p) for p in text.split(between)]
     except ValueError:
@@ -86,20 +86,20 @@ def parse_numbers(
 
 
 def parse_spacing(text: str, about: About) -> tuple[float, ...]:
-    """Return (z, y, x) of ``0.7x0.7x1.6``, the width, height and depth of a voxel. One number gives a cube."""
+    """Convert ``0.7x0.7x1.6``, the width, height and depth of a voxel, to (z, y, x). One number gives a cube."""
     wanted = "WIDTHxHEIGHTxDEPTH of a voxel, as in 0.7x0.7x1.6, or one number"
     numbers = parse_numbers(text.lower().replace("×", "x"), about.option, wanted, counts=(1, about.axes), between="x")
     return tuple(numbers[::-1]) if len(numbers) > 1 else tuple(numbers) * about.axes
 
 
 def parse_range(text: str, about: About) -> tuple[float, float]:
-    """Return the minimum and the maximum of ``0.8:1.2``. ``1`` gives both."""
+    """Convert ``0.8:1.2`` to (minimum, maximum). A single number is both."""
     numbers = parse_numbers(text, about.option, "LEAST:LARGEST, as in 0.8:1.2", counts=(1, 2))
     return numbers[0], numbers[-1]
 
 
 def parse_sizes(text: str, about: About) -> str | bool | list[float]:
-    """Return auto, a bool for yes or no, or numbers."""
+    """Convert a text to "auto", to a bool for yes or no, or to numbers."""
     word = text.strip().lower()
     if word in ("auto", "yes", "no"):
         return "auto" if word == "auto" else word == "yes"
@@ -107,7 +107,7 @@ def parse_sizes(text: str, about: About) -> str | bool | list[float]:
 
 
 def parse_bytes(text: str, option: str = "--memory-limit") -> int:
-    """Return the number of bytes of ``900M`` or ``16G``, in powers of 1024."""
+    """Convert ``900M`` or ``16G`` to a number of bytes, with powers of 1024."""
     found = re.fullmatch(r"([0-9]{1,18})([kmgt]?)(i?b)?", text.strip().lower())
     if not found or int(found[1]) == 0:
         raise InvalidInput(f"{option}: must be a number of bytes, as in 900M or 16G; got {text!r}")
@@ -115,7 +115,7 @@ def parse_bytes(text: str, option: str = "--memory-limit") -> int:
 
 
 def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
-    """Return a number for each plane, or None for a plane whose number will be found."""
+    """Convert texts to one number for each plane. The word found becomes None."""
     found: list[float | None] = []
     for text in texts:
         word = text.strip().lower()
@@ -126,16 +126,16 @@ def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
 
 
 def read_steps(text: str, about: About) -> Any:
-    """Return an edit: comma-separated names, JSON, or a JSON file."""
+    """Read the steps of an edit: comma-separated names, JSON, or a JSON file."""
     if not text.lower().endswith(".json") and not text.lstrip().startswith(("[", "{")):
         return [word.strip() for word in text.split(",")]
     found = read_json(text, about.option)
-    # A report contains its edit among other keys.
+    # A report contains its edit under a key.
     return found["edit"] if isinstance(found, dict) and "edit" in found else found
 
 
 def read_json(text: str, option: str) -> Any:
-    """Read JSON, or a JSON file."""
+    """Parse JSON text, or read a JSON file."""
     where = option
     if text.lower().endswith(".json"):
         where = text
@@ -150,7 +150,7 @@ def read_json(text: str, option: str) -> Any:
 
 
 def read_corrections(text: str, about: About) -> Any:
-    """Return a list of corrections: JSON, or a JSON file."""
+    """Read a list of corrections from JSON text or a JSON file."""
     if not (text.lower().endswith(".json") or text.lstrip().startswith("[")):
         raise InvalidInput(f"{about.option}: must be a file of JSON, or a list of steps as JSON; got {text!r}")
     return read_steps(text, about)

@@ -27,7 +27,7 @@ from texrs.materials._single import SingleMap
 from texrs.papers.design import design_variants
 
 CELLS = 256
-"""Cells of the index texture along each side."""
+"""Number of cells of the index texture along each side."""
 TILED = Options(CornerTiles, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
 DESIGNED = Options(
     design_variants,
@@ -95,7 +95,7 @@ def tiles_command(
     sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(index or str(CELLS), "--index")
     parts = is_stored(out) or chunks is not None or asked.scheduler is not None
     if windowed and not parts:
-        # Check this before the tiles are cut.
+        # Check the size before the tiles are cut, which takes long.
         as_size(sides, "--size", way=BEYOND)
     stack = Stack.take(dict.fromkeys(("depth", "format", "pack")) | {"role": role})
     values = TILED.read(given, which=lambda o: not o.file) | DESIGNED.read(given)
@@ -123,7 +123,7 @@ def tiles_command(
         tiles = CornerTiles(**call, progress=progress)
     note(f"made {tiles!r}, in {time.monotonic() - start:.1f} s", quiet=quiet)
     if not windowed:
-        # Earlier files of this command may be replaced: `write_folder` checks each name.
+        # `write_folder` checks that each existing file is from this command before it is replaced.
         with _outputs.write_folder(out, "out") as place:
             files = tiles.save(place, sides)
         note(f"wrote {out}: {', '.join(file.name for file in files)}", quiet=quiet)

@@ -1,4 +1,4 @@
-"""A command for a verb of the library: it reads the inputs, calls the verb and writes the result."""
+"""Run a function of the library as a command: read the inputs, call the function and write the result."""
 
 from __future__ import annotations
 
@@ -50,46 +50,46 @@ PALETTE = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Verb:
-    """A function that returns a `Synthesis`, as a command."""
+    """A command that calls a function which returns a `Synthesis`."""
 
     options: Options
     times: int = 1
-    """Default size of the result, in sides of the first input."""
+    """Default size of the result, as a multiple of the first input."""
     shape: str = ""
-    """File whose shape the result has if it is given and no size is."""
+    """Name of the parameter whose file determines the size of the result, if no size is given."""
     several: Callable[..., Iterable[Synthesis]] | None = None
-    """Function that makes ``count`` results."""
+    """Function that computes several results for ``--variants``."""
     says: Callable[[Synthesis], str] = lambda result: ""
-    """Additional text about the result."""
+    """Function that returns additional text about a result."""
     scaled: bool = True
-    """Whether a pixel of the result has the size of one of the first input."""
+    """Whether a pixel of the result shows the same length as a pixel of the first input."""
     fills: bool = False
-    """If True, it fills pixels of the first input and keeps the others in place.
+    """If True, the command fills pixels of the first input and keeps the others in place.
 
     A transparent input can then become opaque.
     """
     keeps: bool = False
-    """If True, pixels stay in place if the size stays.
+    """If True, pixels stay in place if the result has the size of the input.
 
     A georeference is then written only to a result of the same size.
     """
     beyond: str = ""
-    """Method for larger results."""
+    """Remedy in errors about results that are too large."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
-    """Values that the texts of the options determine if they are not given."""
+    """Function that returns values for options that are not given, from the texts of the others."""
 
     def make_command(self) -> Callable[..., None]:
-        """Return the function of the command."""
+        """Return the function of the command for typer."""
         return as_command(self.run, self.make_parameters())
 
     def make_parameters(self) -> list[inspect.Parameter]:
-        """Return all arguments and options."""
+        """Return the parameters of all arguments and options of the command."""
         parameters = [o.make_parameter() for o in self.options if o.argument]
         parameters.append(make_parameter("out", Annotated[str, to_write("out")]))
         parameters += [o.make_parameter() for o in self.options if not o.argument]
         if self.several is not None:
             parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
-        # Materials are images.
+        # Only images can be maps of a material.
         stacked = self.options.axes == 2
         for name in ("source_map", "stages", *(SHOWN if stacked else ())):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
@@ -101,20 +101,20 @@ class Verb:
     def run(
         self, *, count: int | None, quiet: bool, variants: int | None = None, palette: bool | None = None, **given: Any
     ) -> None:
-        """Run the command. Errors about size name the method for larger results."""
+        """Run the command. Errors about size contain a remedy for larger results."""
         try:
             with collect() as notices, ask(palette):
                 self.make(count=count, quiet=quiet, variants=variants, notices=notices, **given)
         except LimitExceeded as error:
             if not self.beyond or not str(error).startswith(("size:", "--size:")):
                 raise
-            # The Python method does not help on the command line.
+            # Drop the Python remedy, which does not help on the command line.
             raise LimitExceeded(f"{str(error).partition('; texrs.')[0]}; {self.beyond}") from None
 
     def make(
         self, *, count: int | None, quiet: bool, notices: Notices, variants: int | None = None, **given: Any
     ) -> None:
-        """Run the command. Everything possible is checked before files are read, and before the work."""
+        """Run the command. Arguments and outputs are checked before files are read, and before the work."""
         start, options = time.monotonic(), self.options
         stack = Stack.take(given)
         paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
@@ -191,9 +191,9 @@ class Verb:
         note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
     def find_material(self, values: Mapping[tuple[str, ...], Any]) -> Material | None:
-        """Return the material that the result belongs to, if there is one.
+        """Return the material among the inputs whose maps the result has. None if there is none.
 
-        Other inputs are only a reference of appearance.
+        Inputs that only guide the result are ignored.
         """
         names = getattr(self.options.function, "takes", ())
         several = (value for path, value in values.items() if path[0] in names)
@@ -201,14 +201,14 @@ class Verb:
         return next((each for each in every if isinstance(each, Material) and not isinstance(each, SingleMap)), None)
 
     def find_example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
-        """Return the pixels of the first input."""
+        """Return the pixels of the first input, as an array."""
         first = values[next(o.path for o in self.options if o.argument)]
         first = first[0] if isinstance(first, list) else first
-        # Analysed elements contain their image, and materials have one that represents them.
+        # An analysis contains its image, and a material contains an image that represents it.
         return np.asarray(first.base if isinstance(first, Material) else getattr(first, "image", first))
 
     def read_colours(self, given: Mapping[str, Any], out: str) -> io.Metadata:
-        """Return the colour description of the first input, which the result keeps, and its pixels."""
+        """Return the metadata of the first input that the result keeps, such as its colour profile."""
         first = given[next(o.name for o in self.options if o.argument)]
         name = first[0] if isinstance(first, list) else first
         notes = io.read_metadata(name) if os.path.isfile(name) else io.Metadata()
@@ -222,7 +222,7 @@ class Verb:
         return replace(notes, made=None, density=notes.density if self.scaled else None)
 
     def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
-        """Return the approximate size of the result."""
+        """Return the approximate size of the result before it is computed."""
         if ("size",) in values:
             return tuple(values["size",])
         if (self.shape,) in values and not isinstance(values[self.shape,], str):

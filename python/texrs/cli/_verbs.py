@@ -1,4 +1,4 @@
-"""Commands for verbs: each is a verb, the kinds of its inputs, and the options that need special treatment."""
+"""Define the commands for functions of the library: the kinds of their inputs, and their special options."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemp
 
 
 def make_verb(name: str) -> Verb:
-    """Return the verb of a name. Its function is imported now."""
+    """Create the command of a name. The module of its function is imported now."""
     match name:
         case "inpaint":
             from texrs.inpainting import inpaint
@@ -141,33 +141,33 @@ def make_verb(name: str) -> Verb:
 
 @dataclass(frozen=True, slots=True)
 class Filling(Verb):
-    """A verb for images that also takes volumes."""
+    """A command for images that also processes volumes."""
 
     deep: Verb | None = None
 
     def run(self, **given: Any) -> None:
-        """Fill a volume if the mask is one, or if the values of a volume define the hole. Else fill an image."""
+        """Fill a volume if the mask is a volume, or if the values of a volume define the hole. Otherwise fill an image."""
         mask = given["mask_marks"]
         named = given["image"] if mask is None or mask in FILLED.words or is_number(mask) else mask
         deep = None
-        # The reader refuses an unreadable file later.
+        # Ignore an unreadable file here, because the reader raises an error later.
         with suppress(FileError):
             deep = self.deep if not named.startswith(_outputs.SAMPLE) and holds_volume(named) else None
         Verb.run(deep or self, **given)
 
 
 def count_moved(result: Synthesis) -> str:
-    """Return the number of elements that moved."""
+    """Return a text with the number of elements that moved."""
     return f", {len(result.report['matches'])} elements moved"
 
 
 def tell_filled(result: Synthesis) -> str:
-    """Return the filled share of the image."""
+    """Return a text with the filled share of the image."""
     return f", {100 * result.report['filled']:.3g} % filled"
 
 
 def tell_filled_volume(result: Synthesis) -> str:
-    """Return the filled share of a volume, and the step at the border of the hole."""
+    """Return a text with the filled share of a volume, and the step at the border of the hole."""
     from texrs.inpainting._volumes import SEEN
 
     step = dict(result.report["candidates"])[result.report["patch_size"]]
@@ -176,7 +176,7 @@ def tell_filled_volume(result: Synthesis) -> str:
 
 
 def tell_sizes(result: Synthesis) -> str:
-    """Return the source and the confidence of the measured sizes."""
+    """Return a text about where sizes were measured, and the confidence. Empty if they were not measured."""
     found = result.report["measured"]
     if found is None:
         return ""
@@ -189,7 +189,7 @@ def tell_sizes(result: Synthesis) -> str:
 
 
 def read_cameras(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the angle of view of an exemplar, and the y direction of a target's normals by its name."""
+    """Return options found in files: the angle of view of an exemplar, and the y direction of a target's normals."""
     found = read_exemplar_camera(given)
     target = given["target"] or ""
     if not target.startswith(PLANE) and (role := guess_role(Path(target).stem)) is not None and role.down:
@@ -200,26 +200,26 @@ def read_cameras(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
 
 
 def read_exemplar_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the angle of view of an exemplar from its metadata."""
+    """Return the option for the angle of view of an exemplar, from its metadata. Empty if it is not stated."""
     said = (given["scale_map"] or "").startswith(PLANE)
     fovs = [] if said else list(read_camera({"image": given["exemplar"]}).values())
     return {("fov",): fovs[0]} if fovs else {}
 
 
 def read_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the angle of view of the photograph from its metadata."""
+    """Return the option for the angle of view of a photograph, from its metadata. Empty if it is not stated."""
     fov = None if given["image"].startswith(_outputs.SAMPLE) else io.read_fov(given["image"])
     return {} if fov is None else {("view", "fov"): fov}
 
 
 def read_voxels(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the voxel spacing of the volume."""
+    """Return the option for the voxel spacing of a volume, from its file. Empty if it is not stated."""
     spacing = read_stated_spacing(given["exemplar_image"])
     return {} if spacing is None else {("spacing",): spacing}
 
 
 def say_planes(result: Synthesis) -> str:
-    """Return the planes that were followed."""
+    """Return a text about the slant and tilt of the planes that were used."""
     from texrs.planes._sizes import SURE
 
     said = []
@@ -242,13 +242,13 @@ def make_views(
     fov: list[float | None] | float | None = None,
     ground: list[Array | None] | None = None,
 ) -> Any:
-    """Return the known facts about the planes: a list for several masks of the ground, else a single `PlaneView`."""
+    """Return the views of the planes as a list, or the view itself if there is only one plane."""
     from texrs.planes import PlaneView
 
     given = {"corners": corners, "slant": slant, "tilt": tilt, "fov": fov, "ground": ground}
     several = {n: value if isinstance(value, list) else [value] for n, value in given.items() if value is not None}
     count = len(several.get("ground", [None]))
-    # All planes have the same camera.
+    # Use the same angle of view for all planes, because one camera took the photograph.
     several |= {"fov": several["fov"] * count} if len(several.get("fov", [])) == 1 else {}
     for name, values in several.items():
         if len(values) != count:
