@@ -34,15 +34,15 @@ class Ground:
     shape : tuple of int
         Shape of the exemplar.
     repeat : tuple of bool
-        Axes along which it is periodic.
+        Axes along which the exemplar is periodic.
     side : int
-        Side of a box.
+        Side of a box, in voxels.
     seed : int
-        Seed that chooses the places.
+        Seed of the choice of source positions.
     field : Field, optional
         Rotation and scale of boxes.
     lattice : (A, A) array, optional
-        Lattice vectors of the exemplar as rows, in samples. With one frame for all boxes they are in step.
+        Lattice vectors of the exemplar as rows, in samples. Boxes continue this lattice if all have the same frame.
 
     """
 
@@ -54,7 +54,7 @@ class Ground:
     lattice: NDArray[np.int64] | None = None
 
     def show(self, region: Region) -> tuple[Places, NDArray[np.uint32], NDArray[np.int32]]:
-        """Return the coordinates of a region, the box of each point, and the table of boxes."""
+        """Return the source coordinates of a region, the box of each point, and the table of boxes."""
         axes = len(self.shape)
         places = np.empty((*region.shape, axes), np.int32)
         boxes = np.empty(region.shape, np.uint32)
@@ -80,7 +80,7 @@ class Ground:
         return places.reshape(-1), boxes.reshape(-1), np.array(table, np.int32)
 
     def boxes(self, index: Sequence[int]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], Row]]:
-        """Return a box of the lattice, from its first point to one after its last, in parts if it does not fit."""
+        """Yield a box, or its parts if it does not fit: first point, point after the last, and source of each."""
         low = tuple(i * self.side for i in index)
         parts = self._divide(low, tuple(a + self.side for a in low))
         for number, (start, stop, centre, frame, ends) in enumerate(parts):

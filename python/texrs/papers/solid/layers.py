@@ -117,11 +117,11 @@ class Layers:
 
     @property
     def cached(self) -> int:
-        """Bytes of finished boxes in memory."""
+        """Memory of finished boxes, in bytes."""
         return self._kept.used
 
     def clear(self) -> None:
-        """Drop the finished boxes."""
+        """Delete the finished boxes from memory."""
         self._kept.clear()
 
     def read(self, box: Region, progress: Progress | None = None) -> Places:

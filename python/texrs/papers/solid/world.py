@@ -103,7 +103,7 @@ class World:
         return sum(kept.used for kept in self._kept)
 
     def clear(self) -> None:
-        """Drop the finished parts."""
+        """Delete the finished parts from memory."""
         for kept in self._kept:
             kept.clear()
 
