@@ -35,7 +35,7 @@ class Box:
         Source coordinates of each point. Empty if all patches are rigid, because the table then determines the
         coordinates.
     distortion : (...) float32
-        Distortion of each point. Empty if all patches are rigid.
+        Deviation of the patch from the field at each point. Empty if all patches are rigid.
 
     """
 

@@ -164,12 +164,12 @@ def splice(
         triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
         with departures from the paper.
     strength : float
-        Fraction of the way that elements move, from 0 (their own layout) to 1 (the other layout). With 0, separate
-        elements stay in place, so the result at the texture's own size equals the texture. Default: 1.
+        Fraction of the way that elements move, 0 to 1. 0 keeps their own layout, and 1 uses the other layout. With 0,
+        separate elements stay in place, so the result at the texture's own size equals the texture. Default: 1.
     layout_scale : float, optional
         Scale of the layout, 0.01 to 100. With 1, a pixel of the layout is a pixel of the result, and the centres of
         both images coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense
-        are pushed apart. Default: fits the layout to the spacing or the size of the elements.
+        are pushed apart. Default: the scale that fits the layout to the spacing or the size of the elements.
     align : bool, optional
         If True, the layout is rotated so that lines of its points agree with lines of the elements. Cells and nets
         ignore this. Default: True without ``layout_scale``.

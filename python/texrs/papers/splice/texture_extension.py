@@ -60,8 +60,8 @@ class Extension:
         Element of each pixel in a disjoint foreground, as an index of ``points`` counted from 1, and 0 for other
         pixels.
     stray : (H, W) bool
-        True for foreground without an element: elements that the border cuts, and remains of mirrored elements that
-        were replaced.
+        True for foreground without an element: parts of elements that the border cuts, and remains of replaced
+        mirrored elements.
     mirrored : (H, W, 2) bool
         True for each axis along which a pixel is mirrored.
     piece : (H, W) int32
