@@ -59,7 +59,7 @@ def find_sources(
     Parameters
     ----------
     texts : sequence of str
-        Files, folders, patterns, or ``sample:NAME``. Folders are searched with all folders in them.
+        Files, folders, patterns, or ``sample:NAME``. Folders are searched with all their subfolders.
     verb : str
         Command that processes the inputs.
     stacked : bool

@@ -44,7 +44,7 @@ STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask|numbers)\.png|report\.json")
 MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "Execution"
 """Groups of options in the help."""
 NO_MATERIALS = ("batch", "samples")
-"""Commands that do not read folders of maps. They refuse a folder as an input."""
+"""Commands that do not read a folder as a material. Their outputs can be in a folder of inputs."""
 MATTER = ("out", "folder", "size", "seed", "seeds", "options", "field", "wrap", "slant", "at")
 """Options that the help of a command lists before the others. The first three of them come first."""
 
@@ -84,7 +84,7 @@ def make_argument(metavar: str, text: str) -> Any:
 
 
 def make_option(metavar: str | None, text: str) -> Any:
-    """Return typer's description of an optional option."""
+    """Return typer's description of an option that is not required."""
     return typer.Option(metavar=metavar, help=text, show_default=False)
 
 

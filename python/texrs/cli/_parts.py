@@ -85,7 +85,7 @@ class InParts(Verb):
         self.run_parts(given, said, count=count, quiet=quiet)
 
     def run_parts(self, given: dict[str, Any], said: Mapping[str, Any], *, count: int | None, quiet: bool) -> None:
-        """Compute a part of an unbounded texture, chunk by chunk."""
+        """Compute a part of an unbounded texture chunk by chunk, and write it."""
         axes, options = self.options.axes, self.options
         paths = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         for name, path in paths.items():

@@ -142,7 +142,7 @@ def analyse(
     start = propose(guide, given, how.wrap, partial(watch, "propose")) if cellular is None else cellular.start
     _check(given, start, how)
 
-    # 2. Find where the texture looks like the element.
+    # 2. Find the places that look like the element.
     seen = _detect(guide, given, start, how, partial(watch, "search")) if cellular is None else cellular.found
 
     # 3. Find the pixels of the elements.

@@ -45,13 +45,13 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
     entry : ElementAnalysis
         Analysis to correct.
     steps : sequence of dict
-        Corrections in order. Elements have the numbers shown by `draw`, from 0, as they are before the step:
+        Corrections in order. Elements have the numbers that `draw` shows before the step, from 0:
 
         - ``{"op": "drop", "elements": [3, 7]}``: removes elements, and their foreground if elements are separate;
         - ``{"op": "add", "points": [[row, column], ...]}``: adds missed elements;
         - ``{"op": "move", "element": 4, "to": [row, column]}``: moves the centre of an element;
         - ``{"op": "layout", "layout": "connected"}``: changes the layout;
-        - ``{"op": "foreground", "points": [[row, column], ...], "radius": 4}``, and ``"background"``: paints dabs on
+        - ``{"op": "foreground", "points": [[row, column], ...], "radius": 4}``, and ``"background"``: paints dots on
           the mask.
 
     Returns

@@ -65,9 +65,10 @@ class ElementAnalysis:
     report : dict
         Results and decisions of the analysis, as text, numbers and lists.
     angles : ndarray of shape (n,), float64, optional
-        Rotation of each element relative to the chosen one, in degrees, among the directions that were searched.
+        Rotation of each element relative to the chosen one, in degrees. It is one of the directions that were searched
+        for.
     scales : ndarray of shape (n,), float64, optional
-        Size of each element relative to the chosen one, among the sizes that were searched.
+        Size of each element relative to the chosen one. It is one of the sizes that were searched for.
     sets : Similarity, optional
         Result of `similarity`, if it was computed for storage.
     known : ndarray of shape (height, width), int32, optional

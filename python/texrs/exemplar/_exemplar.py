@@ -53,7 +53,7 @@ T = TypeVar("T")
 
 FORMAT = 2
 CACHED = 256 << 20
-"""Size of the cache of facts, which are keyed by content, in bytes. A larger fact is cached without any other."""
+"""Maximum size, in bytes, of the cache of facts, which are keyed by content. A single larger fact is cached alone."""
 _SMALL = 1 << 12
 _ANALYSED, _SAID = 256, 1 << 24
 """Maximum size of a saved analysis in bytes per sample, and maximum size of the other parts of the file in bytes."""

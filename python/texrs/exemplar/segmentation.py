@@ -227,7 +227,7 @@ class Segmentation:
 def segment(
     image: Array, options: ElementOptions = ElementOptions(), *, progress: Progress | bool | None = None
 ) -> Segmentation:
-    """Segment an exemplar into a background and elements.
+    """Divide an exemplar into a background and elements.
 
     Parameters
     ----------

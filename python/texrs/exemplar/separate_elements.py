@@ -26,7 +26,7 @@ COLOURS = 6
 LEAST = 6
 """Minimum number of areas, and minimum number of samples of an area that counts."""
 LARGEST = 0.15
-"""Maximum size of an element, as a share of all areas."""
+"""Maximum size of an element, as a share of the total size of all elements."""
 FAIR, SHARE, COMPACT, EXPLAINED, PLAIN = 0.9, 0.65, 0.9, 0.3, 0.45
 """Criteria for accepting a background, in this order.
 
@@ -159,7 +159,7 @@ def _score_pieces(mask: Bools, apart: Bools, whole: float, wrap: Sequence[bool])
 def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
     """Return True if areas look like elements on a background.
 
-    They must cover few samples and be short, in a plain background of another colour.
+    Elements cover few samples and are short, and their background is plain and has another colour.
     """
     from scipy import ndimage
 

@@ -23,7 +23,7 @@ ALL: tuple[Flip, ...] = (NONE, (True, False), (False, True), (True, True))
 POLAR, SUSPECT = 5.0, 4.5
 """Difference between an exemplar and its mirror image, in standard errors, that is certain, and that is suspected.
 
-With 3.5, heaps of fruit were not excluded from mirroring left to right, so that elements faced each other.
+With a threshold of 3.5, heaps of fruit would be mirrored only left to right, and elements would face each other.
 """
 
 
