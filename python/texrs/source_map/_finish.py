@@ -121,7 +121,7 @@ class RenderOptions:
         Parameters
         ----------
         parts : mapping of str to array
-            Arrays by name. Other entries are ignored.
+            Arrays by name, with the shapes that `arrays` states. Other entries are ignored.
         shape : tuple of int
             Shape of the map in pixels.
         shapes : tuple of tuple of int

@@ -23,7 +23,7 @@ class CopyStatistics:
     verbatim : float
         Fraction of the output pixels that are unchanged samples of an exemplar, at integer coordinates.
     largest : float
-        Area of the largest connected region copied in one piece, divided by the area of the largest exemplar.
+        Area of the largest region copied in one piece, as a share of the area of the largest exemplar.
     regions : int
         Number of such regions.
 
